@@ -135,6 +135,92 @@ def test_a_rover_pushes_one_that_stands_on_ice():
     assert sum(contacts.impulses[push, 0]) / 0.005 == pytest.approx(CART * acceleration, rel=1e-9)
 
 
+def short(name: str) -> RoverModel:
+    """A cart whose wheels reach beyond its chassis."""
+    return machine(name, FOUR)
+
+
+def meeting_wheels(friction: float) -> Simulation:
+    """Two carts without weight: the front wheels of the first, which spin, meet the back wheels of the other."""
+    pair = RoverModel.join({"a": short("a"), "b": short("b")})
+    sim = Simulation(pair, gravity=(0, 0, 0), friction=friction)
+    q, v, first, second = np.zeros(pair.nv), np.zeros(pair.nv), *(pair.machines[name].coordinates for name in "ab")
+    q[first.start + 1] = q[second.start + 1] = 5.0
+    q[second.start] = 0.6 + 2 * RADIUS + 2e-3
+    v[first.start] = 1.0
+    v[[first.start + 6, first.start + 7]] = -4.0
+    sim.set_state(q, v)
+    return sim
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_a_wheel_that_is_met_feels_the_force_of_the_one_that_meets_it(friction):
+    sim = meeting_wheels(friction)
+    for _ in range(10):
+        sim.step()
+        if len(sim.contacts):
+            break
+    others = [other for other in sim.contacts.others if other is not None]
+    assert len(others) == 2
+    forces = sim.wheel_forces
+    names = sim.model.wheel_names
+    hit = [names.index(name) for name in ("a/FL", "a/FR", "b/BL", "b/BR")]
+    front, back = forces[hit[:2]], forces[hit[2:]]
+    assert (front[:, 0] > 100.0).all()
+    # Opposite normals and axles that agree: forces along the normal and the rolling direction are the same.
+    np.testing.assert_allclose(back[:, :2], front[:, :2], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(back[:, 2], -front[:, 2], rtol=0.0, atol=1e-9)
+    assert (np.abs(front[:, 1]) > 1.0).all() == (friction > 0.0)
+    assert not forces[[k for k in range(8) if k not in hit]].any()
+    assert back[:, 0].sum() * 0.005 == pytest.approx(sim.contacts.impulses[:, 0].sum())
+
+
+def test_a_chassis_that_is_met_by_a_chassis_counts_as_pressed_on_both_sides():
+    sim = on_slope({"tug": cart(), "sledge": cart("skate")}, [0.0, 1.0 + 1e-9], materials={("skate", "ground"): (0, 0)})
+    sim.set_wheel_torques([4.0] * 4 + [0.0] * 4)
+    sim.step(20)
+    push = [k for k, other in enumerate(sim.contacts.others) if other is not None]
+    assert sim.trunk_force == pytest.approx(2.0 * sim.contacts.impulses[push, 0].sum() / 0.005)
+
+
+@pytest.mark.parametrize("time_step", [5e-3, 0.02])
+def test_rovers_that_meet_head_on_at_three_metres_a_second_do_not_pass(time_step):
+    model = RoverModel.named("rover")
+    pair = RoverModel.join({"a": model, "b": model})
+    rolling = -3.0 / np.asarray(model.wheel_radii)
+    for late in np.linspace(0.0, 1.0, 5):
+        sim = Simulation(pair, time_step=time_step)
+        v = np.zeros(pair.nv)
+        for own, speed in zip(pair.machines.values(), (3.0, -3.0), strict=True):
+            v[own.coordinates.start] = speed
+            v[own.coordinates.start + np.asarray(model.wheel_joint_indices)] = rolling
+        starts = [model.resting_pose(Plane(), place, turn) for place, turn in (((0, 0), 0), ((3, 0.1), math.pi))]
+        starts[1][0] += late * 6.0 * time_step
+        sim.set_state(np.concatenate(starts), v)
+        before = sim.energy()
+        sim.step(round(0.8 / time_step))
+        assert sim.q[pair.machines["b"].coordinates.start] - sim.q[0] > 1.2, "a body's length"
+        after = sim.energy()
+        assert after.kinetic + after.potential < before.kinetic + before.potential
+
+
+def test_parts_meet_while_they_move_by_less_than_a_third_of_their_thickness_in_a_step():
+    shape = {"kind": "box", "size": [0.03, 1.0, 1.0]}
+    solid = {"name": "plate", "mass": 50.0, "shape": shape, "collides": True}
+    plate = RoverModel.from_dict({"name": "plate", "solids": [solid]})
+    shot = ball(0.5).to_dict()
+    shot["solids"][0]["shape"]["radius"] = 0.05
+    pair, h = RoverModel.join({"ball": RoverModel.from_dict(shot), "plate": plate}), 0.02
+    speed = 0.98 * 0.13 / 3 / h
+    for late in np.linspace(0.0, 1.0, 20):
+        sim = Simulation(pair, time_step=h, gravity=(0, 0, 0))
+        q, v = np.zeros(12), np.zeros(12)
+        q[0], v[0] = -1.0 - late * speed * h, speed
+        sim.set_state(q, v)
+        sim.step(50)
+        assert sim.q[0] < sim.q[6]
+
+
 @pytest.mark.parametrize("hitch", ["ball joint", "bar"])
 def test_a_rover_tows_one_without_power_up_a_slope(hitch):
     slope, torque, long = 0.1, 6.0, 0.6

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from rover_gym import PDPolicy, Plane, RoverModel, Simulation, TriangleMesh
+from rover_gym import PDPolicy, Plane, RoverModel, Simulation, SphereField, TriangleMesh
 from rover_gym.mechanics import ModelError
 
 HULL, BELT = 200.0, 20.0
@@ -177,6 +177,96 @@ def test_a_lump_from_a_urdf_drives_on_tracks(tmp_path):
         if terminated:
             break
     assert info["distance_to_goal"] < start - 1.0
+
+
+#: Two commercial vehicles: mass, kg, centre and moments of the lump in the file's axes; then what the file does not
+#: say: mass of a belt, gauge, contact length, radius and number of wheels.
+VEHICLES = {
+    "small": ((41.0, (0.003, 0.0, -0.1), (0.43, 1.23, 1.38)), (7.0, 0.46, 0.42, 0.10, 9)),
+    "large": ((117.1, (-0.05, 0.0, -0.17), (2.44, 8.5, 8.85)), (20.0, 0.68, 0.70, 0.12, 13)),
+}
+TOP_SPEED = 1.5
+
+
+def vehicle(name: str, folder) -> RoverModel:
+    (mass, centre, moments), (belt, gauge, length, radius, wheels) = VEHICLES[name]
+    text = LUMP.replace("0.003 0 -0.1", " ".join(map(str, centre))).replace('mass value="41"', f'mass value="{mass}"')
+    for old, new in zip(("0.43", "1.23", "1.38"), moments, strict=True):
+        text = text.replace(f'"{old}"', f'"{new}"')
+    (folder / "lump.urdf").write_text(text.replace('ixz="-0.03"', 'ixz="0"'))
+    lump = RoverModel.from_urdf(folder / "lump.urdf", wheels=[]).to_dict()
+    stall = 0.9 * (mass + 2 * belt) * GRAVITY * radius  # of a track
+    track = {"solid": "base_link", "wheels": wheels, "radius": radius, "mass": belt, "drive_sign": -1.0}
+    track |= {"torque_limit": stall, "motor": {"stall_torque": stall, "no_load_speed": TOP_SPEED / radius}}
+    height = centre[2] - 0.02
+    ends = {"from": [length / 2, height], "to": [-length / 2, height]}
+    tracks = [
+        track | {"name": side} | {end: [*at, z] for end, at in ends.items()}
+        for side, z in (("left", -gauge / 2), ("right", gauge / 2))
+    ]
+    return RoverModel.from_dict(lump | {"tracks": tracks})
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+@pytest.mark.parametrize("degrees", [0.0, 10.0, 20.0, 30.0])
+def test_a_commercial_vehicle_climbs_at_the_speed_of_its_motors(tmp_path, name, degrees):
+    """On the motors' line at the torque that the slope takes, v = v_top (1 - W sin α R / τ)."""
+    pytest.importorskip("yourdfpy")
+    model, slope = vehicle(name, tmp_path), math.radians(degrees)
+    sim = Simulation(model, Plane([-math.sin(slope), math.cos(slope), 0.0], 0.0), friction=FRICTION)
+    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim.set_wheel_torques(torques(model, 1e4, 1e4))
+    assert sim.step(1000).is_converged
+    assert np.hypot(*sim.v[:2]) == pytest.approx(TOP_SPEED * (1.0 - math.sin(slope) / 1.8), rel=1e-3)
+    assert abs(sim.q[2]) < 1e-3
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+@pytest.mark.parametrize("speeds", [(-0.4, 0.4), (0.0, 0.4), (0.2, 0.4)])
+def test_a_commercial_vehicle_turns_as_slip_along_and_across_allow(tmp_path, name, speeds):
+    """Slow belts slip by the same σ along: ψ' = (v_r - v_l) / (B + 2 σ / ψ'), whatever their mean speed."""
+    pytest.importorskip("yourdfpy")
+    _, (_, gauge, length, radius, wheels) = VEHICLES[name]
+    sim = standing(vehicle(name, tmp_path), time_step=2e-3)
+    gain = 50.0 * sim.model.mass * radius**2
+    x = np.linspace(-length / 2, length / 2, wheels)
+    rates = []
+    for k in range(1500):
+        belts = -sim.v[6:8] * radius
+        sim.set_wheel_torques(torques(sim.model, *(gain * (np.array(speeds) - belts) / radius)))
+        sim.step()
+        if k >= 1000:
+            rates.append((sim.v[4], *belts))
+    rate, left, right = np.mean(rates, axis=0)
+    share = sim.wheel_forces[:wheels, 0] + sim.wheel_forces[wheels:, 0]
+    middle = (share * x).sum() / share.sum()  # turns about the centre of the load, nearly
+
+    def moment(d):
+        slip = np.sqrt(d * d + (x - middle) ** 2)
+        return (share * (gauge / 2 * d - (x - middle) ** 2) / slip).sum()
+
+    d = brentq(moment, 1e-6, 10.0)
+    assert rate == pytest.approx((right - left) / (gauge + 2 * d), rel=0.03)
+    assert np.abs(np.array([left, right]) - speeds).max() < 0.1
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_commercial_vehicle_drives_and_turns_over_rocks(tmp_path, name):
+    pytest.importorskip("yourdfpy")
+    model, rng = vehicle(name, tmp_path), np.random.default_rng(1)
+    centres, radii = np.zeros((600, 3)), rng.uniform(0.03, 0.1, 600)
+    centres[:, 0], centres[:, 2] = rng.uniform(0.8, 6.0, 600), rng.uniform(-1.5, 1.5, 600)
+    centres[:, 1] = -0.5 * radii
+    sim = Simulation(model, SphereField(centres, radii, Plane()), friction=0.8)
+    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim.set_wheel_torques(torques(model, 1e4, 1e4))
+    assert sim.step(600).is_converged
+    assert sim.q[0] > 3.5
+    heading = sim.q[4]
+    sim.set_wheel_torques(torques(model, -1e4, 1e4))
+    assert sim.step(80).is_converged
+    assert sim.q[4] - heading > 0.5
+    assert sim.deepest_overlap > -2e-3
 
 
 @pytest.mark.parametrize(

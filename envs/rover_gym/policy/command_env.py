@@ -23,6 +23,7 @@ from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimit
 from rover_gym.policy.features import Features
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.validation import array, known_keys, refuse, whole
+from rover_gym.vector.pushed_vector import RandomPushesVector
 from rover_gym.vector.vector_env import RoverVectorEnv
 
 #: Most steps that a command may be held; a few minutes.
@@ -179,7 +180,8 @@ class CommandVectorEnv(VectorWrapper):
         >>> envs = CommandVectorEnv(gym.make_vec("Rover-v0", 64), repeat=6)
 
     Args:
-        env: A `RoverVectorEnv` with autoreset in the next or in the same step; wrappers go around this one.
+        env: A `RoverVectorEnv` with autoreset in the next or in the same step, or a `RandomPushesVector` around one;
+            other wrappers go around this one.
         repeat: Steps that a command is held.
         pool: Height-scan points per pooling cell, lengthwise and crosswise.
         **limits: Fields of `CommandLimits`.
@@ -188,16 +190,22 @@ class CommandVectorEnv(VectorWrapper):
         OptionError: An argument is out of range, or `env` is another environment.
     """
 
-    def __init__(self, env: RoverVectorEnv, repeat: int = 4, *, pool: int = 1, **limits: float) -> None:
-        if not isinstance(env, RoverVectorEnv):
+    def __init__(
+        self, env: RoverVectorEnv | RandomPushesVector, repeat: int = 4, *, pool: int = 1, **limits: float
+    ) -> None:
+        self._pushes = env if isinstance(env, RandomPushesVector) else None
+        rovers = env.rovers if isinstance(env, RandomPushesVector) else env
+        if not isinstance(rovers, RoverVectorEnv):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
-        if env.autoreset_mode == AutoresetMode.DISABLED:
-            refuse(OptionError, "env.autoreset_mode", env.autoreset_mode.value, "must be NextStep or SameStep")
+        if rovers.autoreset_mode == AutoresetMode.DISABLED:
+            refuse(OptionError, "env.autoreset_mode", rovers.autoreset_mode.value, "must be NextStep or SameStep")
         super().__init__(env)
-        self.rovers = env
-        self.held = HeldCommands(env.prototype, env.num_envs, repeat=repeat, pool=pool, limits=limits)
+        self.rovers = rovers
+        self._driven = env
+        self.held = HeldCommands(rovers.prototype, env.num_envs, repeat=repeat, pool=pool, limits=limits)
         self.repeat = self.held.repeat
         self._over: Mask = np.zeros(self.num_envs, np.bool_)
+        self._forces: Array = np.zeros((self.num_envs, 3))
         self.single_action_space = self.held.action_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.show(self.held.observation_space)
@@ -224,7 +232,7 @@ class CommandVectorEnv(VectorWrapper):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Starts episodes, as `RoverVectorEnv.reset`."""
-        self.held.seen, infos = self.rovers.reset(seed=seed, options=options)
+        self.held.seen, infos = self._driven.reset(seed=seed, options=options)
         self._over &= ~(options or {}).get("reset_mask", np.True_)
         return self.observe(), infos
 
@@ -252,20 +260,29 @@ class CommandVectorEnv(VectorWrapper):
         """
         commands = check_commands(actions, (self.num_envs, N_COMMANDS))
         if self._over.any():
-            self.held.seen, _ = self.rovers.reset(options={"reset_mask": self._over})
+            self.held.seen, _ = self._driven.reset(options={"reset_mask": self._over})
         moved, self._over = ~self._over, np.zeros(self.num_envs, np.bool_)
-        batch = self.rovers.batch
-        rewards, terminated, truncated = self.held.hold(
-            commands, moved, lambda actions, active, has_scan: batch.step(actions, active, has_scan=has_scan)[:4]
-        )
+        self._forces[~moved] = 0.0
+        rewards, terminated, truncated = self.held.hold(commands, moved, self._step)
         self._over = terminated | truncated
         last = self.observe()
         rewards = self.reward(rewards, last, moved)
         finals = self._begin_next(last) if self.rovers.autoreset_mode == AutoresetMode.SAME_STEP else {}
-        infos = batch.infos()
+        infos = self.rovers.batch.infos()
+        if self._pushes is not None:
+            infos["push"] = self._forces.copy()
         for i, final in finals.items():
             infos = self._add_info(infos, final, i)
         return (self.observe() if finals else last), rewards, terminated, truncated, infos
+
+    def _step(self, actions: Observations, active: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
+        """A control period of the active rovers."""
+        if self._pushes is not None:
+            self._forces[active] = self._pushes.push_all(active)[active]
+        stepped = self.rovers.batch.step(actions, active, has_scan=has_scan)[:4]
+        if self._pushes is not None:
+            self._pushes.count_periods(active)
+        return stepped
 
     def _begin_next(self, last: Any) -> dict[int, dict[str, Any]]:
         """Starts the next episodes of the rovers whose episode is over; returns what the last ones ended with.
@@ -273,17 +290,21 @@ class CommandVectorEnv(VectorWrapper):
         If one cannot begin, none does, and the next command refuses it.
         """
         finals = {
-            i: {"final_obs": _row(last, i), "final_info": self.rovers.batch.info(i)}
+            i: {"final_obs": _row(last, i), "final_info": self._final_info(i)}
             for i in np.flatnonzero(self._over).tolist()
         }
         if not finals:
             return {}
         try:
-            self.held.seen, _ = self.rovers.reset(options={"reset_mask": self._over})
+            self.held.seen, _ = self._driven.reset(options={"reset_mask": self._over})
         except TerrainError:
             return finals
         self._over = np.zeros(self.num_envs, np.bool_)
         return finals
+
+    def _final_info(self, i: int) -> dict[str, Any]:
+        pushed = {} if self._pushes is None else {"push": self._forces[i].copy()}
+        return self.rovers.batch.info(i) | pushed
 
 
 def _row(observations: Any, i: int) -> Any:

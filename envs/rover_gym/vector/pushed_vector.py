@@ -33,7 +33,7 @@ class RandomPushesVector(PushedRovers, VectorWrapper):
         if not isinstance(env, RoverVectorEnv):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
         VectorWrapper.__init__(self, env)
-        self._rovers = env
+        self.rovers = env
         self.set_pushes(push_options(force, options), env.prototype, env.num_envs)
         self._over: Mask = np.zeros(self.num_envs, np.bool_)
 
@@ -41,7 +41,7 @@ class RandomPushesVector(PushedRovers, VectorWrapper):
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
         """Starts episodes, as `RoverVectorEnv.reset`."""
-        observation, infos = self._rovers.reset(seed=seed, options=options)
+        observation, infos = self.rovers.reset(seed=seed, options=options)
         mask = (options or {}).get("reset_mask")
         chosen = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask)
         self._begin(chosen)
@@ -50,20 +50,29 @@ class RandomPushesVector(PushedRovers, VectorWrapper):
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, dict[str, Any]]:
         """Applies actions `(num_envs, n_actions)` and the forces of the period."""
-        begins = self._over & (self._rovers.autoreset_mode == AutoresetMode.NEXT_STEP)
-        going = np.flatnonzero(~self._over).tolist()
-        forces = np.zeros((self.num_envs, 3))
-        for i in going:
-            forces[i] = self.push(i, self._rovers.envs[i])
-        observation, rewards, terminated, truncated, infos = self._rovers.step(actions)
-        for i in going:
-            self.count_period(i)
+        begins = self._over & (self.rovers.autoreset_mode == AutoresetMode.NEXT_STEP)
+        going = ~self._over
+        forces = self.push_all(going)
+        observation, rewards, terminated, truncated, infos = self.rovers.step(actions)
+        self.count_periods(going)
         self._over = terminated | truncated
-        if self._rovers.autoreset_mode == AutoresetMode.SAME_STEP:
+        if self.rovers.autoreset_mode == AutoresetMode.SAME_STEP:
             begins, self._over = self._over, np.zeros(self.num_envs, np.bool_)
         self._begin(begins)
         return observation, rewards, terminated, truncated, infos | {"push": forces}
 
+    def push_all(self, going: Mask) -> Array:
+        """Applies the forces of the coming control period to some rovers and returns them, (num_envs, 3), N."""
+        forces = np.zeros((self.num_envs, 3))
+        for i in np.flatnonzero(going).tolist():
+            forces[i] = self.push(i, self.rovers.envs[i])
+        return forces
+
+    def count_periods(self, gone: Mask) -> None:
+        """Counts a control period that some rovers have taken."""
+        for i in np.flatnonzero(gone).tolist():
+            self.count_period(i)
+
     def _begin(self, chosen: Mask) -> None:
         for i in np.flatnonzero(chosen).tolist():
-            self.begin_pushes(i, self._rovers.envs[i])
+            self.begin_pushes(i, self.rovers.envs[i])

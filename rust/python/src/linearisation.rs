@@ -108,8 +108,6 @@ impl From<LinearisationError> for BorderError {
             LinearisationError::Variant => {
                 Kind::Option.error("variant", message, Value::Text("newton".to_owned()))
             }
-            LinearisationError::Wrench => Kind::Command.refusal(message, Value::Nothing),
-            LinearisationError::ClosedLoops => Kind::Option.error("model", message, Value::Nothing),
             LinearisationError::Perturbation { value } => {
                 Kind::Option.error("perturbation", message, Value::Number(value))
             }

@@ -7,7 +7,7 @@ use rover_core::draw::resting_pose;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{JointKind, Model, coordinates};
-use rover_core::simulation::{CommandError, LinearisationError, RoverSimulation};
+use rover_core::simulation::{CommandError, RoverSimulation};
 
 use super::machines::{energy, model, options, simulation, solid};
 
@@ -106,10 +106,7 @@ fn a_parked_rover_is_pushed_away_beyond_its_friction() {
         run.step(5).unwrap();
         again.step(5).unwrap();
         assert_eq!(run.v(), again.v());
-        assert!(matches!(
-            run.linearise(&[], None),
-            Err(LinearisationError::Wrench)
-        ));
+        assert!(run.linearise(&[], None).is_ok());
         run.clear_wrenches();
         assert!(run.fallback_reason().is_none());
     }

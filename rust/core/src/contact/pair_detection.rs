@@ -2,8 +2,8 @@
 //!
 //! Two parts can touch if they belong to different trees or, in a model with self-contact
 //! ([`crate::multibody::ModelDescription::self_contact`]), to bodies of one tree that no joint
-//! connects. There is no sweep between bodies, so a part that passes another body within one step
-//! is not detected.
+//! connects. There is no sweep between bodies: parts that move by more than a third of their
+//! thicknesses against each other in a step may pass (`tests/machines/test_several.py`).
 
 use super::activation::Activation;
 use super::body_motion::{BodyMotion, Still};

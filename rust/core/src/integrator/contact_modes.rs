@@ -8,6 +8,8 @@
 //! slip    u_N = 0,    p_T + μ p_N t = 0,    t = u_T / |u_T|
 //! ```
 //!
+//! A contact that friction holds at the edge of its cone slips with |u_T| → 0 along −p_T.
+//!
 //! A change du⁰ of the velocity at held impulses is answered by dp, with `du = du⁰ + W dp`, and so
 //! is a change dμ of the friction:
 //!
@@ -29,8 +31,11 @@ pub enum ContactMode {
     Slip,
 }
 
-/// Velocity, relative to the largest at play, that counts as rounding: a closed contact that slides
-/// no faster sticks, be it at the edge of its cone.
+/// Velocity, relative to the largest at play, that counts as rounding.
+///
+/// A closed contact sticks if it slides no faster and its impulse is within its cone. At the edge
+/// of the cone it slips, along its friction: redundant contacts leave wheels there that cannot
+/// move, and their impulse stays at the edge with the load.
 const ROUNDING: f64 = 1e-9;
 
 /// Pivots below this fraction of the largest count as zero.
@@ -44,6 +49,8 @@ pub(crate) struct HeldLaw {
     pub(crate) p: Vec<f64>,
     pub(super) u: Vec<f64>,
     mu: Vec<f64>,
+    /// Sliding velocity that is none, m/s.
+    rounding: f64,
     /// W_NN of each contact, 1/kg, by which impulses are compared with velocities.
     weight: Vec<f64>,
 }
@@ -63,7 +70,7 @@ impl HeldLaw {
             let room = w * (mu[i] * p[0] - norm(&p[1..]));
             if w * p[0] <= u[0].max(rounding) {
                 ContactMode::Open
-            } else if room.max(rounding) >= norm(&u[1..]) && mu[i] > 0.0 {
+            } else if room > norm(&u[1..]).max(rounding) && mu[i] > 0.0 {
                 ContactMode::Stick
             } else {
                 ContactMode::Slip
@@ -75,6 +82,7 @@ impl HeldLaw {
             p,
             u,
             mu,
+            rounding,
             weight,
         }
     }
@@ -122,12 +130,18 @@ impl HeldLaw {
         worst / size
     }
 
-    /// Unit vector along the sliding velocity (d − 1); zero without sliding.
+    /// Unit vector along which a contact slides (d − 1): that of its velocity, or against its
+    /// friction where it is held; zero without both.
     fn direction(&self, i: usize) -> Vec<f64> {
-        let (_, u) = self.parts(i);
-        let speed = norm(&u[1..]);
-        let scale = if speed > 0.0 { 1.0 / speed } else { 0.0 };
-        u[1..].iter().map(|x| scale * x).collect()
+        let (p, u) = self.parts(i);
+        let (along, sign) = if norm(&u[1..]) > self.rounding {
+            (&u[1..], 1.0)
+        } else {
+            (&p[1..], -1.0)
+        };
+        let size = norm(along);
+        let scale = if size > 0.0 { sign / size } else { 0.0 };
+        along.iter().map(|x| scale * x).collect()
     }
 
     /// How the impulses answer changes. `W`: row-major. `is_common`: contacts whose friction is the
@@ -155,22 +169,23 @@ impl HeldLaw {
                 ContactMode::Stick => (0..d).for_each(|k| of_u(k, first + k, 1.0)),
                 ContactMode::Slip => {
                     let ((p, u), t) = (self.parts(i), self.direction(i));
-                    let speed = norm(&u[1..]);
-                    let stiffness = if speed > 0.0 {
-                        w * self.mu[i] * p[0] / speed
-                    } else {
-                        0.0
-                    };
+                    // The part across, with numbers of the size of 1 however slow it slides.
+                    let (speed, friction) = (norm(&u[1..]), w * self.mu[i] * p[0]);
+                    let held = friction / (speed + friction).max(f64::MIN_POSITIVE);
+                    let across =
+                        |k: usize, l: usize| f64::from(u8::from(k == l)) - t[k - 1] * t[l - 1];
                     of_u(0, first, 1.0);
                     for k in 1..d {
                         for l in 1..d {
-                            let unit = f64::from(u8::from(k == l));
-                            of_u(k, first + l, stiffness * (unit - t[k - 1] * t[l - 1]));
+                            of_u(k, first + l, held * across(k, l));
                         }
                     }
                     for k in 1..d {
                         let row = &mut row[k * width..][..width];
-                        row[first + k] += w;
+                        for l in 1..d {
+                            let along = t[k - 1] * t[l - 1];
+                            row[first + l] += w * (along + (1.0 - held) * across(k, l));
+                        }
                         row[first] += w * self.mu[i] * t[k - 1];
                         if is_common[i] {
                             row[2 * size] = -w * p[0] * t[k - 1];

@@ -13,37 +13,42 @@
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 8.
 
-use nalgebra::Vector3;
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use super::kinematics::Kinematics;
+use super::mechanism::Mechanism;
 use super::model::closed_loop::{BodyPose, Closure};
 use super::model::{Loop, LoopGap, Model};
+use super::poses::Poses;
+use crate::scalar::{Lane, Vec3};
 
 /// Pose of a body.
-fn pose(kinematics: &Kinematics, b: usize) -> BodyPose {
+#[inline(always)]
+fn pose<T: Lane>(mechanism: &Mechanism, poses: &Poses<T>, b: usize) -> BodyPose<T> {
     BodyPose {
-        R: kinematics.R(b),
-        r: kinematics.r(b),
-        origin: *kinematics.origin(b),
+        R: poses.bodies[b].R,
+        r: poses.bodies[b].r,
+        origin: poses.origin_of(mechanism.tree_of_body(b)),
     }
 }
 
 impl Loop {
     /// Writes the rows of A (n_rows, nv), row-major.
-    pub fn write_rows(
+    #[inline(always)]
+    pub fn write_rows<T: Lane>(
         &self,
-        model: &Model,
-        kinematics: &Kinematics,
-        joints: &[f64],
-        rows: &mut [f64],
+        mechanism: &Mechanism,
+        poses: &Poses<T>,
+        joints: &[T],
+        rows: &mut [T],
     ) {
-        rows.fill(0.0);
+        let zero = rows[0].like(0.0);
+        rows.fill(zero);
         match &self.closure {
             Closure::Bodies(ends) => {
                 for (end, sign) in ends.iter().zip([1.0, -1.0]) {
                     if let Some(body) = end.body {
-                        let [x, _] = end.place(|b| pose(kinematics, b));
-                        add_rows(model, kinematics, (body, &x), sign, rows);
+                        let x = end.place(&pose(mechanism, poses, body));
+                        add_rows(mechanism, poses, (body, x), zero.like(sign), rows);
                     }
                 }
             }
@@ -52,12 +57,12 @@ impl Loop {
                 other,
                 polynomial,
             } => {
-                rows[own.velocity] += own.ratio;
+                rows[own.velocity] += zero.like(own.ratio);
                 if let Some(other) = other {
                     let x = other.value(joints);
                     let terms = polynomial.iter().enumerate().skip(1).rev();
-                    let slope = terms.fold(0.0, |p, (k, c)| p * x + k as f64 * c);
-                    rows[other.velocity] -= slope * other.ratio;
+                    let slope = terms.fold(zero, |p, (k, c)| p * x + zero.like(k as f64 * c));
+                    rows[other.velocity] -= slope * zero.like(other.ratio);
                 }
             }
         }
@@ -66,35 +71,39 @@ impl Loop {
 
 /// Adds `sign` times the velocity of a body's material point at `x`, and of a weld the body's
 /// angular velocity, per unit of each velocity.
-fn add_rows(
-    model: &Model,
-    kinematics: &Kinematics,
-    (body, x): (usize, &Vector3<f64>),
-    sign: f64,
-    rows: &mut [f64],
+#[inline(always)]
+fn add_rows<T: Lane>(
+    mechanism: &Mechanism,
+    poses: &Poses<T>,
+    (body, x): (usize, Vec3<T>),
+    sign: T,
+    rows: &mut [T],
 ) {
-    let nv = model.nv();
-    let (path, lead) = (model.path(body), model.lead(body));
-    for (i, row) in rows.chunks_exact_mut(nv).enumerate() {
-        let direction = Vector3::ith(i % 3, 1.0);
+    let zero = sign.like(0.0);
+    for (i, row) in rows.chunks_exact_mut(mechanism.nv()).enumerate() {
+        let mut unit = [0.0; 3];
+        unit[i % 3] = 1.0;
+        let direction = Vec3::splat(zero.token(), unit);
         let is_turn = i >= 3;
-        let moment = x.cross(&direction);
-        for (k, &velocity) in path[..lead].iter().enumerate() {
-            row[velocity] += sign
-                * match (is_turn, k < 3) {
-                    (false, true) => direction[k],
-                    (false, false) => moment[k - 3],
-                    (true, true) => 0.0,
-                    (true, false) => direction[k - 3],
-                };
+        let moment = x.cross(direction);
+        if let Some(first) = mechanism.base_of(body) {
+            let numbers = |v: Vec3<T>| [v.x, v.y, v.z];
+            let (moves, turns) = if is_turn {
+                ([zero; 3], numbers(direction))
+            } else {
+                (numbers(direction), numbers(moment))
+            };
+            for (own, x) in row[first..].iter_mut().zip(moves.into_iter().chain(turns)) {
+                *own += sign * x;
+            }
         }
-        for mover in model.movers(body) {
-            let motion = &kinematics.motions()[mover.motion];
+        for mover in mechanism.movers(body) {
+            let motion = &poses.motions[mover.motion];
             row[mover.velocity] += sign
                 * if is_turn {
-                    motion.axis.dot(direction.into())
+                    motion.axis.dot(direction)
                 } else {
-                    motion.power(direction.into(), moment.into())
+                    motion.power(direction, moment)
                 };
         }
     }
@@ -108,20 +117,22 @@ impl Model {
     }
 
     /// Writes the gaps of all loops, and the rows of A (n_loop_rows, nv) if there is room for them.
-    pub fn write_loops(
+    #[inline(always)]
+    pub fn write_loops<T: Lane>(
         &self,
-        kinematics: &Kinematics,
-        joints: &[f64],
-        gaps: &mut [f64],
-        rows: &mut [f64],
+        poses: &Poses<T>,
+        joints: &[T],
+        gaps: &mut [T],
+        rows: &mut [T],
     ) {
+        let (mechanism, nv) = (self.mechanism(), self.nv());
         let mut first = 0;
         for closure in self.loops() {
             let end = first + closure.n_rows();
-            closure.write_gaps(|b| pose(kinematics, b), joints, &mut gaps[first..end]);
+            let own = &mut gaps[first..end];
+            closure.write_gaps(|b| pose(mechanism, poses, b), joints, own);
             if !rows.is_empty() {
-                let rows = &mut rows[first * self.nv()..end * self.nv()];
-                closure.write_rows(self, kinematics, joints, rows);
+                closure.write_rows(mechanism, poses, joints, &mut rows[first * nv..end * nv]);
             }
             first = end;
         }

@@ -164,14 +164,9 @@ impl<T: Lane> Poses<T> {
 impl<T: Lane> Pose<T> {
     /// That of the world's frame.
     fn of_world(token: T::Token) -> Self {
-        let unit = |v| Vec3::splat(token, v);
-        let nowhere = unit([0.0; 3]);
+        let nowhere = Vec3::splat(token, [0.0; 3]);
         Self {
-            R: Mat3 {
-                x: unit([1.0, 0.0, 0.0]),
-                y: unit([0.0, 1.0, 0.0]),
-                z: unit([0.0, 0.0, 1.0]),
-            },
+            R: Mat3::identity(token),
             r: nowhere,
             c: nowhere,
             lever: nowhere,

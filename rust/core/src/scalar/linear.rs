@@ -145,6 +145,17 @@ pub struct Mat3<T> {
 }
 
 impl<T: Lane> Mat3<T> {
+    /// The identity.
+    #[inline(always)]
+    pub fn identity(token: T::Token) -> Self {
+        let unit = |v| Vec3::splat(token, v);
+        Self {
+            x: unit([1.0, 0.0, 0.0]),
+            y: unit([0.0, 1.0, 0.0]),
+            z: unit([0.0, 0.0, 1.0]),
+        }
+    }
+
     /// Its columns.
     #[inline(always)]
     pub fn columns(&self) -> [Vec3<T>; 3] {

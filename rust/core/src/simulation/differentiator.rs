@@ -22,6 +22,7 @@ use crate::multibody::{Configuration, Model, coordinates};
 use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Instructions, Single};
 use crate::system::TreeSystem;
+use crate::system::loops::check_closed;
 use crate::system::tangent::{Direction, HeldTree, Tangent, TangentScene};
 
 /// Cosine of the pitch below which the coordinates count as singular.
@@ -96,7 +97,7 @@ impl Differentiator {
     /// Of a simulation with its command, for this machine's instructions.
     ///
     /// # Errors
-    /// `Variant`, `ClosedLoops`, `Wrench`.
+    /// `Variant`.
     pub fn new(of: &RoverSimulation) -> Result<Self, LinearisationError> {
         Self::with(of, Instructions::of_this_machine())
     }
@@ -104,19 +105,13 @@ impl Differentiator {
     /// The same for other instructions.
     ///
     /// # Errors
-    /// `Variant`, `ClosedLoops`, `Wrench`.
+    /// `Variant`.
     pub fn with(
         of: &RoverSimulation,
         instructions: Instructions,
     ) -> Result<Self, LinearisationError> {
         if of.options.variant != Variant::Linearised {
             return Err(LinearisationError::Variant);
-        }
-        if !of.model().loops().is_empty() {
-            return Err(LinearisationError::ClosedLoops);
-        }
-        if !of.command().actuators.wrenches.is_empty() {
-            return Err(LinearisationError::Wrench);
         }
         Ok(Self {
             sim: of.clone(),
@@ -157,12 +152,12 @@ impl Differentiator {
         Ok(())
     }
 
-    /// Sets a state (2 nv) and the command.
+    /// Sets a state (2 nv), with its loops closed, and the command.
     fn set(&mut self, state: &[f64]) -> Result<(), LinearisationError> {
         let nv = self.nv();
         let configuration = coordinates::from_public(self.sim.model(), &state[..nv])?;
         let v = coordinates::checked_velocity(self.sim.model(), &state[nv..])?;
-        self.sim.place(configuration, v);
+        self.sim.set_state(configuration, v);
         self.sim.command = self.command.clone();
         Ok(())
     }
@@ -393,6 +388,11 @@ impl Differentiator {
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Trajectory, TrajectoryError> {
         let (nx, nu) = (2 * self.nv(), 2 * self.n_wheels());
+        let refused = |error| TrajectoryError { step: 0, error };
+        let model = self.sim.model();
+        (coordinates::from_public(model, &state[..nx / 2]))
+            .and_then(|q| check_closed(model, &q))
+            .map_err(|error| refused(error.into()))?;
         let mut out = Trajectory {
             states: state.to_vec(),
             ..Trajectory::default()

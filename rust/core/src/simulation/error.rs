@@ -140,12 +140,6 @@ pub enum LinearisationError {
     /// The scheme is implicit in the forces.
     #[error("variant: only steps of the variant \"linearised\" can be linearised")]
     Variant,
-    /// Loops are closed.
-    #[error("model: steps of a machine with closed loops have no derivatives yet")]
-    ClosedLoops,
-    /// A wrench acts from outside.
-    #[error("steps under a wrench have no derivatives yet: clear_wrenches removes it")]
-    Wrench,
     /// A perturbation outside its range.
     #[error("perturbation: must be from 1e-9 to 1e-3, is {value}")]
     Perturbation {

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::rover::RoverSimulation;
 use super::rover_sand::{SLIP_SPEED, WheelContactInSand};
-use crate::contact::{Part, WheelGaps};
+use crate::contact::WheelGaps;
 use crate::geometry::Terrain;
 use crate::integrator::StepStatus;
 use crate::multibody::{Model, coordinates};
@@ -292,18 +292,15 @@ impl RoverSimulation {
     fn mean_slip(&self, in_sand: &[WheelContactInSand]) -> f64 {
         let mut total: f64 = in_sand.iter().map(|contact| contact.slip).sum();
         let mut n = in_sand.len();
-        for active in self.contacts() {
-            if let Part::Wheel(i) = active.contact.part {
-                let wheel = &self.model().wheels()[i];
-                let rate = wheel.joint;
-                let rate = rate.map_or(0.0, |j| self.state().v[self.model().joint_velocity(j)]);
-                let rim = wheel.radius * wheel.drive_sign * rate;
-                let [_, u_t, u_b] = active.velocity;
-                let ground = hypot(rim + u_t, u_b);
-                total += hypot(u_t, u_b) / rim.abs().max(ground).max(SLIP_SPEED);
-                n += 1;
-            }
-        }
+        self.for_each_wheel_contact(|i, _, [_, u_t, u_b]| {
+            let wheel = &self.model().wheels()[i];
+            let rate = wheel.joint;
+            let rate = rate.map_or(0.0, |j| self.state().v[self.model().joint_velocity(j)]);
+            let rim = wheel.radius * wheel.drive_sign * rate;
+            let ground = hypot(rim + u_t, u_b);
+            total += hypot(u_t, u_b) / rim.abs().max(ground).max(SLIP_SPEED);
+            n += 1;
+        });
         if n == 0 { 0.0 } else { total / n as f64 }
     }
 }

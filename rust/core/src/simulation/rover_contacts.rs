@@ -1,10 +1,14 @@
 //! Contact points and forces of a rover on the ground.
 
-use super::rover::RoverSimulation;
-use crate::contact::detection::{deepest_overlap, wheel_contacts};
+use nalgebra::Vector3;
 
+use super::active_contact::ActiveContact;
+use super::rover::RoverSimulation;
 use super::rover_sand::WheelContactInSand;
-use crate::contact::{Contact, Part};
+use crate::contact::detection::{deepest_overlap, wheel_contacts};
+use crate::contact::{Contact, ContactFrame, OtherSide, Part};
+use crate::geometry::query::PairPoint;
+use crate::multibody::Kinematics;
 
 impl RoverSimulation {
     /// Current nearest point, frame and gap of every wheel.
@@ -38,29 +42,74 @@ impl RoverSimulation {
     ) {
         forces.clear();
         forces.resize(self.model().wheels().len(), [0.0; 3]);
-        for active in &self.active {
-            if let Part::Wheel(i) = active.contact.part {
-                for (force, impulse) in forces[i].iter_mut().zip(active.impulse) {
-                    *force += impulse / self.options.time_step;
-                }
-            }
-        }
-        for contact in in_sand {
-            for (force, own) in forces[contact.wheel].iter_mut().zip(contact.force) {
+        let mut add = |wheel: usize, own: [f64; 3]| {
+            for (force, own) in forces[wheel].iter_mut().zip(own) {
                 *force += own;
             }
+        };
+        self.for_each_wheel_contact(|wheel, impulse, _| {
+            add(wheel, impulse.map(|p| p / self.options.time_step));
+        });
+        for contact in in_sand {
+            add(contact.wheel, contact.force);
         }
+    }
+
+    /// Calls `act` with the wheel, the impulse on it and its velocity relative to the other side,
+    /// for every contact of a wheel in the last step. Between two wheels each has its own frame,
+    /// with the normal towards it.
+    pub(super) fn for_each_wheel_contact(&self, mut act: impl FnMut(usize, [f64; 3], [f64; 3])) {
+        let mut kinematics = None;
+        for active in &self.active {
+            if let Part::Wheel(i) = active.contact.part {
+                act(i, active.impulse, active.velocity);
+            }
+            if let Some(other) = active.contact.other
+                && let Part::Wheel(i) = other.part
+            {
+                let kinematics = kinematics.get_or_insert_with(|| self.kinematics());
+                let frame = self.frame_on_other(kinematics, active, other);
+                let on_other = |x: [f64; 3]| {
+                    let axes = active.contact.frame.rows().into_iter().zip(x);
+                    let opposite: Vector3<f64> = axes.map(|(axis, x)| axis * -x).sum();
+                    frame.rows().map(|axis| axis.dot(&opposite))
+                };
+                act(i, on_other(active.impulse), on_other(active.velocity));
+            }
+        }
+    }
+
+    /// Frame of a contact of two bodies as the other one sees it, with the normal towards that.
+    fn frame_on_other(
+        &self,
+        kinematics: &Kinematics,
+        active: &ActiveContact<Contact>,
+        OtherSide { part, body }: OtherSide,
+    ) -> ContactFrame {
+        let pose = (&kinematics.R(body), &kinematics.r(body));
+        let shape = part.place_at(self.model(), pose);
+        let point = PairPoint {
+            point: active.position.into(),
+            n: -active.contact.frame.n,
+            gap: active.contact.gap,
+            feature: 0,
+        };
+        ContactFrame::of_pair(&shape.moved(kinematics.origin(body)), &point)
     }
 
     /// Mean normal force of the last step on all parts except wheels, N, without joints' stops.
     #[must_use]
     pub fn body_force(&self) -> f64 {
-        let boxes = self.active.iter().filter(|a| {
-            matches!(
-                a.contact.part,
-                Part::Box(_) | Part::Sphere(_) | Part::Collider(_)
-            )
+        let is_body =
+            |part: Part| matches!(part, Part::Box(_) | Part::Sphere(_) | Part::Collider(_));
+        let on_bodies = self.active.iter().map(|active| {
+            let other = active
+                .contact
+                .other
+                .is_some_and(|other| is_body(other.part));
+            let n = u8::from(is_body(active.contact.part)) + u8::from(other);
+            f64::from(n) * active.impulse[0]
         });
-        boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
+        on_bodies.sum::<f64>() / self.options.time_step
     }
 }

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::multibody::{Kinematics, Model, Motor};
+use crate::multibody::{Model, Motor, Poses};
+use crate::scalar::{Lane, Mat3, Vec3};
 
 /// A joint held at a set-point by a PD controller that is implicit in the step:
 /// `τ = −stiffness (q − set_point) − damping q̇`.
@@ -47,19 +48,36 @@ impl Wrench {
         self.solid < model.frames().len() && numbers.as_flattened().iter().all(|x| x.is_finite())
     }
 
-    /// Adds its generalized force (nv), N and N m, at the poses of `kinematics` for a step.
-    pub(super) fn add_force(&self, model: &Model, kinematics: &Kinematics, out: &mut [f64]) {
-        let frame = &model.frames()[self.solid];
-        let (force, body) = (Vector3::from(self.force), frame.body);
+    /// The body that it acts on.
+    pub(super) fn body(&self, model: &Model) -> usize {
+        model.frames()[self.solid].body
+    }
+
+    /// Adds its generalized force (nv), N and N m, at the poses of a step. `R`: attitude of the
+    /// body, also of a spinner.
+    #[allow(clippy::inline_always)] // a call leaves the instructions that its caller is for
+    #[inline(always)]
+    pub(super) fn add_force<T: Lane>(
+        &self,
+        model: &Model,
+        poses: &Poses<T>,
+        R: &Mat3<T>,
+        out: &mut [T],
+    ) {
+        let (frame, mechanism) = (&model.frames()[self.solid], model.mechanism());
+        let pose = &poses.bodies[frame.body];
+        let vector = |x: [f64; 3]| Vec3::splat(pose.r.x.token(), x);
         let point = frame.position + frame.rotation * Vector3::from(self.point);
-        let x = kinematics.r(body) + kinematics.spun(model, body) * point;
-        let moment = x.cross(&force) + Vector3::from(self.moment);
-        let lead = model.path(body)[..model.lead(body)].iter();
-        for (&k, value) in lead.zip(force.iter().chain(&moment)) {
-            out[k] += value;
+        let (force, x) = (vector(self.force), pose.r + R.times_shared(point.into()));
+        let moment = x.cross(force) + vector(self.moment);
+        if let Some(first) = mechanism.base_of(frame.body) {
+            let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+            for (out, x) in out[first..].iter_mut().zip(both) {
+                *out += x;
+            }
         }
-        for mover in model.movers(body) {
-            out[mover.velocity] += kinematics.power(mover.motion, &force, &moment);
+        for mover in mechanism.movers(frame.body) {
+            out[mover.velocity] += poses.motions[mover.motion].power(force, moment);
         }
     }
 }

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::command::Command;
 use super::extent::{Turning, displacement};
+use super::loops::Closing;
 use super::momentum_balance::BalanceScene;
 use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use super::sand_patch::SandScene;
@@ -100,7 +101,7 @@ impl TreeSystem<'_> {
             ..
         } = &mut *self.parts;
         if let Some(loops) = loops {
-            loops.begin(self.model, kinematics, joints_middle, factor);
+            loops.begin(self.model, kinematics.poses(), joints_middle, factor);
         }
     }
 
@@ -574,8 +575,24 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn close_end(&mut self, p: &[f64], q: &mut Configuration, v: &mut [f64]) -> f64 {
-        let TreeScratch { loops, factor, .. } = &mut *self.parts;
-        (loops.as_mut()).map_or(0.0, |loops| loops.end(self.model, factor, p, q, v))
+        let TreeScratch {
+            loops,
+            factor,
+            q: lane,
+            ..
+        } = &mut *self.parts;
+        let Some(loops) = loops else {
+            return 0.0;
+        };
+        let machine = Closing {
+            model: self.model,
+            inertias: self.model.inertias(),
+            factor,
+        };
+        lane.set_lane(0, q);
+        let gap = loops.end(machine, p, lane, v);
+        lane.to_lane(0, q);
+        gap
     }
 
     #[inline]

@@ -49,7 +49,7 @@ pub struct TreeScratch {
     /// Of a machine on soft ground.
     pub(super) sand: Option<Box<SandContact<f64>>>,
     /// Of a machine with closed loops.
-    pub(super) loops: Option<Box<Loops>>,
+    pub(super) loops: Option<Box<Loops<f64>>>,
 }
 
 impl TreeScratch {
@@ -82,7 +82,7 @@ impl TreeScratch {
             system: ContactSystem::with_capacity(model, n),
             friction: Vec::with_capacity(model.rubbing_joints().len()),
             sand: None,
-            loops: Loops::of(model),
+            loops: Loops::of(token, model, 0),
         }
     }
 
@@ -195,7 +195,8 @@ impl TreeScratch {
         }
         self.applied.resize(model.nv(), 0.0);
         for wrench in wrenches {
-            wrench.add_force(model, &self.kinematics, &mut self.applied);
+            let R = self.kinematics.spun(model, wrench.body(model)).into();
+            wrench.add_force(model, self.kinematics.poses(), &R, &mut self.applied);
         }
     }
 

@@ -44,7 +44,7 @@ impl Model {
                 closure,
             };
             let mut gaps = vec![0.0; made.n_rows()];
-            made.write_gaps(|b| poses[b], &joints, &mut gaps);
+            made.write_gaps(|b| placed(poses[b]), &joints, &mut gaps);
             let gap = made.gap(i, &gaps);
             let has_place =
                 made.kind != LoopKind::Joint && is_placed(&self.description, &described, &solids);
@@ -72,7 +72,7 @@ impl Model {
         i: usize,
         described: &mut LoopDescription,
         solids: &HashMap<&str, usize>,
-        poses: &[BodyPose],
+        poses: &[Place],
     ) -> Result<[End; 2], ModelError> {
         let frame = |name: &str| solids.get(name).map(|&k| &self.frames[k]);
         let (first, second) = (
@@ -149,15 +149,23 @@ fn without(described: &LoopDescription) -> &'static str {
     }
 }
 
-/// Poses of all bodies with all joints at zero.
-fn zero_poses(bodies: &[Body]) -> Vec<BodyPose> {
-    let mut poses: Vec<BodyPose> = Vec::with_capacity(bodies.len());
+/// Attitude of a body and its origin in the world, m.
+type Place = (Matrix3<f64>, Vector3<f64>);
+
+fn placed((R, r): Place) -> BodyPose<f64> {
+    BodyPose {
+        R: R.into(),
+        r: r.into(),
+        origin: Vector3::zeros().into(),
+    }
+}
+
+/// Places of all bodies with all joints at zero.
+fn zero_poses(bodies: &[Body]) -> Vec<Place> {
+    let mut poses: Vec<Place> = Vec::with_capacity(bodies.len());
     for body in bodies {
-        let carrier = body
-            .parent
-            .map_or((Matrix3::identity(), Vector3::zeros()), |parent| {
-                (poses[parent].R, poses[parent].r)
-            });
+        let nowhere = (Matrix3::identity(), Vector3::zeros());
+        let carrier = body.parent.map_or(nowhere, |parent| poses[parent]);
         let frame = body.rotation.map_or(carrier.0, |R| carrier.0 * R);
         let lock = match &body.joint {
             Joint::Coupled(Coupled { moves, coupling }) => match moves {
@@ -167,19 +175,15 @@ fn zero_poses(bodies: &[Body]) -> Vec<BodyPose> {
             _ => Lock::AtZero,
         };
         let (displacement, R) = lock.place(&frame);
-        poses.push(BodyPose {
-            R,
-            r: carrier.1 + carrier.0 * body.position + displacement,
-            origin: Vector3::zeros(),
-        });
+        poses.push((R, carrier.1 + carrier.0 * body.position + displacement));
     }
     poses
 }
 
 /// Attitude and origin of a solid's frame in the world; the identity for the world itself.
-fn pose(frame: Option<&Frame>, poses: &[BodyPose]) -> (Matrix3<f64>, Vector3<f64>) {
+fn pose(frame: Option<&Frame>, poses: &[Place]) -> Place {
     frame.map_or((Matrix3::identity(), Vector3::zeros()), |frame| {
-        let BodyPose { R, r, .. } = poses[frame.body];
+        let (R, r) = poses[frame.body];
         (R * frame.rotation, r + R * frame.position)
     })
 }
@@ -236,11 +240,9 @@ mod tests {
             let description = crate::multibody::ModelDescription::named(name).unwrap();
             let model = Model::from_description(description).unwrap();
             let kinematics = Kinematics::of(&model, &Configuration::zero(&model));
-            for (b, pose) in zero_poses(model.bodies()).iter().enumerate() {
+            for (b, (R, r)) in zero_poses(model.bodies()).iter().enumerate() {
                 let place = kinematics.r(b) + kinematics.origin(b);
-                assert!(
-                    (pose.r - place).norm() < 1e-14 && (pose.R - kinematics.R(b)).norm() < 1e-14
-                );
+                assert!((r - place).norm() < 1e-14 && (R - kinematics.R(b)).norm() < 1e-14);
             }
         }
     }

@@ -4,16 +4,29 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::multibody::description::LoopKind;
 use crate::multibody::joint::{Joint, JointModel};
+use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Attitude of a body, its origin relative to that of its tree, m, and the latter in the world, m.
 #[derive(Clone, Copy, Debug)]
-pub struct BodyPose {
+pub struct BodyPose<T> {
     /// `R_WB`.
-    pub R: Matrix3<f64>,
+    pub R: Mat3<T>,
     /// World axes, m.
-    pub r: Vector3<f64>,
+    pub r: Vec3<T>,
     /// m.
-    pub origin: Vector3<f64>,
+    pub origin: Vec3<T>,
+}
+
+impl<T: Lane> BodyPose<T> {
+    /// That of the world's frame.
+    fn of_world(token: T::Token) -> Self {
+        let nowhere = Vec3::splat(token, [0.0; 3]);
+        Self {
+            R: Mat3::identity(token),
+            r: nowhere,
+            origin: nowhere,
+        }
+    }
 }
 
 /// A constraint of a machine.
@@ -88,27 +101,30 @@ impl JointReading {
         })
     }
 
-    pub(in crate::multibody) fn value(&self, joints: &[f64]) -> f64 {
-        self.ratio * joints[self.joint] + self.offset
+    #[inline(always)]
+    pub(in crate::multibody) fn value<T: Lane>(&self, joints: &[T]) -> T {
+        let x = joints[self.joint];
+        x.like(self.ratio) * x + x.like(self.offset)
     }
 }
 
 impl End {
-    /// Point (world, m) relative to the origin of its tree, and that origin.
-    pub(in crate::multibody) fn place(
-        &self,
-        pose: impl Fn(usize) -> BodyPose,
-    ) -> [Vector3<f64>; 2] {
-        let pose = self.body.map(pose);
-        pose.map_or([self.point, Vector3::zeros()], |pose| {
-            [pose.r + pose.R * self.point, pose.origin]
-        })
+    /// Pose of its body.
+    #[inline(always)]
+    fn pose<T: Lane>(&self, token: T::Token, pose: impl Fn(usize) -> BodyPose<T>) -> BodyPose<T> {
+        (self.body).map_or_else(|| BodyPose::of_world(token), pose)
     }
 
-    /// The common axes in world axes, as columns.
-    fn axes(&self, pose: impl Fn(usize) -> BodyPose) -> Matrix3<f64> {
-        let pose = self.body.map(pose);
-        pose.map_or(self.axes, |pose| pose.R * self.axes)
+    /// Point (world, m) relative to the origin of its tree.
+    #[inline(always)]
+    pub(in crate::multibody) fn place<T: Lane>(&self, pose: &BodyPose<T>) -> Vec3<T> {
+        pose.r + pose.R.times_shared(self.point.into())
+    }
+
+    /// The common axes in world axes.
+    #[inline(always)]
+    fn axes<T: Lane>(&self, pose: &BodyPose<T>) -> Mat3<T> {
+        pose.R.times_columns(&self.axes.into())
     }
 }
 
@@ -133,15 +149,25 @@ impl Loop {
     }
 
     /// Writes φ (n_rows). `pose`: of each body; `joints`: coordinates of the joints there.
-    pub fn write_gaps(&self, pose: impl Fn(usize) -> BodyPose, joints: &[f64], out: &mut [f64]) {
+    #[inline(always)]
+    pub fn write_gaps<T: Lane>(
+        &self,
+        pose: impl Fn(usize) -> BodyPose<T>,
+        joints: &[T],
+        out: &mut [T],
+    ) {
+        let number = |x: f64| out[0].like(x);
         match &self.closure {
             Closure::Bodies(ends) => {
-                let [[x_a, o_a], [x_b, o_b]] = ends.each_ref().map(|end| end.place(&pose));
-                out[..3].copy_from_slice(((x_a - x_b) + (o_a - o_b)).as_slice());
+                let token = out[0].token();
+                let [a, b] = ends.each_ref().map(|end| end.pose(token, &pose));
+                let apart = ends[0].place(&a) - ends[1].place(&b) + (a.origin - b.origin);
+                out[..3].copy_from_slice(&[apart.x, apart.y, apart.z]);
                 if let Some(turn) = out.get_mut(3..6) {
-                    let [e, f] = ends.each_ref().map(|end| end.axes(&pose));
-                    let sum: Vector3<f64> = (0..3).map(|i| f.column(i).cross(&e.column(i))).sum();
-                    turn.copy_from_slice((sum * 0.5).as_slice());
+                    let [e, f] = [ends[0].axes(&a), ends[1].axes(&b)];
+                    let sum = f.x.cross(e.x) + f.y.cross(e.y) + f.z.cross(e.z);
+                    let sum = sum * sum.x.like(0.5);
+                    turn.copy_from_slice(&[sum.x, sum.y, sum.z]);
                 }
             }
             Closure::Joints {
@@ -149,8 +175,10 @@ impl Loop {
                 other,
                 polynomial,
             } => {
-                let x = other.map_or(0.0, |other| other.value(joints));
-                out[0] = own.value(joints) - polynomial.iter().rev().fold(0.0, |p, c| p * x + c);
+                let x = other.map_or(number(0.0), |other| other.value(joints));
+                let terms = polynomial.iter().rev();
+                let followed = terms.fold(number(0.0), |p, c| p * x + x.like(*c));
+                out[0] = own.value(joints) - followed;
             }
         }
     }

@@ -100,6 +100,7 @@ impl<T: Lane> Tangent<T> {
             self.varies_inertias |= direction.is_of_inertias();
         }
         (self.start).set_moved(mechanism, &self.base, &self.moved, 1.0);
+        self.close_start(scene);
     }
 
     /// The inertias of the machine in all lanes.

@@ -17,10 +17,14 @@
 //! Source: Lidec et al. 2024, *End-to-end and highly-efficient differentiable simulation for
 //! robotics* (Simple), arXiv 2409.07107, for the residuals by the recursive Newton–Euler algorithm.
 //!
+//! Closed loops are differentiated by the sources that close them, with a factor of M̂ for each
+//! direction: the start as `set_state` closes it, the mean velocity, and the end.
+//!
 //! - `direction`: what varies; `held_tree`: what a step held; `contacts`: their places and
-//!   velocities; `scratch`, `pass`: one pass, a direction a lane.
+//!   velocities; `closed_loops`; `scratch`, `pass`: one pass, a direction a lane.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+mod closed_loops;
 mod contacts;
 mod direction;
 mod held_tree;

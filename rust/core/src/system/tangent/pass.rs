@@ -8,7 +8,6 @@ use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::multibody::Configuration;
 use crate::multibody::bias::bias;
 use crate::multibody::energy::energy;
-use crate::multibody::mechanism::Mechanism;
 use crate::scalar::{Dual, Lane, Vec3};
 
 /// Relative difference of velocities that is rounding.
@@ -73,6 +72,7 @@ impl<T: Lane> Tangent<T> {
             #[inline(always)]
             || self.drive(scene),
         );
+        self.begin_loops(scene);
         self.weigh(scene, true);
         T::vectorize(
             token,
@@ -101,7 +101,7 @@ impl<T: Lane> Tangent<T> {
         self.end.set_moved(mechanism, &self.start, &self.v, h);
     }
 
-    /// Implicit terms, branches and torques of the drives.
+    /// Implicit terms, branches and torques of the drives, and the wrenches.
     #[inline(always)]
     fn drive(&mut self, scene: &TangentScene<'_>) {
         let step = self.step(scene);
@@ -130,6 +130,15 @@ impl<T: Lane> Tangent<T> {
             [&self.v, &self.v],
             &mut self.torque,
         );
+        self.applied.fill(Dual::splat(self.token, 0.0));
+        for wrench in &scene.command.wrenches {
+            let (poses, body) = (&self.poses_middle, wrench.body(scene.model));
+            let R = poses.spun(mechanism, &self.middle, body);
+            wrench.add_force(scene.model, poses, &R, &mut self.applied);
+        }
+        for (torque, force) in self.torque.iter_mut().zip(&self.applied) {
+            *torque += step.0 * *force;
+        }
     }
 
     /// `y` = the bias at the velocity v, or at the mean velocity.
@@ -147,9 +156,15 @@ impl<T: Lane> Tangent<T> {
         );
     }
 
-    /// `y ← M̂⁻¹ y`, with the derivative by the residual.
+    /// `y ← M̂⁻¹ y`, with the derivative by the residual. Closed loops restrict it; `closes`: to a
+    /// change of `v` after which the mean velocity obeys them.
     #[inline(always)]
-    fn solve(&mut self, mechanism: &Mechanism) {
+    fn solve(&mut self, scene: &TangentScene<'_>, closes: bool) {
+        let mechanism = scene.model.mechanism();
+        if self.loops.is_some() {
+            self.solve_with_loops(scene, closes);
+            return;
+        }
         let [value, slope] = &mut self.solved;
         for (value, y) in value.iter_mut().zip(&self.y) {
             *value = y.value;
@@ -184,7 +199,7 @@ impl<T: Lane> Tangent<T> {
         let (h, theta) = self.step(scene);
         let share = h.like(1.0) - theta;
         self.load_forces(h);
-        self.solve(scene.model.mechanism());
+        self.solve(scene, true);
         for ((mean, v), change) in self.v_mean.iter_mut().zip(&self.v).zip(&self.y) {
             *mean = *v + share * *change;
         }
@@ -193,7 +208,6 @@ impl<T: Lane> Tangent<T> {
     /// The velocity at the end with the impulses' answer, and the projection's displacement.
     #[inline(always)]
     fn find_velocity(&mut self, scene: &TangentScene<'_>) {
-        let mechanism = scene.model.mechanism();
         let (h, _) = self.step(scene);
         let step = &scene.held.step;
         self.load_forces(h);
@@ -201,7 +215,7 @@ impl<T: Lane> Tangent<T> {
         for (i, p) in step.law.p.chunks_exact(3).enumerate() {
             self.push(scene, i, [p[0], p[1], p[2]]);
         }
-        self.solve(mechanism);
+        self.solve(scene, true);
         for ((end, v), change) in self.v_end.iter_mut().zip(&self.v).zip(&self.y) {
             *end = *v + *change;
         }
@@ -274,7 +288,7 @@ impl<T: Lane> Tangent<T> {
         for (i, p) in projection.law.p.chunks_exact(3).enumerate() {
             self.push(scene, i, [p[0], p[1], p[2]]);
         }
-        self.solve(scene.model.mechanism());
+        self.solve(scene, false);
         for i in 0..step.contacts.len() {
             let mut local = self.local(scene, i, &self.y);
             if let Some(law) = self.yielding(scene, i) {
@@ -336,9 +350,10 @@ impl<T: Lane> Tangent<T> {
                 let mechanism = scene.model.mechanism();
                 self.end
                     .set_moved(mechanism, &self.middle, &self.v_end, theta * h);
-                self.end.normalise();
             },
         );
+        self.close_end(scene, false);
+        self.end.normalise();
         if self.correction != Correction::None {
             self.correct(scene);
         }
@@ -349,12 +364,15 @@ impl<T: Lane> Tangent<T> {
                 if scene.held.step.projection.is_some() {
                     let mechanism = scene.model.mechanism();
                     (self.reached).set_moved(mechanism, &self.end, &self.displacement, 1.0);
-                    self.reached.normalise();
                 } else {
                     self.reached.clone_from(&self.end);
                 }
             },
         );
+        if scene.held.step.projection.is_some() {
+            self.close_end(scene, true);
+            self.reached.normalise();
+        }
     }
 
     /// What the audit leaves of the velocity, see [`crate::integrator::energy_audit`].
@@ -374,10 +392,15 @@ impl<T: Lane> Tangent<T> {
             scratch,
         );
         let places = &self.start.joints;
-        let work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]);
+        let mut work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]);
+        let (h, theta) = step;
+        for (force, (v, end)) in self.applied.iter().zip(self.v.iter().zip(&self.v_end)) {
+            work += h * *force * (theta * *end + (h.like(1.0) - theta) * *v);
+        }
         let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
         let (zero, one) = (mass.like(0.0), mass.like(1.0));
-        let is_relative = self.correction == Correction::Relative && scene.model.is_free();
+        let is_free = scene.model.is_free() && !scene.model.holds_the_world();
+        let is_relative = self.correction == Correction::Relative && is_free;
         let whole = if is_relative {
             momentum.dot(momentum) / (mass + mass)
         } else {
@@ -386,13 +409,16 @@ impl<T: Lane> Tangent<T> {
         let share = (one - excess / (after.kinetic - whole)).max(zero).sqrt();
         let common = momentum * (one / mass);
         let common = [common.x, common.y, common.z];
-        for (k, v) in self.v_end.iter_mut().enumerate() {
-            let common = if is_relative && k < 3 {
-                common[k]
-            } else {
-                zero
-            };
-            *v = common + share * (*v - common);
+        for v in &mut self.v_end {
+            *v *= share;
+        }
+        if is_relative {
+            for tree in &mechanism.trees {
+                let translation = &mut self.v_end[tree.velocities.start..];
+                for (v, common) in translation.iter_mut().zip(common) {
+                    *v += (one - share) * common;
+                }
+            }
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::multibody::{
 };
 use crate::scalar::{Dual, Lane};
 use crate::system::drives::Drives;
+use crate::system::loops::Loops;
 
 /// What the energy audit did to the velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +46,8 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) v_end: Vec<Dual<T>>,
     pub(super) displacement: Vec<Dual<T>>,
     pub(super) torque: Vec<Dual<T>>,
+    /// Generalized force of the wrenches (nv).
+    pub(super) applied: Vec<Dual<T>>,
     pub(super) y: Vec<Dual<T>>,
     pub(super) product: Vec<Dual<T>>,
     pub(super) solved: [Vec<T>; 2],
@@ -61,6 +64,14 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) d_stiffness: T,
     pub(super) d_damping: T,
     pub(super) correction: Correction,
+    /// Of a machine with closed loops.
+    pub(super) loops: Option<VaryingLoops<T>>,
+}
+
+/// Closed loops with their derivatives, and the factor of M̂ with its own.
+pub(super) struct VaryingLoops<T: Lane> {
+    pub loops: Box<Loops<Dual<T>>>,
+    pub factor: Factor<Dual<T>>,
 }
 
 impl<T: Lane> Tangent<T> {
@@ -88,6 +99,7 @@ impl<T: Lane> Tangent<T> {
             v_end: vector(),
             displacement: vector(),
             torque: vector(),
+            applied: vector(),
             y: vector(),
             product: vector(),
             solved: [vec![zero; model.nv()], vec![zero; model.nv()]],
@@ -104,6 +116,10 @@ impl<T: Lane> Tangent<T> {
             d_stiffness: zero,
             d_damping: zero,
             correction: Correction::None,
+            loops: Loops::of(token, model, 1).map(|loops| VaryingLoops {
+                loops,
+                factor: Factor::new(token, mechanism),
+            }),
         }
     }
 }

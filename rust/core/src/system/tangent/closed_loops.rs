@@ -1,0 +1,71 @@
+//! Closed loops in a pass: the sources of the step ([`crate::system::loops`]) over dual numbers,
+//! with a factor of M̂ that varies too.
+
+use super::held_tree::TangentScene;
+use super::scratch::{Tangent, VaryingLoops};
+use crate::scalar::Lane;
+use crate::system::loops::Closing;
+
+impl<T: Lane> Tangent<T> {
+    /// Closes the loops at the start of the step, where what varies would open them.
+    pub(super) fn close_start(&mut self, scene: &TangentScene<'_>) {
+        let Some(VaryingLoops { loops, factor }) = &mut self.loops else {
+            return;
+        };
+        let (model, mechanism, inertias) = (scene.model, scene.model.mechanism(), &self.inertias);
+        (self.poses_middle).update(mechanism, inertias, &self.start);
+        (self.mass_matrix).update(mechanism, inertias, &self.poses_middle);
+        self.mass_matrix.factorise(mechanism, factor);
+        let machine = Closing {
+            model,
+            inertias,
+            factor,
+        };
+        loops.project(machine, &mut self.start, &mut self.v);
+    }
+
+    /// The loops' rows at the midpoint, once M̂ is known.
+    pub(super) fn begin_loops(&mut self, scene: &TangentScene<'_>) {
+        let Some(VaryingLoops { loops, factor }) = &mut self.loops else {
+            return;
+        };
+        self.mass_matrix.factorise(scene.model.mechanism(), factor);
+        loops.begin(scene.model, &self.poses_middle, &self.middle.joints, factor);
+    }
+
+    /// `y ← M̂⁻¹ y` of a machine with loops; `closes`: to a change of `v` after which the mean
+    /// velocity obeys them.
+    #[inline(always)]
+    pub(super) fn solve_with_loops(&mut self, scene: &TangentScene<'_>, closes: bool) {
+        let Some(VaryingLoops { loops, factor }) = &mut self.loops else {
+            return;
+        };
+        let mechanism = scene.model.mechanism();
+        factor.half_solve(mechanism, &mut self.y);
+        if closes {
+            loops.close(scene.options.theta, &self.v, &self.v, &mut self.y);
+        } else {
+            loops.restrict(&mut self.y);
+        }
+        factor.half_solve_back(mechanism, &mut self.y);
+    }
+
+    /// Closes the loops at the end of the step; `is_projected`: after the projection out of
+    /// penetration.
+    pub(super) fn close_end(&mut self, scene: &TangentScene<'_>, is_projected: bool) {
+        let Some(VaryingLoops { loops, factor }) = &mut self.loops else {
+            return;
+        };
+        let machine = Closing {
+            model: scene.model,
+            inertias: &self.inertias,
+            factor,
+        };
+        let q = if is_projected {
+            &mut self.reached
+        } else {
+            &mut self.end
+        };
+        loops.project_end(machine, q, &mut self.v_end);
+    }
+}
