@@ -26,7 +26,7 @@ use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
 use super::problem::{MAX_CONTACTS, MAX_DENSE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
-use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, Side};
+use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, Side, rollers};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
@@ -52,9 +52,9 @@ pub struct Slot<T: Lane> {
     pub point: Vec3<T>,
     /// Normal, from the ground to the wheel.
     pub n: Vec3<T>,
-    /// Rolling direction.
+    /// Rolling direction, or the axis of [rollers](crate::contact::rollers).
     pub t: Vec3<T>,
-    /// `t × n`.
+    /// `t × n`, or zero.
     pub b: Vec3<T>,
     /// m.
     pub gap: T,
@@ -62,6 +62,19 @@ pub struct Slot<T: Lane> {
     sphere: GroundSphere<T>,
     /// The plane that it stands on where the ground is a surface.
     pub(super) plane: LanePlane<T>,
+}
+
+impl<T: Lane> Slot<T> {
+    /// Completes the frame of a wheel from its normal and rolling direction.
+    #[inline(always)]
+    fn finish_frame(&mut self, rollers: Option<[f64; 2]>) {
+        self.b = self.t.cross(self.n);
+        if let Some(angle) = rollers {
+            self.t = rollers::axis_of(self.t, self.b, angle);
+            let zero = self.gap.like(0.0);
+            self.b = Vec3::new(zero, zero, zero);
+        }
+    }
 }
 
 /// A circle of a wheel over a plane.
@@ -788,7 +801,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + to_point, slot.point);
             slot.gap = T::select(here, distance - sphere.radius, slot.gap);
         }
-        slot.b = slot.t.cross(slot.n);
+        slot.finish_frame(wheel.rollers);
         undefined
     }
 
@@ -838,7 +851,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + near.point, slot.point);
             slot.gap = T::select(here, near.distance - slot.sphere.radius, slot.gap);
         }
-        slot.b = slot.t.cross(slot.n);
+        slot.finish_frame(wheel.rollers);
         undefined
     }
 

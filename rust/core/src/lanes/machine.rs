@@ -35,9 +35,6 @@ pub enum Unsupported {
     /// Joints have dry friction.
     #[error("joints of the machine have dry friction")]
     JointFriction,
-    /// Wheels have rollers.
-    #[error("wheels of the machine have rollers")]
-    Rollers,
     /// Its wheels and stops can have more contacts than a problem.
     #[error("wheels with a width and stops can have {0} contacts, more than {MAX_CONTACTS}")]
     TooManyContacts(usize),
@@ -105,6 +102,8 @@ pub struct WheelDisc {
     pub rounding: f64,
     /// Spring and damper where it touches; `None` if it is rigid.
     pub compliance: Option<Compliance>,
+    /// Sine and cosine of the angle of its rollers from the axle, if it has any.
+    pub rollers: Option<[f64; 2]>,
 }
 
 /// A box that collides with the ground, or around a ball or another collider which does.
@@ -210,6 +209,7 @@ impl WheelDisc {
             },
             rounding: if is_wide { wheel.rounding } else { 0.0 },
             compliance: wheel.compliance,
+            rollers: wheel.rollers,
         }
     }
 
@@ -251,9 +251,6 @@ fn check(model: &Model) -> Result<(), Unsupported> {
     }
     if !model.rubbing_joints().is_empty() {
         return Err(Unsupported::JointFriction);
-    }
-    if model.has_rollers() {
-        return Err(Unsupported::Rollers);
     }
     let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
     let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);

@@ -11,7 +11,7 @@ use super::contacts::{Contacts, Slot};
 use super::machine::Machine;
 use super::pattern::Pattern;
 use super::problem::{ContactProblem, Triple, block};
-use crate::contact::Contact;
+use crate::contact::{Contact, rollers};
 use crate::contact::jacobian::{add_impulse, for_each_row};
 use crate::contact::rows::{Path, Place, add, close_stop, product, square};
 use crate::multibody::mechanism::{BASE, Mover};
@@ -38,6 +38,8 @@ pub struct Rows<T: Lane> {
     movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
+    /// Whether wheels have rollers.
+    has_rollers: bool,
     /// Length of the longest path.
     stride: usize,
     /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
@@ -92,6 +94,7 @@ impl<T: Lane> Rows<T> {
             bodies,
             movers,
             common,
+            has_rollers: (machine.wheels.iter()).any(|wheel| wheel.rollers.is_some()),
             stride,
             Z: vec![[zero; 3]; n_slots * stride],
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
@@ -211,6 +214,8 @@ impl<T: Lane> Rows<T> {
         let mut own = square(T::splat(self.token, 0.0), rows);
         if contacts.stop(slot).is_some() {
             close_stop(&mut own);
+        } else if self.has_rollers {
+            rollers::close(&mut own);
         }
         own
     }
