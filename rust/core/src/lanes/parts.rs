@@ -108,7 +108,7 @@ impl Parts {
         let wheels = (machine.wheels.iter())
             .map(|wheel| {
                 let first = n_slots;
-                n_slots += wheel.n_slots();
+                n_slots += wheel.n_slots;
                 let link = &machine.links[wheel.body];
                 let axle = axle_of(wheel.axle);
                 let spins = link.is_spinner && link.turns_about(axle);

@@ -72,6 +72,8 @@ pub struct Factored {
     pub diagonal: Vec<[f64; 9]>,
     /// Diagonal of D by contact, 1/kg.
     pub softness: Vec<f64>,
+    /// What it has more along a normal that nothing moves, 1/kg: that of a joint's dry friction.
+    pub normal: Vec<f64>,
 }
 
 impl Factored {
@@ -110,6 +112,7 @@ impl Factored {
             self.Z.resize(MAX_CONTACTS * pattern.stride(), [0.0; 3]);
             self.diagonal.resize(MAX_CONTACTS, [0.0; 9]);
             self.softness.resize(MAX_CONTACTS, 0.0);
+            self.normal.resize(MAX_CONTACTS, 0.0);
         }
     }
 
@@ -119,6 +122,7 @@ impl Factored {
         self.Z.clone_from(&other.Z);
         self.diagonal.clone_from(&other.diagonal);
         self.softness.clone_from(&other.softness);
+        self.normal.clone_from(&other.normal);
     }
 }
 

@@ -45,9 +45,10 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
     /// `Z` by slot; zero in lanes without a contact there.
     Z: Vec<Columns<T>>,
     q: [Triple<T>; C],
-    /// Diagonal blocks of W, and the diagonal of D, 1/kg.
+    /// Diagonal blocks of W, the diagonal of D, and what it has more along the normal, 1/kg.
     diagonal: [Block<T>; C],
     softness: [T; C],
+    normal: [T; C],
     /// `G_i`.
     inverse: [Triple<T>; C],
     /// Factors of `Z K Zᵀ` of a contact.
@@ -226,8 +227,10 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for VelocitySystem<T, C> {
         }
         for i in Bits(self.used) {
             let local = self.local(i);
+            let own = self.softness[i];
+            let softness = [own + self.normal[i], own, own];
             for k in 0..3 {
-                u[i][k] = local[k] + self.softness[i] * p[i][k] + self.q[i][k];
+                u[i][k] = local[k] + softness[k] * p[i][k] + self.q[i][k];
             }
         }
     }
@@ -248,7 +251,7 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for VelocitySystem<T, C> {
             let own = alpha + self.softness[i];
             let inverse = one / own;
             self.inverse[i] = [
-                T::select(*closed, inverse, zero),
+                T::select(*closed, one / (own + self.normal[i]), zero),
                 one / ((b[0] * b[0] + b[1] * b[1]) * own + *gamma),
                 T::select(*stick, inverse, zero),
             ];
@@ -306,6 +309,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
             q: [[zero; 3]; C],
             diagonal: [[zero; 9]; C],
             softness: [zero; C],
+            normal: [zero; C],
             inverse: [[zero; 3]; C],
             left: Columns::new(zero, 0),
             right: Columns::new(zero, 0),
@@ -342,6 +346,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
                     own.set(lane, 0.0);
                 }
                 self.softness[slot].set(lane, 0.0);
+                self.normal[slot].set(lane, 0.0);
                 continue;
             };
             let m = pattern.joints(slot).len();
@@ -362,6 +367,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
                 self.diagonal[slot][k].set(lane, w[k]);
             }
             self.softness[slot].set(lane, factored.softness[contact]);
+            self.normal[slot].set(lane, factored.normal[contact]);
         }
         Bits(changed)
     }
@@ -405,7 +411,7 @@ pub(super) mod tests {
             wheel.width = Some(0.1);
         }
         let model = Model::from_description(description).unwrap();
-        Machine::of(&model).unwrap().pattern.unwrap()
+        Machine::of(&model).unwrap().pattern
     }
 
     /// A problem of the first slots of the rover with both forms of its operator.

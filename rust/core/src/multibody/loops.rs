@@ -13,37 +13,50 @@
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 8.
 
-use nalgebra::Vector3;
-
 use super::kinematics::Kinematics;
-use super::model::closed_loop::{BodyPose, Closure};
+use super::mechanism::{BASE, Mechanism};
+use super::model::closed_loop::{BodyPose, Closure, widths};
 use super::model::{Loop, LoopGap, Model};
+use super::poses::Poses;
+use crate::scalar::{Lane, Vec3};
 
-/// Pose of a body.
-fn pose(kinematics: &Kinematics, b: usize) -> BodyPose {
-    BodyPose {
-        R: kinematics.R(b),
-        r: kinematics.r(b),
-        origin: *kinematics.origin(b),
+/// Poses of a mechanism, and the coordinates of its joints there.
+#[derive(Clone, Copy)]
+pub(crate) struct Placed<'a, T: Lane> {
+    pub mechanism: &'a Mechanism,
+    pub poses: &'a Poses<T>,
+    pub joints: &'a [T],
+}
+
+impl<T: Lane> Placed<'_, T> {
+    /// Pose of a body.
+    #[inline(always)]
+    fn pose(&self, b: usize) -> BodyPose<T> {
+        let own = &self.poses.bodies[b];
+        BodyPose {
+            R: own.R,
+            r: own.r,
+            origin: self.poses.origin_of(self.mechanism.tree_of_body(b)),
+        }
     }
 }
 
 impl Loop {
     /// Writes the rows of A (n_rows, nv), row-major.
-    pub fn write_rows(
-        &self,
-        model: &Model,
-        kinematics: &Kinematics,
-        joints: &[f64],
-        rows: &mut [f64],
-    ) {
-        rows.fill(0.0);
+    #[inline(always)]
+    fn write_rows<T: Lane>(&self, placed: &Placed<'_, T>, rows: &mut [T]) {
+        let zero = rows[0].like(0.0);
+        rows.fill(zero);
         match &self.closure {
             Closure::Bodies(ends) => {
                 for (end, sign) in ends.iter().zip([1.0, -1.0]) {
                     if let Some(body) = end.body {
-                        let [x, _] = end.place(|b| pose(kinematics, b));
-                        add_rows(model, kinematics, (body, &x), sign, rows);
+                        let [x, _] = end.place(
+                            zero.token(),
+                            #[inline(always)]
+                            |b| placed.pose(b),
+                        );
+                        add_rows(placed, (body, x), zero.like(sign), rows);
                     }
                 }
             }
@@ -52,12 +65,14 @@ impl Loop {
                 other,
                 polynomial,
             } => {
-                rows[own.velocity] += own.ratio;
+                rows[own.velocity] += zero.like(own.ratio);
                 if let Some(other) = other {
-                    let x = other.value(joints);
-                    let terms = polynomial.iter().enumerate().skip(1).rev();
-                    let slope = terms.fold(0.0, |p, (k, c)| p * x + k as f64 * c);
-                    rows[other.velocity] -= slope * other.ratio;
+                    let x = other.value(placed.joints);
+                    let mut slope = zero;
+                    for (k, c) in polynomial.iter().enumerate().skip(1).rev() {
+                        slope = slope * x + x.like(k as f64 * c);
+                    }
+                    rows[other.velocity] -= slope * zero.like(other.ratio);
                 }
             }
         }
@@ -66,38 +81,79 @@ impl Loop {
 
 /// Adds `sign` times the velocity of a body's material point at `x`, and of a weld the body's
 /// angular velocity, per unit of each velocity.
-fn add_rows(
-    model: &Model,
-    kinematics: &Kinematics,
-    (body, x): (usize, &Vector3<f64>),
-    sign: f64,
-    rows: &mut [f64],
-) {
-    let nv = model.nv();
-    let (path, lead) = (model.path(body), model.lead(body));
-    for (i, row) in rows.chunks_exact_mut(nv).enumerate() {
-        let direction = Vector3::ith(i % 3, 1.0);
-        let is_turn = i >= 3;
-        let moment = x.cross(&direction);
-        for (k, &velocity) in path[..lead].iter().enumerate() {
-            row[velocity] += sign
-                * match (is_turn, k < 3) {
-                    (false, true) => direction[k],
-                    (false, false) => moment[k - 3],
-                    (true, true) => 0.0,
-                    (true, false) => direction[k - 3],
-                };
+#[inline(always)]
+fn add_rows<T: Lane>(placed: &Placed<'_, T>, (body, x): (usize, Vec3<T>), sign: T, rows: &mut [T]) {
+    let Placed {
+        mechanism, poses, ..
+    } = *placed;
+    let token = sign.token();
+    for (i, row) in rows.chunks_exact_mut(mechanism.nv()).enumerate() {
+        let (axis, is_turn) = (i % 3, i >= 3);
+        let mut direction = [0.0; 3];
+        direction[axis] = 1.0;
+        let direction = Vec3::splat(token, direction);
+        let moment = x.cross(direction);
+        if let Some(first) = mechanism.base_of(body) {
+            let base = &mut row[first..first + BASE];
+            if is_turn {
+                base[3 + axis] += sign;
+            } else {
+                base[axis] += sign;
+                base[3] += sign * moment.x;
+                base[4] += sign * moment.y;
+                base[5] += sign * moment.z;
+            }
         }
-        for mover in model.movers(body) {
-            let motion = &kinematics.motions()[mover.motion];
-            row[mover.velocity] += sign
-                * if is_turn {
-                    motion.axis.dot(direction.into())
-                } else {
-                    motion.power(direction.into(), moment.into())
-                };
+        for mover in mechanism.movers(body) {
+            let motion = &poses.motions[mover.motion];
+            let rate = if is_turn {
+                motion.axis.dot(direction)
+            } else {
+                motion.power(direction, moment)
+            };
+            row[mover.velocity] += sign * rate;
         }
     }
+}
+
+/// Writes the gaps of loops, and the rows of A (n_loop_rows, nv) if there is room for them.
+#[inline(always)]
+pub(crate) fn write_loops<T: Lane>(
+    loops: &[Loop],
+    placed: &Placed<'_, T>,
+    gaps: &mut [T],
+    rows: &mut [T],
+) {
+    let (mut first, nv) = (0, placed.mechanism.nv());
+    for closure in loops {
+        let end = first + closure.n_rows();
+        closure.write_gaps(
+            #[inline(always)]
+            |b| placed.pose(b),
+            placed.joints,
+            &mut gaps[first..end],
+        );
+        if !rows.is_empty() {
+            closure.write_rows(placed, &mut rows[first * nv..end * nv]);
+        }
+        first = end;
+    }
+}
+
+/// The widest of the gaps of loops, m or rad; not a number if one is none.
+#[inline(always)]
+pub(crate) fn widest<T: Lane>(loops: &[Loop], gaps: &[T]) -> T {
+    let zero = gaps[0].like(0.0);
+    let (mut first, mut widest) = (0, zero);
+    for closure in loops {
+        let end = first + closure.n_rows();
+        for width in widths(&gaps[first..end]) {
+            let stays = width.le(widest) | !widest.le(widest);
+            widest = T::select(stays, widest, width);
+        }
+        first = end;
+    }
+    widest
 }
 
 impl Model {
@@ -107,7 +163,7 @@ impl Model {
         self.loops().iter().map(Loop::n_rows).sum()
     }
 
-    /// Writes the gaps of all loops, and the rows of A (n_loop_rows, nv) if there is room for them.
+    /// The gaps of all loops, and the rows of A (n_loop_rows, nv) if there is room for them.
     pub fn write_loops(
         &self,
         kinematics: &Kinematics,
@@ -115,16 +171,12 @@ impl Model {
         gaps: &mut [f64],
         rows: &mut [f64],
     ) {
-        let mut first = 0;
-        for closure in self.loops() {
-            let end = first + closure.n_rows();
-            closure.write_gaps(|b| pose(kinematics, b), joints, &mut gaps[first..end]);
-            if !rows.is_empty() {
-                let rows = &mut rows[first * self.nv()..end * self.nv()];
-                closure.write_rows(self, kinematics, joints, rows);
-            }
-            first = end;
-        }
+        let placed = Placed {
+            mechanism: self.mechanism(),
+            poses: kinematics.poses(),
+            joints,
+        };
+        write_loops(self.loops(), &placed, gaps, rows);
     }
 
     /// The loop that is open farthest with these gaps; none of a tree.

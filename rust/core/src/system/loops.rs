@@ -20,12 +20,22 @@
 //!
 //! Source: Gear et al. 1985, for constraints on both levels; Featherstone 2008, ch. 8, for loops
 //! closed on a tree.
+//!
+//! Written over the scalar: a rover of the general step, or those of a block (`crate::lanes`). A
+//! row that some lanes leave out is zero there, so that no lane depends on its neighbours.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::contact::ContactSystem;
+use crate::contact::rows::{Triple, along};
 use crate::integrator::report::MOST_OPEN;
 use crate::multibody::error::StateError;
-use crate::multibody::{Configuration, Factor, Kinematics, LoopGap, MassMatrix, Mechanism, Model};
-use crate::scalar::Single;
+use crate::multibody::loops::{Placed, widest, write_loops};
+use crate::multibody::model::Loop;
+use crate::multibody::{
+    Configuration, Factor, Inertias, Kinematics, LaneConfiguration, LoopGap, MassMatrix, Mechanism,
+    Model, Poses,
+};
+use crate::scalar::{Lane, LaneMask, Single};
 
 /// Part of a row outside the span of earlier rows, relative to the longest of its loop, below which
 /// it follows from them.
@@ -44,116 +54,111 @@ const MOST_ELSEWHERE: usize = 100;
 const LONGEST: f64 = 0.3;
 
 /// The rows of the loops at one configuration, and a basis of them in factor coordinates.
-#[derive(Clone, Debug, Default)]
-struct Basis {
+#[derive(Clone, Debug)]
+struct Basis<T: Lane> {
     /// φ of all rows (m).
-    gaps: Vec<f64>,
+    gaps: Vec<T>,
     /// A (m, nv), row-major.
-    rows: Vec<f64>,
-    /// The rows of A that do not follow from earlier ones (r).
-    kept: Vec<usize>,
-    /// Orthonormal rows (r, nv).
-    Q: Vec<f64>,
-    /// Lower triangle of R in `G = R Q` of the kept rows (r (r + 1) / 2), by rows.
-    R: Vec<f64>,
+    rows: Vec<T>,
+    /// Where each row does not follow from earlier ones (m).
+    kept: Vec<T::Mask>,
+    /// Orthonormal rows (m, nv), zero where a row is not kept.
+    Q: Vec<T>,
+    /// Lower triangle of R in `G = R Q` (m (m + 1) / 2), by rows; that of the unit matrix where a
+    /// row is not kept.
+    R: Vec<T>,
 }
 
-impl Basis {
-    fn new(model: &Model) -> Self {
-        let (m, nv) = (model.n_loop_rows(), model.nv());
+impl<T: Lane> Basis<T> {
+    fn new(token: T::Token, mechanism: &Mechanism, loops: &[Loop]) -> Self {
+        let m = loops.iter().map(Loop::n_rows).sum::<usize>();
+        let zeros = |n: usize| vec![T::splat(token, 0.0); n];
         Self {
-            gaps: vec![0.0; m],
-            rows: vec![0.0; m * nv],
-            kept: Vec::with_capacity(m),
-            Q: Vec::with_capacity(m * nv),
-            R: Vec::with_capacity(m * (m + 1) / 2),
+            gaps: zeros(m),
+            rows: zeros(m * mechanism.nv()),
+            kept: vec![T::mask(token, 0); m],
+            Q: zeros(m * mechanism.nv()),
+            R: zeros(m * (m + 1) / 2),
         }
     }
 
     /// Gaps, rows and their basis at a configuration, with the factor of M̂.
-    fn update(
-        &mut self,
-        model: &Model,
-        kinematics: &Kinematics,
-        joints: &[f64],
-        factor: &Factor<f64>,
-    ) {
-        model.write_loops(kinematics, joints, &mut self.gaps, &mut self.rows);
-        let nv = model.nv();
-        self.kept.clear();
-        self.Q.clear();
-        self.R.clear();
+    #[inline(always)]
+    fn update(&mut self, loops: &[Loop], placed: &Placed<'_, T>, factor: &Factor<T>) {
+        write_loops(loops, placed, &mut self.gaps, &mut self.rows);
+        let nv = placed.mechanism.nv();
+        self.Q.copy_from_slice(&self.rows);
         let mut first = 0;
-        for closure in model.loops() {
-            let rows = first..first + closure.n_rows();
-            let begin = self.Q.len();
+        for closure in loops {
+            let end = first + closure.n_rows();
             // The rows of the loop first: their length is the measure of each.
-            self.Q
-                .extend_from_slice(&self.rows[rows.start * nv..rows.end * nv]);
-            let mut longest = 0.0_f64;
-            for row in self.Q[begin..].chunks_exact_mut(nv) {
-                factor.half_solve(model.mechanism(), row);
+            let mut longest = self.Q[0].like(0.0);
+            for row in self.Q[first * nv..end * nv].chunks_exact_mut(nv) {
+                factor.half_solve(placed.mechanism, row);
                 longest = longest.max(norm(row));
             }
-            for (i, row) in rows.clone().enumerate() {
-                let from = begin + i * nv;
-                let to = self.kept.len() * nv;
-                self.Q.copy_within(from..from + nv, to);
-                if self.orthogonalise(nv, longest) {
-                    self.kept.push(row);
-                }
+            for row in first..end {
+                self.orthogonalise(row, nv, longest);
             }
-            self.Q.truncate(self.kept.len() * nv);
-            first = rows.end;
+            first = end;
         }
     }
 
-    /// Makes the next row of Q orthogonal to those before it and of unit length; false if nothing
-    /// of it is left.
-    fn orthogonalise(&mut self, nv: usize, longest: f64) -> bool {
-        let r = self.kept.len();
-        let begin = self.R.len();
-        self.R.resize(begin + r + 1, 0.0);
-        let (before, own) = self.Q.split_at_mut(r * nv);
+    /// Makes a row of Q orthogonal to those before it and of unit length, or zero if nothing of it
+    /// is left.
+    #[inline(always)]
+    fn orthogonalise(&mut self, row: usize, nv: usize, longest: T) {
+        let (zero, one) = (longest.like(0.0), longest.like(1.0));
+        let coefficients = &mut self.R[row * (row + 1) / 2..][..=row];
+        coefficients.fill(zero);
+        let (before, own) = self.Q.split_at_mut(row * nv);
         let own = &mut own[..nv];
         // Twice is enough.
         for _ in 0..2 {
-            for (q, coefficient) in before.chunks_exact(nv).zip(&mut self.R[begin..]) {
+            for (q, coefficient) in before.chunks_exact(nv).zip(&mut *coefficients) {
                 let share = dot(q, own);
                 add(own, q, -share);
                 *coefficient += share;
             }
         }
         let length = norm(own);
-        if length.is_nan() || length <= DEPENDENT * longest {
-            self.R.truncate(begin);
-            return false;
-        }
+        let kept = (longest.like(DEPENDENT) * longest).lt(length);
+        self.kept[row] = kept;
+        coefficients[row] = length;
+        let length = T::select(kept, length, one);
         for x in own {
-            *x /= length;
+            *x = T::select(kept, *x / length, zero);
         }
-        self.R[begin + r] = length;
-        true
+        for (k, coefficient) in coefficients.iter_mut().enumerate() {
+            let unit = if k == row { one } else { zero };
+            *coefficient = T::select(kept, *coefficient, unit);
+        }
     }
 
-    fn r(&self) -> usize {
+    /// Number of rows.
+    #[inline(always)]
+    fn m(&self) -> usize {
         self.kept.len()
     }
 
     /// `z = R⁻¹ z`, in place.
-    fn solve(&self, z: &mut [f64]) {
+    #[inline(always)]
+    fn solve(&self, z: &mut [T]) {
         let mut row = 0;
         for i in 0..z.len() {
-            let known = dot(&self.R[row..row + i], &z[..i]);
-            z[i] = (z[i] - known) / self.R[row + i];
+            let (known, own) = z.split_at_mut(i);
+            for (r, z) in self.R[row..row + i].iter().zip(known) {
+                own[0] -= *r * *z;
+            }
+            own[0] /= self.R[row + i];
             row += i + 1;
         }
     }
 
     /// `z = R⁻ᵀ z`, in place.
-    fn solve_transposed(&self, z: &mut [f64]) {
-        let r = z.len();
-        for i in (0..r).rev() {
+    #[inline(always)]
+    fn solve_transposed(&self, z: &mut [T]) {
+        for i in (0..z.len()).rev() {
             let row = i * (i + 1) / 2;
             z[i] /= self.R[row + i];
             let value = z[i];
@@ -163,149 +168,366 @@ impl Basis {
         }
     }
 
-    /// `A v` of the kept rows, as an iterator.
-    fn rates<'a>(&'a self, v: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        let nv = v.len();
-        self.kept
-            .iter()
-            .map(move |&i| dot(&self.rows[i * nv..(i + 1) * nv], v))
+    /// `A v` of a row, zero where it is not kept.
+    #[inline(always)]
+    fn rate(&self, row: usize, v: &[T]) -> T {
+        let rate = dot(&self.rows[row * v.len()..][..v.len()], v);
+        T::select(self.kept[row], rate, rate.like(0.0))
+    }
+
+    /// A row of Q.
+    #[inline(always)]
+    fn q(&self, row: usize, nv: usize) -> &[T] {
+        &self.Q[row * nv..][..nv]
     }
 
     /// `y += Qᵀ z`.
-    fn add_transposed(&self, z: &[f64], y: &mut [f64]) {
-        for (q, z) in self.Q.chunks_exact(y.len()).zip(z) {
-            add(y, q, *z);
+    #[inline(always)]
+    fn add_transposed(&self, z: &[T], y: &mut [T]) {
+        for (row, z) in z.iter().enumerate() {
+            let nv = y.len();
+            add(y, self.q(row, nv), *z);
         }
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+#[inline(always)]
+fn dot<T: Lane>(a: &[T], b: &[T]) -> T {
+    let (Some((first, a)), Some((other, b))) = (a.split_first(), b.split_first()) else {
+        unreachable!("invariant: a machine with loops has velocities")
+    };
+    let mut sum = *first * *other;
+    let b = &b[..a.len()];
+    for k in 0..a.len() {
+        sum += a[k] * b[k];
+    }
+    sum
 }
 
-fn norm(a: &[f64]) -> f64 {
+#[inline(always)]
+fn norm<T: Lane>(a: &[T]) -> T {
     dot(a, a).sqrt()
 }
 
 /// `y += a x`.
-fn add(y: &mut [f64], x: &[f64], a: f64) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += a * x;
+#[inline(always)]
+fn add<T: Lane>(y: &mut [T], x: &[T], a: T) {
+    let x = &x[..y.len()];
+    for k in 0..y.len() {
+        y[k] += a * x[k];
     }
 }
 
 /// The loops of a machine in a step.
 #[derive(Clone, Debug)]
-pub(crate) struct Loops {
+pub(crate) struct Loops<T: Lane> {
+    token: T::Token,
+    closures: Vec<Loop>,
     /// At the midpoint of the step.
-    middle: Basis,
+    middle: Basis<T>,
     /// At its end.
-    end: Basis,
-    kinematics: Kinematics,
-    /// `B = Q Z` of the contacts (r, 3 n_c).
-    B: Vec<f64>,
-    /// Change of Q y by the last [`Self::close`] (r).
-    change: Vec<f64>,
+    end: Basis<T>,
+    /// Poses at the end, and a configuration on the way to it.
+    poses: Poses<T>,
+    moved: LaneConfiguration<T>,
+    /// `B = Q Z` of the contacts (m, n), by the numbers that they have there.
+    B: Vec<Triple<T>>,
+    n: usize,
+    /// Change of Q y by the last [`Self::close`] (m).
+    change: Vec<T>,
     /// Impulses of all rows in the last step (m), N s or N m s.
-    impulses: Vec<f64>,
-    /// Scratch (r) and (nv).
-    z: Vec<f64>,
-    y: Vec<f64>,
+    impulses: Vec<T>,
+    /// Scratch (m) and (nv).
+    z: Vec<T>,
+    y: Vec<T>,
 }
 
-impl Loops {
+/// What the end of a step is projected with.
+#[derive(Clone, Copy)]
+pub(crate) struct Projector<'a, T: Lane> {
+    pub mechanism: &'a Mechanism,
+    pub inertias: &'a Inertias<T>,
+    pub factor: &'a Factor<T>,
+    /// Lanes whose configuration and velocity are projected.
+    pub lanes: T::Mask,
+}
+
+impl<T: Lane> Loops<T> {
     /// None for a machine that has none.
-    pub(crate) fn of(model: &Model) -> Option<Box<Self>> {
-        (!model.loops().is_empty()).then(|| {
+    pub(crate) fn new(token: T::Token, mechanism: &Mechanism, loops: &[Loop]) -> Option<Box<Self>> {
+        let middle = Basis::new(token, mechanism, loops);
+        let zeros = |n: usize| vec![T::splat(token, 0.0); n];
+        (!loops.is_empty()).then(|| {
             Box::new(Self {
-                middle: Basis::new(model),
-                end: Basis::new(model),
-                kinematics: Kinematics::new(model),
+                token,
+                closures: loops.to_vec(),
+                end: middle.clone(),
+                poses: Poses::new(token, mechanism),
+                moved: LaneConfiguration::new(token, mechanism),
                 B: Vec::new(),
-                change: Vec::new(),
-                impulses: vec![0.0; model.n_loop_rows()],
-                z: Vec::new(),
-                y: vec![0.0; model.nv()],
+                n: 0,
+                change: zeros(middle.m()),
+                impulses: zeros(middle.m()),
+                z: zeros(middle.m()),
+                y: zeros(mechanism.nv()),
+                middle,
             })
         })
     }
 
-    /// The basis at the midpoint, once M̂ is factored.
-    pub(super) fn begin(
-        &mut self,
-        model: &Model,
-        kinematics: &Kinematics,
-        joints: &[f64],
-        factor: &Factor<f64>,
-    ) {
-        self.middle.update(model, kinematics, joints, factor);
-        self.B.clear();
+    /// The basis at the midpoint, once M̂ is factored, for `n` contacts.
+    pub(crate) fn begin(&mut self, placed: &Placed<'_, T>, factor: &Factor<T>, n: usize) {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.middle.update(&self.closures, placed, factor),
+        );
+        self.set_size(n);
     }
 
-    /// Computes B, and subtracts `Bᵀ B` from W.
-    pub(super) fn project_operator(&mut self, model: &Model, system: &mut ContactSystem) {
-        let size = 3 * system.n_contacts();
-        self.B.resize(self.middle.r() * size, 0.0);
-        if size == 0 {
-            return;
-        }
-        let nv = model.nv();
-        for (q, b) in (self.middle.Q.chunks_exact(nv)).zip(self.B.chunks_exact_mut(size)) {
-            system.local(model, q, b);
-        }
-        for b in self.B.chunks_exact(size) {
-            for (row, x) in system.W.chunks_exact_mut(size).zip(b) {
-                add(row, b, -x);
+    /// Makes room for the products of `n` contacts.
+    fn set_size(&mut self, n: usize) {
+        let none = [T::splat(self.token, 0.0); 3];
+        self.n = n;
+        self.B.resize(self.middle.m() * n, none);
+    }
+
+    /// Number of rows.
+    #[inline(always)]
+    pub(crate) fn m(&self) -> usize {
+        self.middle.m()
+    }
+
+    /// A row of Q (nv).
+    #[inline(always)]
+    pub(crate) fn q(&self, row: usize) -> &[T] {
+        self.middle.q(row, self.y.len())
+    }
+
+    /// The product `Q Z` of a row with a contact.
+    #[inline(always)]
+    pub(crate) fn product(&self, row: usize, contact: usize) -> &Triple<T> {
+        &self.B[row * self.n + contact]
+    }
+
+    /// The same, to be set.
+    #[inline(always)]
+    pub(crate) fn product_mut(&mut self, row: usize, contact: usize) -> &mut Triple<T> {
+        &mut self.B[row * self.n + contact]
+    }
+
+    /// `W − Bᵀ B` of two contacts, whose block of W without loops is given.
+    #[inline(always)]
+    pub(crate) fn project_block(&self, [c, d]: [usize; 2], block: &mut [T; 9]) {
+        for row in 0..self.m() {
+            let (x, y) = (self.product(row, c), self.product(row, d));
+            for i in 0..3 {
+                for j in 0..3 {
+                    block[3 * i + j] -= x[i] * y[j];
+                }
             }
         }
     }
 
-    /// `y −= Qᵀ B p`: what the loops make of the impulses p (3 n_c).
-    pub(super) fn answer(&self, p: &[f64], y: &mut [f64]) {
-        if p.is_empty() {
-            return;
+    /// `y −= Qᵀ B p` in the lanes of a mask: what the loops make of impulses, given by contact and
+    /// the lanes in which there is one.
+    #[inline(always)]
+    pub(crate) fn answer(
+        &self,
+        impulses: &(impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone),
+        y: &mut [T],
+    ) {
+        for row in 0..self.m() {
+            let z = self.reaction(row, impulses.clone());
+            add(y, self.q(row), -z);
         }
-        for (q, b) in (self.middle.Q.chunks_exact(y.len())).zip(self.B.chunks_exact(p.len())) {
-            add(y, q, -dot(b, p));
+    }
+
+    /// `B p` of a row.
+    #[inline(always)]
+    fn reaction(
+        &self,
+        row: usize,
+        impulses: impl Iterator<Item = (usize, T::Mask, Triple<T>)>,
+    ) -> T {
+        let zero = T::splat(self.token, 0.0);
+        let mut sum = zero;
+        for (contact, here, p) in impulses {
+            let own = along(self.product(row, contact), &p);
+            sum += T::select(here, own, zero);
         }
+        sum
     }
 
     /// Changes y so that after the change of `v` by `F⁻¹ y` the mean with `v_begin` obeys the
     /// loops.
-    pub(super) fn close(&mut self, theta: f64, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
-        let (basis, z) = (&self.middle, &mut self.z);
-        z.clear();
-        let share = (1.0 - theta) / theta;
-        let rates = basis.rates(v).zip(basis.rates(v_begin));
-        z.extend(rates.map(|(rate, begin)| -(rate + share * begin)));
+    #[inline(always)]
+    pub(crate) fn close(&mut self, theta: f64, v_begin: &[T], v: &[T], y: &mut [T]) {
+        let (basis, z) = (&self.middle, &mut self.change);
+        for (row, z) in z.iter_mut().enumerate() {
+            let rate = basis.rate(row, v);
+            let share = rate.like((1.0 - theta) / theta);
+            *z = -(rate + share * basis.rate(row, v_begin));
+        }
         basis.solve(z);
-        for (z, q) in z.iter_mut().zip(basis.Q.chunks_exact(y.len())) {
-            *z -= dot(q, y);
+        for (row, z) in z.iter_mut().enumerate() {
+            *z -= dot(basis.q(row, y.len()), y);
         }
         basis.add_transposed(z, y);
-        self.change.clone_from(z);
     }
 
-    /// The impulses λ of the last [`Self::close`] with the contacts' p (3 n_c), from
+    /// The impulses λ of the last [`Self::close`] with those of the contacts, from
     /// `Rᵀ λ = Δ(Q y)`.
-    fn find_impulses(&mut self, p: &[f64]) {
-        let z = &mut self.z;
-        z.clone_from(&self.change);
-        if !p.is_empty() {
-            for (z, b) in z.iter_mut().zip(self.B.chunks_exact(p.len())) {
-                *z -= dot(b, p);
+    #[inline(always)]
+    pub(crate) fn find_impulses(
+        &mut self,
+        impulses: &(impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone),
+    ) {
+        for row in 0..self.m() {
+            self.impulses[row] = self.change[row] - self.reaction(row, impulses.clone());
+        }
+        self.middle.solve_transposed(&mut self.impulses);
+    }
+
+    /// Newton's iteration on `φ(q) = 0` along `M̂⁻¹ Aᵀ`, and the basis at its end. Returns the
+    /// widest gap that is left, m or rad.
+    pub(crate) fn project_position(
+        &mut self,
+        with: &Projector<'_, T>,
+        q: &mut LaneConfiguration<T>,
+    ) -> T {
+        self.project_in(with, MOST_IN_STEP, q)
+    }
+
+    fn project_in(
+        &mut self,
+        with: &Projector<'_, T>,
+        most: usize,
+        q: &mut LaneConfiguration<T>,
+    ) -> T {
+        let token = self.token;
+        let mut last = T::splat(token, f64::INFINITY);
+        let mut left = T::splat(token, 0.0);
+        let mut moving = with.lanes;
+        for iteration in 0..=most {
+            self.poses.update(with.mechanism, with.inertias, q);
+            let gap = T::vectorize(
+                token,
+                #[inline(always)]
+                || self.look(with, q),
+            );
+            let is_stuck = (gap.like(0.5) * last).le(gap) & gap.lt(gap.like(MOST_OPEN));
+            let is_done = gap.le(gap.like(TIGHT)) | is_stuck | !gap.is_finite();
+            left = T::select(moving, gap, left);
+            moving = moving & !is_done;
+            if !moving.any() || iteration == most {
+                break;
+            }
+            last = gap;
+            T::vectorize(
+                token,
+                #[inline(always)]
+                || self.approach(with, moving, q),
+            );
+        }
+        left
+    }
+
+    /// The basis at a configuration, and its widest gap.
+    #[inline(always)]
+    fn look(&mut self, with: &Projector<'_, T>, q: &LaneConfiguration<T>) -> T {
+        let placed = Placed {
+            mechanism: with.mechanism,
+            poses: &self.poses,
+            joints: &q.joints,
+        };
+        self.end.update(&self.closures, &placed, with.factor);
+        widest(&self.closures, &self.end.gaps)
+    }
+
+    /// Moves a configuration along `M̂⁻¹ Aᵀ` by what closes the loops at the rates there.
+    #[inline(always)]
+    fn approach(&mut self, with: &Projector<'_, T>, moving: T::Mask, q: &mut LaneConfiguration<T>) {
+        let zero = T::splat(self.token, 0.0);
+        for (row, z) in self.z.iter_mut().enumerate() {
+            *z = T::select(self.end.kept[row], -self.end.gaps[row], zero);
+        }
+        self.move_along(with);
+        let mut farthest = zero;
+        for y in &self.y {
+            farthest = farthest.max(y.abs());
+        }
+        let share = (zero.like(LONGEST) / farthest).min(zero.like(1.0));
+        for y in &mut self.y {
+            *y *= share;
+        }
+        self.moved.set_moved(with.mechanism, q, &self.y, 1.0);
+        self.moved.normalise();
+        q.select_from(moving, &self.moved);
+    }
+
+    /// Removes from a velocity what would open the loops at the end of the step.
+    #[inline(always)]
+    pub(crate) fn project_velocity(&mut self, with: &Projector<'_, T>, v: &mut [T]) {
+        for (row, z) in self.z.iter_mut().enumerate() {
+            *z = -self.end.rate(row, v);
+        }
+        self.move_along(with);
+        for (v, y) in v.iter_mut().zip(&self.y) {
+            *v = T::select(with.lanes, *v + *y, *v);
+        }
+    }
+
+    /// The change `self.y` of the velocity along `M̂⁻¹ Aᵀ` that changes the rates of the kept rows
+    /// at the end by `self.z`.
+    #[inline(always)]
+    fn move_along(&mut self, with: &Projector<'_, T>) {
+        self.end.solve(&mut self.z);
+        self.y.fill(T::splat(self.token, 0.0));
+        self.end.add_transposed(&self.z, &mut self.y);
+        with.factor.half_solve_back(with.mechanism, &mut self.y);
+    }
+
+    /// Impulses of all rows in the last step (m): along x, y and z in N s, about them in N m s, and
+    /// of a joint its own. They act on the first end, and their opposites on the second.
+    pub(crate) fn impulses(&self) -> &[T] {
+        &self.impulses
+    }
+
+    /// The same, to be set.
+    pub(super) fn impulses_mut(&mut self) -> &mut [T] {
+        &mut self.impulses
+    }
+}
+
+impl Loops<f64> {
+    /// None for a machine that has none.
+    pub(crate) fn of(model: &Model) -> Option<Box<Self>> {
+        Self::new(Single::best(), model.mechanism(), model.loops())
+    }
+
+    /// Computes B, and subtracts `Bᵀ B` from W.
+    pub(super) fn project_operator(&mut self, model: &Model, system: &mut ContactSystem) {
+        let n = system.n_contacts();
+        self.set_size(n);
+        if n == 0 {
+            return;
+        }
+        let size = 3 * n;
+        for row in 0..self.m() {
+            let b = self.B[row * n..][..n].as_flattened_mut();
+            system.local(model, self.middle.q(row, model.nv()), b);
+        }
+        for b in self.B.chunks_exact(n) {
+            for (row, x) in system.W.chunks_exact_mut(size).zip(b.as_flattened()) {
+                add(row, b.as_flattened(), -x);
             }
         }
-        self.middle.solve_transposed(z);
-        self.impulses.fill(0.0);
-        for (&row, z) in self.middle.kept.iter().zip(&*z) {
-            self.impulses[row] = *z;
-        }
     }
 
-    /// `out += Aᵀ λ` (nv) with these impulses.
+    /// `out += Aᵀ λ` (nv) with the impulses of the last [`Self::close`] and the contacts'.
     pub(super) fn add_generalized_impulse(&mut self, p: &[f64], out: &mut [f64]) {
-        self.find_impulses(p);
+        self.find_impulses(&each(p));
         let rows = self.middle.rows.chunks_exact(out.len());
         for (row, impulse) in rows.zip(&self.impulses) {
             add(out, row, *impulse);
@@ -319,72 +541,37 @@ impl Loops {
         model: &Model,
         factor: &Factor<f64>,
         p: &[f64],
-        q: &mut Configuration,
+        q: &mut LaneConfiguration<f64>,
         v: &mut [f64],
     ) -> f64 {
-        self.find_impulses(p);
-        let gap = self.project_position(model, factor, MOST_IN_STEP, q);
-        self.project_velocity(model, factor, v);
-        gap
+        self.find_impulses(&each(p));
+        self.project(model, factor, MOST_IN_STEP, q, v)
     }
 
-    /// Newton's iteration on `φ(q) = 0` along `M̂⁻¹ Aᵀ`, and the basis at its end.
-    fn project_position(
+    fn project(
         &mut self,
         model: &Model,
         factor: &Factor<f64>,
         most: usize,
-        q: &mut Configuration,
+        q: &mut LaneConfiguration<f64>,
+        v: &mut [f64],
     ) -> f64 {
-        let mut last = f64::INFINITY;
-        let mut iteration = 0;
-        loop {
-            self.kinematics.update_for_step(model, q);
-            (self.end).update(model, &self.kinematics, &q.joints, factor);
-            let gap = model
-                .widest_gap(&self.end.gaps)
-                .map_or(0.0, |gap| gap.value);
-            let is_stuck = gap >= 0.5 * last && gap < MOST_OPEN;
-            if gap <= TIGHT || is_stuck || iteration == most || gap.is_nan() {
-                return gap;
-            }
-            last = gap;
-            iteration += 1;
-            let (basis, z) = (&self.end, &mut self.z);
-            z.clear();
-            z.extend(basis.kept.iter().map(|&row| -basis.gaps[row]));
-            self.move_along(model, factor);
-            let farthest = self.y.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            let share = (LONGEST / farthest).min(1.0);
-            q.advance(model, &self.y, share);
-            q.normalise();
-        }
+        let with = Projector {
+            mechanism: model.mechanism(),
+            inertias: model.inertias(),
+            factor,
+            lanes: true,
+        };
+        let gap = self.project_in(&with, most, q);
+        self.project_velocity(&with, v);
+        gap
     }
+}
 
-    /// Removes from a velocity what would open the loops at the end of the step.
-    fn project_velocity(&mut self, model: &Model, factor: &Factor<f64>, v: &mut [f64]) {
-        let (basis, z) = (&self.end, &mut self.z);
-        z.clear();
-        z.extend(basis.rates(v).map(|rate| -rate));
-        self.move_along(model, factor);
-        add(v, &self.y, 1.0);
-    }
-
-    /// The change `self.y` of the velocity along `M̂⁻¹ Aᵀ` that changes the rates of the kept rows
-    /// at the end by `self.z`.
-    fn move_along(&mut self, model: &Model, factor: &Factor<f64>) {
-        let (basis, z) = (&self.end, &mut self.z);
-        basis.solve(z);
-        self.y.fill(0.0);
-        basis.add_transposed(z, &mut self.y);
-        factor.half_solve_back(model.mechanism(), &mut self.y);
-    }
-
-    /// Impulses of all rows in the last step (m): along x, y and z in N s, about them in N m s, and
-    /// of a joint its own. They act on the first end, and their opposites on the second.
-    pub(crate) fn impulses(&self) -> &[f64] {
-        &self.impulses
-    }
+/// The impulses p (3 n_c) of a single machine, by contact.
+pub(super) fn each(p: &[f64]) -> impl Iterator<Item = (usize, bool, Triple<f64>)> + Clone {
+    let all = p.chunks_exact(3).map(|p| [p[0], p[1], p[2]]);
+    all.enumerate().map(|(contact, p)| (contact, true, p))
 }
 
 /// The factor of a machine's mass matrix M.
@@ -396,6 +583,19 @@ fn factor_of(model: &Model, kinematics: &Kinematics) -> Option<Factor<f64>> {
     mass_matrix
         .factorise(mechanism, &mut factor)
         .then_some(factor)
+}
+
+/// The poses of a single machine.
+pub(super) fn placed<'a>(
+    model: &'a Model,
+    kinematics: &'a Kinematics,
+    joints: &'a [f64],
+) -> Placed<'a, f64> {
+    Placed {
+        mechanism: model.mechanism(),
+        poses: kinematics.poses(),
+        joints,
+    }
 }
 
 /// The loop that is open farthest in a configuration; none of a tree.
@@ -438,8 +638,10 @@ pub fn closed(
     };
     let kinematics = Kinematics::of(model, &q);
     if let Some(factor) = factor_of(model, &kinematics) {
-        loops.project_position(model, &factor, MOST_ELSEWHERE, &mut q);
-        loops.project_velocity(model, &factor, v);
+        let mut lane = LaneConfiguration::new(Single::best(), model.mechanism());
+        lane.set_lane(0, &q);
+        loops.project(model, &factor, MOST_ELSEWHERE, &mut lane, v);
+        lane.to_lane(0, &mut q);
     }
     match widest_gap(model, &q) {
         Some(gap) if gap.value.is_nan() || gap.value > MOST_OPEN => {
@@ -457,15 +659,16 @@ pub fn closed(
 #[must_use]
 pub fn redundant_rows(model: &Model, q: &Configuration) -> Vec<usize> {
     let kinematics = Kinematics::of(model, q);
-    let mut basis = Basis::new(model);
+    let mut basis = Basis::new(Single::best(), model.mechanism(), model.loops());
     if let Some(factor) = factor_of(model, &kinematics) {
-        basis.update(model, &kinematics, &q.joints, &factor);
+        let placed = placed(model, &kinematics, &q.joints);
+        basis.update(model.loops(), &placed, &factor);
     }
     let mut first = 0;
     let redundant = model.loops().iter().map(|closure| {
         let rows = first..first + closure.n_rows();
         first = rows.end;
-        rows.filter(|row| !basis.kept.contains(row)).count()
+        rows.filter(|row| !basis.kept[*row]).count()
     });
     redundant.collect()
 }

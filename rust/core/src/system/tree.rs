@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::command::Command;
 use super::extent::{Turning, displacement};
+use super::loops::{each, placed};
 use super::momentum_balance::BalanceScene;
 use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use super::sand_patch::SandScene;
@@ -100,7 +101,8 @@ impl TreeSystem<'_> {
             ..
         } = &mut *self.parts;
         if let Some(loops) = loops {
-            loops.begin(self.model, kinematics, joints_middle, factor);
+            let placed = placed(self.model, kinematics, joints_middle);
+            loops.begin(&placed, factor, 0);
         }
     }
 
@@ -555,7 +557,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
         self.parts.system.add_impulses(self.model, p, y);
         if let Some(loops) = &self.parts.loops {
-            loops.answer(p, y);
+            loops.answer(&each(p), y);
         }
     }
 
@@ -574,8 +576,19 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn close_end(&mut self, p: &[f64], q: &mut Configuration, v: &mut [f64]) -> f64 {
-        let TreeScratch { loops, factor, .. } = &mut *self.parts;
-        (loops.as_mut()).map_or(0.0, |loops| loops.end(self.model, factor, p, q, v))
+        let TreeScratch {
+            loops,
+            factor,
+            q: lane,
+            ..
+        } = &mut *self.parts;
+        let Some(loops) = loops else {
+            return 0.0;
+        };
+        lane.set_lane(0, q);
+        let gap = loops.end(self.model, factor, p, lane, v);
+        lane.to_lane(0, q);
+        gap
     }
 
     #[inline]

@@ -49,7 +49,7 @@ pub struct TreeScratch {
     /// Of a machine on soft ground.
     pub(super) sand: Option<Box<SandContact<f64>>>,
     /// Of a machine with closed loops.
-    pub(super) loops: Option<Box<Loops>>,
+    pub(super) loops: Option<Box<Loops<f64>>>,
 }
 
 impl TreeScratch {
@@ -147,6 +147,13 @@ impl TreeScratch {
     #[must_use]
     pub fn loop_impulses(&self) -> &[f64] {
         self.loops.as_ref().map_or(&[], |loops| loops.impulses())
+    }
+
+    /// The same, to be set by a step that was taken elsewhere.
+    pub(crate) fn loop_impulses_mut(&mut self) -> &mut [f64] {
+        self.loops
+            .as_mut()
+            .map_or(&mut [], |loops| loops.impulses_mut())
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.

@@ -44,7 +44,7 @@ impl Model {
                 closure,
             };
             let mut gaps = vec![0.0; made.n_rows()];
-            made.write_gaps(|b| poses[b], &joints, &mut gaps);
+            made.write_gaps(|b| poses[b].into(), &joints, &mut gaps);
             let gap = made.gap(i, &gaps);
             let has_place =
                 made.kind != LoopKind::Joint && is_placed(&self.description, &described, &solids);
@@ -72,7 +72,7 @@ impl Model {
         i: usize,
         described: &mut LoopDescription,
         solids: &HashMap<&str, usize>,
-        poses: &[BodyPose],
+        poses: &[ZeroPose],
     ) -> Result<[End; 2], ModelError> {
         let frame = |name: &str| solids.get(name).map(|&k| &self.frames[k]);
         let (first, second) = (
@@ -149,9 +149,26 @@ fn without(described: &LoopDescription) -> &'static str {
     }
 }
 
-/// Poses of all bodies with all joints at zero.
-fn zero_poses(bodies: &[Body]) -> Vec<BodyPose> {
-    let mut poses: Vec<BodyPose> = Vec::with_capacity(bodies.len());
+/// Attitude and origin (world, m) of a body with all joints at zero.
+#[derive(Clone, Copy, Debug)]
+struct ZeroPose {
+    R: Matrix3<f64>,
+    r: Vector3<f64>,
+}
+
+impl From<ZeroPose> for BodyPose<f64> {
+    fn from(pose: ZeroPose) -> Self {
+        Self {
+            R: pose.R.into(),
+            r: pose.r.into(),
+            origin: Vector3::zeros().into(),
+        }
+    }
+}
+
+/// Poses of all bodies.
+fn zero_poses(bodies: &[Body]) -> Vec<ZeroPose> {
+    let mut poses: Vec<ZeroPose> = Vec::with_capacity(bodies.len());
     for body in bodies {
         let carrier = body
             .parent
@@ -167,19 +184,18 @@ fn zero_poses(bodies: &[Body]) -> Vec<BodyPose> {
             _ => Lock::AtZero,
         };
         let (displacement, R) = lock.place(&frame);
-        poses.push(BodyPose {
+        poses.push(ZeroPose {
             R,
             r: carrier.1 + carrier.0 * body.position + displacement,
-            origin: Vector3::zeros(),
         });
     }
     poses
 }
 
 /// Attitude and origin of a solid's frame in the world; the identity for the world itself.
-fn pose(frame: Option<&Frame>, poses: &[BodyPose]) -> (Matrix3<f64>, Vector3<f64>) {
+fn pose(frame: Option<&Frame>, poses: &[ZeroPose]) -> (Matrix3<f64>, Vector3<f64>) {
     frame.map_or((Matrix3::identity(), Vector3::zeros()), |frame| {
-        let BodyPose { R, r, .. } = poses[frame.body];
+        let ZeroPose { R, r } = poses[frame.body];
         (R * frame.rotation, r + R * frame.position)
     })
 }
@@ -202,13 +218,13 @@ fn end(frame: Option<&Frame>, point: &Vector3<f64>, axes: &Matrix3<f64>) -> End 
     match frame {
         None => End {
             body: None,
-            point: *point,
-            axes: *axes,
+            point: (*point).into(),
+            axes: (*axes).into(),
         },
         Some(frame) => End {
             body: Some(frame.body),
-            point: frame.position + frame.rotation * point,
-            axes: frame.rotation * axes,
+            point: (frame.position + frame.rotation * point).into(),
+            axes: (frame.rotation * axes).into(),
         },
     }
 }

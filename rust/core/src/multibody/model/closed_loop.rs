@@ -1,23 +1,22 @@
 //! A closed loop: what it compares, and how far it is open.
 
-use nalgebra::{Matrix3, Vector3};
-
 use crate::multibody::description::LoopKind;
 use crate::multibody::joint::{Joint, JointModel};
+use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Attitude of a body, its origin relative to that of its tree, m, and the latter in the world, m.
 #[derive(Clone, Copy, Debug)]
-pub struct BodyPose {
+pub(in crate::multibody) struct BodyPose<T> {
     /// `R_WB`.
-    pub R: Matrix3<f64>,
+    pub R: Mat3<T>,
     /// World axes, m.
-    pub r: Vector3<f64>,
+    pub r: Vec3<T>,
     /// m.
-    pub origin: Vector3<f64>,
+    pub origin: Vec3<T>,
 }
 
 /// A constraint of a machine.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Loop {
     /// Its name.
     pub name: String,
@@ -27,7 +26,7 @@ pub struct Loop {
 }
 
 /// What a loop compares.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(in crate::multibody) enum Closure {
     /// The common point, and of a weld the common axes, as each end carries them.
     Bodies([End; 2]),
@@ -41,18 +40,18 @@ pub(in crate::multibody) enum Closure {
 }
 
 /// One end of a loop between bodies.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(in crate::multibody) struct End {
     /// `None` for the world.
     pub body: Option<usize>,
     /// The common point in the body's frame, m.
-    pub point: Vector3<f64>,
+    pub point: [f64; 3],
     /// The common axes in the body's frame, as columns.
-    pub axes: Matrix3<f64>,
+    pub axes: [[f64; 3]; 3],
 }
 
 /// The coordinate of a joint, also of one that follows another: `ratio q + offset`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::multibody) struct JointReading {
     /// Index among the coordinates of joints, and of its velocity.
     pub joint: usize,
@@ -88,27 +87,34 @@ impl JointReading {
         })
     }
 
-    pub(in crate::multibody) fn value(&self, joints: &[f64]) -> f64 {
-        self.ratio * joints[self.joint] + self.offset
+    #[inline(always)]
+    pub(in crate::multibody) fn value<T: Lane>(&self, joints: &[T]) -> T {
+        let q = joints[self.joint];
+        q.like(self.ratio) * q + q.like(self.offset)
     }
 }
 
 impl End {
     /// Point (world, m) relative to the origin of its tree, and that origin.
-    pub(in crate::multibody) fn place(
+    #[inline(always)]
+    pub(in crate::multibody) fn place<T: Lane>(
         &self,
-        pose: impl Fn(usize) -> BodyPose,
-    ) -> [Vector3<f64>; 2] {
-        let pose = self.body.map(pose);
-        pose.map_or([self.point, Vector3::zeros()], |pose| {
-            [pose.r + pose.R * self.point, pose.origin]
-        })
+        token: T::Token,
+        pose: impl Fn(usize) -> BodyPose<T>,
+    ) -> [Vec3<T>; 2] {
+        match self.body.map(pose) {
+            None => [self.point, [0.0; 3]].map(|x| Vec3::splat(token, x)),
+            Some(pose) => [pose.r + pose.R.times_shared(self.point), pose.origin],
+        }
     }
 
     /// The common axes in world axes, as columns.
-    fn axes(&self, pose: impl Fn(usize) -> BodyPose) -> Matrix3<f64> {
-        let pose = self.body.map(pose);
-        pose.map_or(self.axes, |pose| pose.R * self.axes)
+    #[inline(always)]
+    fn axes<T: Lane>(&self, token: T::Token, pose: impl Fn(usize) -> BodyPose<T>) -> [Vec3<T>; 3] {
+        match self.body.map(pose) {
+            None => self.axes.map(|axis| Vec3::splat(token, axis)),
+            Some(pose) => pose.R.times_columns(&self.axes).columns(),
+        }
     }
 }
 
@@ -133,15 +139,27 @@ impl Loop {
     }
 
     /// Writes φ (n_rows). `pose`: of each body; `joints`: coordinates of the joints there.
-    pub fn write_gaps(&self, pose: impl Fn(usize) -> BodyPose, joints: &[f64], out: &mut [f64]) {
+    #[inline(always)]
+    pub(in crate::multibody) fn write_gaps<T: Lane>(
+        &self,
+        pose: impl Fn(usize) -> BodyPose<T>,
+        joints: &[T],
+        out: &mut [T],
+    ) {
+        let token = out[0].token();
         match &self.closure {
-            Closure::Bodies(ends) => {
-                let [[x_a, o_a], [x_b, o_b]] = ends.each_ref().map(|end| end.place(&pose));
-                out[..3].copy_from_slice(((x_a - x_b) + (o_a - o_b)).as_slice());
+            Closure::Bodies([a, b]) => {
+                let ([x_a, o_a], [x_b, o_b]) = (a.place(token, &pose), b.place(token, &pose));
+                let gap = (x_a - x_b) + (o_a - o_b);
+                out[..3].copy_from_slice(&[gap.x, gap.y, gap.z]);
                 if let Some(turn) = out.get_mut(3..6) {
-                    let [e, f] = ends.each_ref().map(|end| end.axes(&pose));
-                    let sum: Vector3<f64> = (0..3).map(|i| f.column(i).cross(&e.column(i))).sum();
-                    turn.copy_from_slice((sum * 0.5).as_slice());
+                    let (e, f) = (a.axes(token, &pose), b.axes(token, &pose));
+                    let mut sum = Vec3::splat(token, [0.0; 3]);
+                    for i in 0..3 {
+                        sum += f[i].cross(e[i]);
+                    }
+                    let turned = sum * gap.x.like(0.5);
+                    turn.copy_from_slice(&[turned.x, turned.y, turned.z]);
                 }
             }
             Closure::Joints {
@@ -149,8 +167,15 @@ impl Loop {
                 other,
                 polynomial,
             } => {
-                let x = other.map_or(0.0, |other| other.value(joints));
-                out[0] = own.value(joints) - polynomial.iter().rev().fold(0.0, |p, c| p * x + c);
+                let mut sum = out[0].like(0.0);
+                let x = match other {
+                    Some(other) => other.value(joints),
+                    None => sum,
+                };
+                for c in polynomial.iter().rev() {
+                    sum = sum * x + x.like(*c);
+                }
+                out[0] = own.value(joints) - sum;
             }
         }
     }
@@ -158,9 +183,7 @@ impl Loop {
     /// How far it is open with these φ (n_rows). `index`: its place among the loops.
     #[must_use]
     pub fn gap(&self, index: usize, gaps: &[f64]) -> LoopGap {
-        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let (way, turn) = gaps.split_at(gaps.len().min(3));
-        let (way, turn) = (norm(way), norm(turn));
+        let [way, turn] = widths(gaps);
         let is_angle = match &self.closure {
             Closure::Joints { own, .. } => own.turns,
             Closure::Bodies(_) => turn > way,
@@ -171,4 +194,14 @@ impl Loop {
             unit: if is_angle { "rad" } else { "m" },
         }
     }
+}
+
+/// How far a loop is open with these φ (n_rows): m, or of a joint its own; and rad.
+#[inline(always)]
+pub(in crate::multibody) fn widths<T: Lane>(gaps: &[T]) -> [T; 2] {
+    let mut squares = [gaps[0].like(0.0); 2];
+    for (k, gap) in gaps.iter().enumerate() {
+        squares[k / 3] += *gap * *gap;
+    }
+    [squares[0].sqrt(), squares[1].sqrt()]
 }
