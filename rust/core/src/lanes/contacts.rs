@@ -24,7 +24,7 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
-use super::problem::{MAX_CONTACTS, MAX_DENSE};
+use super::problem::{MANY, MAX_CONTACTS, MAX_DENSE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
 use crate::geometry::query::sweep::DEEP;
@@ -207,7 +207,11 @@ impl<T: Lane> Contacts<T> {
             slots: vec![slot; n_slots],
             by_lane: ByLane::new(machine, first_spare),
             part_of,
-            most_dense: if machine.has_lines() { 0 } else { MAX_DENSE },
+            most_dense: match (machine.has_lines(), machine.rubbing.is_empty()) {
+                (true, _) => 0,
+                (_, true) => MANY,
+                _ => MAX_DENSE,
+            },
             used: Vec::with_capacity(n_slots),
             n_of_shapes: 0,
             factored: 0,

@@ -9,8 +9,12 @@ pub(crate) use crate::solver::pivoting::Triple;
 /// Most contacts of a problem.
 pub const MAX_CONTACTS: usize = 32;
 
-/// Most contacts of a problem with `W` itself.
-pub const MAX_DENSE: usize = 8;
+/// Most contacts of a problem with `W` itself, if those of dry joints are among them: factors solve
+/// a tenth of such problems on rigid wheels only after many attempts, or never.
+pub const MAX_DENSE: usize = 16;
+
+/// The same without dry joints.
+pub const MANY: usize = 8;
 
 /// Most unknowns.
 pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
@@ -137,7 +141,10 @@ impl Clone for ContactProblem {
     fn clone_from(&mut self, other: &Self) {
         self.n_contacts = other.n_contacts;
         self.factored.copy_from(&other.factored);
-        self.W = other.W;
+        if !other.is_factored() {
+            let used = block(other.n_contacts, 0);
+            self.W[..used].copy_from_slice(&other.W[..used]);
+        }
         (self.q, self.mu) = (other.q, other.mu);
         (self.p, self.u) = (other.p, other.u);
         (self.start, self.has_start) = (other.start, other.has_start);
