@@ -48,6 +48,7 @@ def test_options_without_a_fast_step_are_named(options: dict[str, Any], reason: 
         {"armature": 0.2},
         {"joint": "prismatic"},
         {"coupled": {"joint": "front_axle", "ratio": -0.5}, "hold": None},
+        {"friction": 5.0},
     ],
 )
 def test_joints_and_forces_of_every_kind_step_in_lanes(changes: dict[str, Any]) -> None:

@@ -17,6 +17,7 @@ mod materials;
 mod planar;
 mod rolling;
 mod rover;
+mod rover_kinds;
 mod sand;
 mod shapes;
 mod solver;

@@ -195,10 +195,8 @@ fn a_rover_that_rolls_is_braked_by_its_bearings() {
         let q = coordinates::from_public(&model, &q).unwrap();
         let options = options(5e-3, variant);
         let mut run = RoverSimulation::new(model.clone(), Arc::new(plane()), options).unwrap();
-        if variant == Variant::Linearised {
-            let reason = run.fallback_reason().unwrap().to_string();
-            assert_eq!(reason, "joints of the machine have dry friction");
-        }
+        let is_fast = variant == Variant::Linearised;
+        assert_eq!(run.fallback_reason().is_none(), is_fast);
         let mut v = vec![0.0; model.nv()];
         v[0] = 0.5;
         for wheel in model.wheels() {

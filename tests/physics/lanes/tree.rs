@@ -486,6 +486,6 @@ fn a_machine_without_a_fast_step_is_refused_with_its_reason() {
             ..template.clone()
         }));
     };
-    assert_eq!(reason(with_stops), Err(Unsupported::TooManyParts(36)));
+    assert_eq!(reason(with_stops), Err(Unsupported::TooManyContacts(36)));
     assert!(reason(|rover| rover.self_contact = true).is_ok());
 }

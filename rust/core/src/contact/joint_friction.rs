@@ -9,6 +9,7 @@
 //! velocity. Its normal row is zero, with a diagonal w of W and a free velocity `−w τ_f h`, so that
 //! `0 ≤ u_N ⊥ p_N ≥ 0` gives the normal impulse `p_N = τ_f h`; with μ = 1 Coulomb's law is the law
 //! above. The row b is zero, too, and its diagonal that of t.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use nalgebra::Vector3;
 
@@ -16,6 +17,18 @@ use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, Opposite};
 use super::part::Part;
 use crate::multibody::{JointModel, Kinematics, Model};
+
+impl ContactKey {
+    /// Key of a joint's dry friction.
+    #[must_use]
+    pub(crate) fn of_friction(joint: usize) -> Self {
+        Self {
+            part: Part::Friction(joint).code(),
+            feature: 2,
+            opposite: Opposite::Stop,
+        }
+    }
+}
 
 /// Adds to `out` the friction of all joints that have it.
 pub fn list_friction(model: &Model, kinematics: &Kinematics, out: &mut Vec<Contact>) {
@@ -39,11 +52,7 @@ fn contact(model: &Model, kinematics: &Kinematics, joint: usize) -> Contact {
     let axis: Vector3<f64> = model.bodies()[body].joint.direction(motion).into();
     let part = Part::Friction(joint);
     Contact {
-        key: ContactKey {
-            part: part.code(),
-            feature: 2,
-            opposite: Opposite::Stop,
-        },
+        key: ContactKey::of_friction(joint),
         part,
         body,
         other: None,
@@ -55,6 +64,7 @@ fn contact(model: &Model, kinematics: &Kinematics, joint: usize) -> Contact {
 }
 
 /// Makes the own block of W of such a contact regular; its only entry is that of t.
-pub(super) fn close(own: &mut [f64; 9]) {
+#[inline(always)]
+pub(crate) fn close<T: Copy>(own: &mut [T; 9]) {
     (own[0], own[8]) = (own[4], own[4]);
 }

@@ -10,19 +10,27 @@
 //! with the frame (n, t₀, b₀) of the wheel and the angle γ of the roller from the axle. The row b
 //! of H is then zero, and so is the impulse along it once W has a diagonal there: Coulomb's law in
 //! the plane of n and t. Rollers have no inertia.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::pair::{Contact, Opposite};
 use super::part::Part;
 use crate::multibody::Model;
+use crate::scalar::{Lane, Vec3};
 
 /// Turns the frame of a wheel's contact with the ground to the wheel's rollers, if it has any.
 #[inline]
 pub(crate) fn turn_to_rollers(model: &Model, contact: &mut Contact) {
     if let Some([sine, cosine]) = rollers_of(model, contact) {
         let frame = &mut contact.frame;
-        frame.t = frame.b * cosine + frame.t * sine;
+        frame.t = axis_of(frame.t.into(), frame.b.into(), [sine, cosine]).into();
         frame.b.fill(0.0);
     }
+}
+
+/// Axis t of rollers at an angle of the given sine and cosine, from the frame of their wheel.
+#[inline(always)]
+pub(crate) fn axis_of<T: Lane>(t: Vec3<T>, b: Vec3<T>, [sine, cosine]: [f64; 2]) -> Vec3<T> {
+    b * t.x.like(cosine) + t * t.x.like(sine)
 }
 
 /// Sine and cosine of the angle of the rollers on which a contact stands.
@@ -34,7 +42,9 @@ pub(super) fn rollers_of(model: &Model, contact: &Contact) -> Option<[f64; 2]> {
     }
 }
 
-/// Makes the own block of W of such a contact regular; its row b is zero.
-pub(super) fn close(own: &mut [f64; 9]) {
-    own[8] = own[4];
+/// Makes the own block of W of such a contact regular, where its row b is zero.
+#[inline(always)]
+pub(crate) fn close<T: Lane>(own: &mut [T; 9]) {
+    let zero = own[8].like(0.0);
+    own[8] = T::select(own[8].le(zero), own[4], own[8]);
 }

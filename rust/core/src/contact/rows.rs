@@ -139,19 +139,8 @@ impl<'a> Path<'a> {
         u
     }
 
-    /// The same for a stop at the last joint of the path: its only row is the `sign` at the joint's
-    /// velocity.
-    #[inline(always)]
-    pub(crate) fn write_stop<T: Lane>(
-        &self,
-        sign: T,
-        v: &[T],
-        rows: &mut [Triple<T>],
-    ) -> Triple<T> {
-        self.write_joint(0, sign, v, rows)
-    }
-
-    /// The same for one of n, t and b at the last joint of the path.
+    /// The same for the last joint of the path, of which only one row is not zero, n, t or b: the
+    /// `sign` at the joint's velocity.
     #[inline(always)]
     pub(crate) fn write_joint<T: Lane>(
         &self,

@@ -90,7 +90,7 @@ impl StepReport {
     }
 
     /// Enters the widest gap of the loops, m or rad.
-    pub(super) fn enter_loops(&mut self, gap: f64) {
+    pub(crate) fn enter_loops(&mut self, gap: f64) {
         self.loop_gap = self.loop_gap.max(gap);
         if gap.is_nan() || gap > MOST_OPEN {
             self.status = StepStatus::NotConverged;

@@ -24,9 +24,9 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
-use super::problem::{MAX_CONTACTS, MAX_DENSE};
+use super::problem::{MANY, MAX_CONTACTS, MAX_DENSE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
-use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, Side};
+use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
@@ -52,9 +52,9 @@ pub struct Slot<T: Lane> {
     pub point: Vec3<T>,
     /// Normal, from the ground to the wheel.
     pub n: Vec3<T>,
-    /// Rolling direction.
+    /// Rolling direction, or the axis of [rollers](crate::contact::rollers).
     pub t: Vec3<T>,
-    /// `t × n`.
+    /// `t × n`, or zero.
     pub b: Vec3<T>,
     /// m.
     pub gap: T,
@@ -62,6 +62,19 @@ pub struct Slot<T: Lane> {
     sphere: GroundSphere<T>,
     /// The plane that it stands on where the ground is a surface.
     pub(super) plane: LanePlane<T>,
+}
+
+impl<T: Lane> Slot<T> {
+    /// Completes the frame of a wheel from its normal and rolling direction.
+    #[inline(always)]
+    fn finish_frame(&mut self, rollers: Option<[f64; 2]>) {
+        self.b = self.t.cross(self.n);
+        if let Some(angle) = rollers {
+            self.t = rollers::axis_of(self.t, self.b, angle);
+            let zero = self.gap.like(0.0);
+            self.b = Vec3::new(zero, zero, zero);
+        }
+    }
 }
 
 /// A circle of a wheel over a plane.
@@ -95,19 +108,19 @@ pub struct Contacts<T: Lane> {
     pub(super) stops: Vec<Stop>,
     /// Of each stop, 1 where the joint is at its lower end, −1 at its upper one, 0 at none.
     pub(super) ends: Vec<T>,
-    /// The first spare slot, and the first slot of a stop.
+    /// Joints with dry friction.
+    pub(super) rubbing: Vec<usize>,
+    /// The first spare slot, and the first slot of a joint.
     first_spare: usize,
-    pub(super) first_stop: usize,
+    pub(super) first_of_joints: usize,
     twists: Vec<Twist<T>>,
     pub(super) slots: Vec<Slot<T>>,
-    /// Part of each slot: a wheel, or, counted on from the wheels, a spare slot or a joint with
-    /// stops.
+    /// Part of each slot: a wheel, or, counted on from the wheels, a spare slot or a joint.
     pub(super) part_of: Vec<usize>,
-    /// Most contacts of a rover, and most of one whose problem has the whole operator.
-    most: usize,
+    /// Most contacts of a rover whose problem has the whole operator.
     most_dense: usize,
     pub(super) used: Vec<usize>,
-    /// How many of them are not of stops.
+    /// How many of them are not of joints.
     n_of_shapes: usize,
     /// Lanes whose problem has factors, and slots in use by the others.
     factored: u32,
@@ -153,10 +166,9 @@ impl<T: Lane> Contacts<T> {
             .collect();
         let first_spare = part_of.len();
         part_of.extend(n_wheels..n_wheels + machine.spares.len());
-        let first_stop = part_of.len();
+        let first_of_joints = part_of.len();
         let n_shapes = n_wheels + machine.spares.len();
-        let stops = n_shapes..n_shapes + machine.stops.len();
-        part_of.extend(stops);
+        part_of.extend(n_shapes..n_shapes + machine.joints_with_slots().count());
         let n_slots = part_of.len();
         assert!(n_slots <= 256, "invariant: slots are numbered by 8 bits");
         let zero = T::splat(token, 0.0);
@@ -187,19 +199,19 @@ impl<T: Lane> Contacts<T> {
             token,
             twists: vec![twist; parts.n_carriers()],
             first_spare,
-            first_stop,
+            first_of_joints,
             parts,
             stops: machine.stops.clone(),
             ends: vec![zero; machine.stops.len()],
+            rubbing: machine.rubbing.clone(),
             slots: vec![slot; n_slots],
             by_lane: ByLane::new(machine, first_spare),
             part_of,
-            most: if machine.pattern.is_some() {
-                MAX_CONTACTS
-            } else {
-                MAX_DENSE
+            most_dense: match (machine.has_lines(), machine.rubbing.is_empty()) {
+                (true, _) => 0,
+                (_, true) => MANY,
+                _ => MAX_DENSE,
             },
-            most_dense: if machine.has_lines() { 0 } else { MAX_DENSE },
             used: Vec::with_capacity(n_slots),
             n_of_shapes: 0,
             factored: 0,
@@ -223,15 +235,15 @@ impl<T: Lane> Contacts<T> {
         &self.used
     }
 
-    /// Those that are not of stops.
+    /// Those that are not of joints.
     #[inline(always)]
     pub(super) fn used_by_shapes(&self) -> &[usize] {
         &self.used[..self.n_of_shapes]
     }
 
-    /// Those of the stops, which follow.
+    /// Those of the joints, which follow.
     #[inline(always)]
-    pub(super) fn used_by_stops(&self) -> &[usize] {
+    pub(super) fn used_by_joints(&self) -> &[usize] {
         &self.used[self.n_of_shapes..]
     }
 
@@ -258,7 +270,7 @@ impl<T: Lane> Contacts<T> {
         &self.slots[slot]
     }
 
-    /// Part of a slot: a wheel, or, counted on from the wheels, a spare slot or a joint with stops.
+    /// Part of a slot: a wheel, or, counted on from the wheels, a spare slot or a joint.
     #[inline(always)]
     #[must_use]
     pub fn part(&self, slot: usize) -> usize {
@@ -288,13 +300,10 @@ impl<T: Lane> Contacts<T> {
         }
         let (own, part) = (&self.slots[slot], self.part(slot));
         let n = Vector3::from(own.n.get(lane));
-        let (part, body, frame) = if let Some((stop, end)) = self.stop(slot) {
-            let part = Part::Limit(stop.joint, side(end, lane));
-            (
-                part,
-                machine.joints[stop.joint].body,
-                ContactFrame::of_normal(&n),
-            )
+        let (part, body, frame) = if let Some((joint, row)) = self.joint_row(slot) {
+            let (part, _) = row.names(joint, lane);
+            let body = machine.joints[joint].body;
+            (part, body, ContactFrame::of_normal(&n))
         } else {
             let (t, b) = (own.t.get(lane).into(), own.b.get(lane).into());
             (
@@ -417,11 +426,11 @@ impl<T: Lane> Contacts<T> {
         }
         let mut fallbacks = T::mask(self.token, 0);
         if self.by_lane.is_asked() || sight.machine.has_pairs {
-            for slot in &mut self.slots[self.first_spare..self.first_stop] {
+            for slot in &mut self.slots[self.first_spare..self.first_of_joints] {
                 slot.active = fallbacks;
             }
             fallbacks = self.find_by_lane(ground, sight);
-            let slots = self.slots[..self.first_stop].iter().enumerate();
+            let slots = self.slots[..self.first_of_joints].iter().enumerate();
             let used = slots.filter(|(_, own)| own.active.any());
             self.used.clear();
             self.used.extend(used.map(|(slot, _)| slot));
@@ -788,7 +797,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + to_point, slot.point);
             slot.gap = T::select(here, distance - sphere.radius, slot.gap);
         }
-        slot.b = slot.t.cross(slot.n);
+        slot.finish_frame(wheel.rollers);
         undefined
     }
 
@@ -838,7 +847,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + near.point, slot.point);
             slot.gap = T::select(here, near.distance - slot.sphere.radius, slot.gap);
         }
-        slot.b = slot.t.cross(slot.n);
+        slot.finish_frame(wheel.rollers);
         undefined
     }
 
@@ -874,12 +883,12 @@ impl<T: Lane> Contacts<T> {
         }
     }
 
-    /// Lists the contacts of a slot, of a stop's without ground, after those of the slots before
+    /// Lists the contacts of a slot, of a joint's without ground, after those of the slots before
     /// it. Returns the lanes that have too many.
     #[inline(always)]
     pub(super) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
-        let stop = self.stop(slot).map(|(stop, end)| (stop.joint, end));
-        let shown = match stop {
+        let joint_row = self.joint_row(slot);
+        let shown = match joint_row {
             Some(_) => NO_KEY,
             None => match self.parts.wheels.get(self.part_of[slot]) {
                 Some(wheel) => {
@@ -906,7 +915,7 @@ impl<T: Lane> Contacts<T> {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
             let list = &mut self.lists[lane];
-            if list.n == self.most {
+            if list.n == MAX_CONTACTS {
                 too_many |= 1 << lane;
                 continue;
             }
@@ -920,8 +929,8 @@ impl<T: Lane> Contacts<T> {
             } else if on_sphere >> lane & 1 == 1 {
                 key.feature = 0;
                 key.opposite = Opposite::Ground(whole(numbers[lane]));
-            } else if let Some((joint, end)) = stop {
-                key = ContactKey::at_limit(joint, side(end, lane));
+            } else if let Some((joint, row)) = joint_row {
+                (_, key) = row.names(joint, lane);
             } else if ground.is_some_and(|ground| ground.is_surface(lane)) {
                 // Which piece was found depends on when a search was made.
                 key = key.on_surface().lasting();
@@ -934,16 +943,6 @@ impl<T: Lane> Contacts<T> {
             own.active = own.active & !T::mask(self.token, too_many);
         }
         T::mask(self.token, too_many)
-    }
-}
-
-/// The end of its range that a joint is at, in a lane.
-#[inline(always)]
-fn side<T: Lane>(end: T, lane: usize) -> Side {
-    if end.get(lane) > 0.0 {
-        Side::Lower
-    } else {
-        Side::Upper
     }
 }
 

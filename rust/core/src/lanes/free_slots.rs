@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use super::machine::{Machine, WheelDisc};
+use super::machine::Machine;
 use super::pattern::Pattern;
 use super::problem::MAX_CONTACTS;
 
@@ -38,36 +38,38 @@ impl Machine {
         for_pairs.chain(for_bodies).take(room).collect()
     }
 
-    /// Number of slots of the wheels and stops.
+    /// Number of slots of the wheels and joints.
     fn n_own_slots(&self) -> usize {
-        let of_wheels = self.wheels.iter().map(WheelDisc::n_slots).sum::<usize>();
-        of_wheels + self.stops.len()
+        let of_wheels = self.wheels.iter().map(|wheel| wheel.n_slots).sum::<usize>();
+        of_wheels + self.stops.len() + self.rubbing.len()
+    }
+
+    /// Joints with slots of their own: those with stops, then those with dry friction.
+    pub(super) fn joints_with_slots(&self) -> impl Iterator<Item = usize> {
+        let stops = self.stops.iter().map(|stop| stop.joint);
+        stops.chain(self.rubbing.iter().copied())
     }
 
     /// Bodies whose path each slot has, in order; `None`: all velocities.
     pub(super) fn slot_bodies(&self) -> Vec<Option<usize>> {
         let wheels = (self.wheels.iter())
-            .flat_map(|wheel| std::iter::repeat_n(Some(wheel.body), wheel.n_slots()));
-        let stops = (self.stops.iter()).map(|stop| Some(self.joints[stop.joint].body));
+            .flat_map(|wheel| std::iter::repeat_n(Some(wheel.body), wheel.n_slots));
+        let joints = (self.joints_with_slots()).map(|joint| Some(self.joints[joint].body));
         wheels
             .chain(self.spares.iter().copied())
-            .chain(stops)
+            .chain(joints)
             .collect()
     }
 
-    /// Pattern of the problems of all slots, if they have room. Where bodies touch each other, or a
+    /// Pattern of the problems of all slots. Where loops are closed, bodies touch each other, or a
     /// coupled joint follows one with other carriers, it has all entries.
-    pub(super) fn find_pattern(&self) -> Option<Arc<Pattern>> {
+    pub(super) fn find_pattern(&self) -> Arc<Pattern> {
         let bodies = self.slot_bodies();
-        if bodies.len() > MAX_CONTACTS {
-            return None;
-        }
-        let whole: Vec<usize> = (0..self.nv()).collect();
         let paths = (bodies.iter()).map(|body| body.map(|body| self.path(body).to_vec()));
         let own = paths.collect::<Option<Vec<_>>>();
+        let own = own.filter(|_| self.loops.is_empty());
         let of_tree = own.and_then(|paths| Pattern::new(self.nv(), &paths));
-        let pattern = of_tree.or_else(|| Pattern::new(self.nv(), &vec![whole; bodies.len()]));
-        pattern.map(Arc::new)
+        Arc::new(of_tree.unwrap_or_else(|| Pattern::whole(self.nv(), bodies.len())))
     }
 
     /// Whether all that moves a body also moves another one.

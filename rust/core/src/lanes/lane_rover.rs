@@ -30,6 +30,8 @@ pub struct LaneRover<'a> {
     pub drive_work: &'a mut [f64],
     /// Mean torque of each wheel's drive in the last step, positive forward, N m.
     pub wheel_torque: &'a mut [f64],
+    /// Impulses of the rows of its loops in the last step (n_loop_rows), N s and N m s.
+    pub loop_impulses: &'a mut [f64],
     /// The sand under its wheels, if its ground is soft. The block keeps its ruts until the rover
     /// is stored.
     pub sand: Option<&'a mut SandState>,

@@ -16,12 +16,13 @@ use crate::contact::Part;
 use crate::geometry::Roller;
 use crate::law::compliance::Compliance;
 use crate::multibody::description::Limits;
+use crate::multibody::model::Loop;
 use crate::multibody::{Mechanism, Model, Wheel};
 use crate::scalar::elementary::hypot;
 use crate::system::sand_wheel::PlacedWheel;
 
-/// Most wheels and joints with stops: the operator of a block has room for contacts of all of them.
-pub const MOST_PARTS: usize = 32;
+/// Most slots of a wheel beside those of its circles on a plane.
+const MOST_FURTHER: usize = 2;
 
 /// Why a machine has no fast step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -29,21 +30,10 @@ pub enum Unsupported {
     /// It has several trees, or its root is fixed.
     #[error("the machine is not one tree on a free base")]
     NotOneFreeTree,
-    /// Loops are closed.
-    #[error("the machine has closed loops")]
-    ClosedLoops,
-    /// Joints have dry friction.
-    #[error("joints of the machine have dry friction")]
-    JointFriction,
-    /// Wheels have rollers.
-    #[error("wheels of the machine have rollers")]
-    Rollers,
-    /// Its wheels and stops can have more contacts than a problem.
-    #[error("wheels with a width and stops can have {0} contacts, more than {MAX_CONTACTS}")]
+    /// A problem has no room for the contacts of its wheels with a plane, its stops and its joints
+    /// with dry friction.
+    #[error("wheels, stops and dry joints can have {0} contacts, more than {MAX_CONTACTS}")]
     TooManyContacts(usize),
-    /// It has more wheels and joints with stops than lanes have room for.
-    #[error("the machine has {0} wheels and joints with stops, more than {MOST_PARTS}")]
-    TooManyParts(usize),
 }
 
 /// What a block of rovers has in common: a mechanism, and its wheels, boxes and stops.
@@ -58,13 +48,17 @@ pub struct Machine {
     pub boxes: Vec<BodyBox>,
     /// Joints with stops, ascending.
     pub stops: Vec<Stop>,
-    /// Slots between those of the wheels and the stops: [`Self::find_free_slots`].
+    /// Joints with dry friction, ascending.
+    pub rubbing: Vec<usize>,
+    /// Closed loops, and whether one of them ties the machine to the world.
+    pub loops: Vec<Loop>,
+    pub(super) holds_the_world: bool,
+    /// Slots between those of the wheels and the joints: [`Self::find_free_slots`].
     pub(super) spares: Vec<Option<usize>>,
     /// Whether its bodies can touch each other.
     pub(super) has_pairs: bool,
-    /// Pattern of its contact problems; none if they cannot be solved by the factors of their
-    /// operator.
-    pub(super) pattern: Option<Arc<Pattern>>,
+    /// Pattern of its contact problems.
+    pub(super) pattern: Arc<Pattern>,
 }
 
 impl Deref for Machine {
@@ -105,6 +99,10 @@ pub struct WheelDisc {
     pub rounding: f64,
     /// Spring and damper where it touches; `None` if it is rigid.
     pub compliance: Option<Compliance>,
+    /// Sine and cosine of the angle of its rollers from the axle, if it has any.
+    pub rollers: Option<[f64; 2]>,
+    /// Number of its slots for contacts.
+    pub n_slots: usize,
 }
 
 /// A box that collides with the ground, or around a ball or another collider which does.
@@ -129,9 +127,12 @@ impl Machine {
     /// Why it has no fast step.
     pub fn of(model: &Model) -> Result<Self, Unsupported> {
         check(model)?;
+        let mut wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
+        let rubbing = model.rubbing_joints().to_vec();
+        give_slots(&mut wheels, model.limited_joints().len() + rubbing.len())?;
         let mut machine = Self {
             mechanism: model.mechanism().clone(),
-            wheels: (model.wheels().iter()).map(WheelDisc::of).collect(),
+            wheels,
             in_sand: (model.wheels().iter()).map(PlacedWheel::of).collect(),
             boxes: (Part::all(model).skip(model.wheels().len()))
                 .map(|part| BodyBox::of(model, part))
@@ -142,9 +143,12 @@ impl Machine {
                     Some(Stop { joint, limits })
                 })
                 .collect(),
+            rubbing,
+            loops: model.loops().to_vec(),
+            holds_the_world: model.holds_the_world(),
             spares: Vec::new(),
             has_pairs: model.trees()[0].self_contact,
-            pattern: None,
+            pattern: Arc::default(),
         };
         machine.spares = machine.find_free_slots(machine.has_pairs);
         machine.pattern = machine.find_pattern();
@@ -163,9 +167,10 @@ impl Machine {
         self.wheels.iter().any(|wheel| wheel.compliance.is_some())
     }
 
-    /// Whether a model differs from this machine only in its inertias, springs, dampers and rotors,
-    /// so that it can be a lane of a block. A joint that gains or loses a rotor, a mass centre that
-    /// leaves the frame's origin, or moments that are no longer equal, make another machine.
+    /// Whether a model differs from this machine only in its inertias, springs, dampers, rotors and
+    /// the size of dry friction, so that it can be a lane of a block. A joint that gains or loses a
+    /// rotor or dry friction, a mass centre that leaves the frame's origin, or moments that are no
+    /// longer equal, make another machine.
     #[must_use]
     pub fn fits(&self, model: &Model) -> bool {
         Self::of(model).is_ok_and(|other| other == *self)
@@ -210,6 +215,8 @@ impl WheelDisc {
             },
             rounding: if is_wide { wheel.rounding } else { 0.0 },
             compliance: wheel.compliance,
+            rollers: wheel.rollers,
+            n_slots: 0,
         }
     }
 
@@ -217,12 +224,6 @@ impl WheelDisc {
     #[must_use]
     pub fn is_wide(&self) -> bool {
         self.half > 0.0 || self.rounding > 0.0
-    }
-
-    /// Number of its slots for contacts.
-    #[must_use]
-    pub fn n_slots(&self) -> usize {
-        if self.n_circles() > 1 { 4 } else { 3 }
     }
 
     /// Radius of a bounding ball about its centre.
@@ -246,25 +247,19 @@ fn check(model: &Model) -> Result<(), Unsupported> {
     if !model.is_free_tree() {
         return Err(Unsupported::NotOneFreeTree);
     }
-    if !model.loops().is_empty() {
-        return Err(Unsupported::ClosedLoops);
-    }
-    if !model.rubbing_joints().is_empty() {
-        return Err(Unsupported::JointFriction);
-    }
-    if model.has_rollers() {
-        return Err(Unsupported::Rollers);
-    }
-    let wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
-    let has_lines = wheels.iter().any(|wheel| wheel.n_circles() > 1);
-    let n_slots = wheels.iter().map(WheelDisc::n_slots).sum::<usize>();
-    let n_slots = n_slots + model.limited_joints().len();
-    if has_lines && n_slots > MAX_CONTACTS {
-        return Err(Unsupported::TooManyContacts(n_slots));
-    }
-    let n_parts = model.wheels().len() + model.limited_joints().len();
-    if n_parts > MOST_PARTS {
-        return Err(Unsupported::TooManyParts(n_parts));
+    Ok(())
+}
+
+/// Gives each wheel slots for its circles on a plane, and as many further ones as there is room
+/// for. `n_of_joints`: number of slots of joints.
+fn give_slots(wheels: &mut [WheelDisc], n_of_joints: usize) -> Result<(), Unsupported> {
+    let n_needed = n_of_joints + wheels.iter().map(WheelDisc::n_circles).sum::<usize>();
+    let Some(room) = MAX_CONTACTS.checked_sub(n_needed) else {
+        return Err(Unsupported::TooManyContacts(n_needed));
+    };
+    let further = (room / wheels.len().max(1)).min(MOST_FURTHER);
+    for wheel in wheels {
+        wheel.n_slots = wheel.n_circles() + further;
     }
     Ok(())
 }

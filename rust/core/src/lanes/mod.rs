@@ -10,7 +10,7 @@
 //! - [`admission`]: which options have a fast step; [`machine`]: what the rovers of a block share;
 //!   `parts`: its wheels, boxes and balls; [`lane_rover`]: what a block reads of a rover;
 //! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `wide_wheel`,
-//!   `stops`, [`forecast`]: contacts of all lanes at once; `lane_detection`, `by_lane`,
+//!   `joint_slots`, [`forecast`]: contacts of all lanes at once; `lane_detection`, `by_lane`,
 //!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
 //! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield; [`pattern`]: which
 //!   velocities a contact moves;
@@ -57,6 +57,7 @@ mod equations;
 pub mod forecast;
 mod free_slots;
 pub mod ground;
+mod joint_slots;
 mod lane_detection;
 pub mod lane_rover;
 mod lane_solver;
@@ -69,7 +70,6 @@ pub mod queue;
 mod rolling;
 pub mod rows;
 pub mod step;
-mod stops;
 mod sweeps;
 mod system;
 mod tree_matrix;

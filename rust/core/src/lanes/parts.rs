@@ -41,6 +41,8 @@ pub(super) struct Wheel {
     pub rounding: f64,
     /// Whether it yields where it touches.
     pub is_soft: bool,
+    /// Sine and cosine of the angle of its rollers from the axle, if it has any.
+    pub rollers: Option<[f64; 2]>,
     /// Radius of a bounding ball, m.
     pub bound: f64,
     /// Twist of the body that moves its centre.
@@ -106,7 +108,7 @@ impl Parts {
         let wheels = (machine.wheels.iter())
             .map(|wheel| {
                 let first = n_slots;
-                n_slots += wheel.n_slots();
+                n_slots += wheel.n_slots;
                 let link = &machine.links[wheel.body];
                 let axle = axle_of(wheel.axle);
                 let spins = link.is_spinner && link.turns_about(axle);
@@ -121,6 +123,7 @@ impl Parts {
                     half: wheel.half,
                     rounding: wheel.rounding,
                     is_soft: wheel.compliance.is_some(),
+                    rollers: wheel.rollers,
                     bound: wheel.bound(),
                     carrier: carrier_of(machine, mover, &mut carriers),
                     spin: spins.then_some(link.velocity),

@@ -8,7 +8,7 @@ use crate::multibody::model::BASE;
 /// (Featherstone 2008, ch. 6): all entries of the base's six velocities, and (k, a) and (a, k) for
 /// every joint's velocity k and those that carry it, its ancestors. Joints' velocities are numbered
 /// from 0, after those of the base.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct Pattern {
     /// Joint ancestors of all joints, from the root: those of joint k are `ancestors[rows[k]]`.
     ancestors: Vec<usize>,
@@ -59,6 +59,20 @@ impl Pattern {
                 .collect(),
             paths: own_paths,
         })
+    }
+
+    /// That of `n` slots with all entries of `nv` velocities, those of the base among them.
+    #[must_use]
+    pub fn whole(nv: usize, n: usize) -> Self {
+        let joints: Vec<usize> = (0..nv - BASE).collect();
+        let first = |k: usize| k * k.saturating_sub(1) / 2;
+        Self {
+            ancestors: joints.iter().flat_map(|&k| 0..k).collect(),
+            rows: joints.iter().map(|&k| first(k)..first(k) + k).collect(),
+            paths: vec![joints; n],
+            stride: nv,
+            shared: vec![nv; n * n],
+        }
     }
 
     /// Number of joints' velocities.

@@ -9,8 +9,12 @@ pub(crate) use crate::solver::pivoting::Triple;
 /// Most contacts of a problem.
 pub const MAX_CONTACTS: usize = 32;
 
-/// Most contacts of a problem with `W` itself.
-pub const MAX_DENSE: usize = 8;
+/// Most contacts of a problem with `W` itself, if those of dry joints are among them: factors solve
+/// a tenth of such problems on rigid wheels only after many attempts, or never.
+pub const MAX_DENSE: usize = 16;
+
+/// The same without dry joints.
+pub const MANY: usize = 8;
 
 /// Most unknowns.
 pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
@@ -72,6 +76,8 @@ pub struct Factored {
     pub diagonal: Vec<[f64; 9]>,
     /// Diagonal of D by contact, 1/kg.
     pub softness: Vec<f64>,
+    /// What it has more along a normal that nothing moves, 1/kg: that of a joint's dry friction.
+    pub normal: Vec<f64>,
 }
 
 impl Factored {
@@ -110,6 +116,7 @@ impl Factored {
             self.Z.resize(MAX_CONTACTS * pattern.stride(), [0.0; 3]);
             self.diagonal.resize(MAX_CONTACTS, [0.0; 9]);
             self.softness.resize(MAX_CONTACTS, 0.0);
+            self.normal.resize(MAX_CONTACTS, 0.0);
         }
     }
 
@@ -119,6 +126,7 @@ impl Factored {
         self.Z.clone_from(&other.Z);
         self.diagonal.clone_from(&other.diagonal);
         self.softness.clone_from(&other.softness);
+        self.normal.clone_from(&other.normal);
     }
 }
 
@@ -133,7 +141,10 @@ impl Clone for ContactProblem {
     fn clone_from(&mut self, other: &Self) {
         self.n_contacts = other.n_contacts;
         self.factored.copy_from(&other.factored);
-        self.W = other.W;
+        if !other.is_factored() {
+            let used = block(other.n_contacts, 0);
+            self.W[..used].copy_from_slice(&other.W[..used]);
+        }
         (self.q, self.mu) = (other.q, other.mu);
         (self.p, self.u) = (other.p, other.u);
         (self.start, self.has_start) = (other.start, other.has_start);

@@ -11,7 +11,7 @@
 use std::collections::VecDeque;
 
 use super::lane_solver::{DenseSolver, FactoredSolver, ProblemSource};
-use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE};
+use super::problem::{ContactProblem, MANY, MAX_CONTACTS, MAX_DENSE};
 use crate::problem::Residual;
 use crate::scalar::Lane;
 use crate::solver::SolverOptions;
@@ -63,10 +63,11 @@ impl ContactProblem {
 pub struct Queue<T: Lane> {
     token: T::Token,
     few: Box<DenseSolver<T, FEW>>,
-    many: Box<DenseSolver<T, MAX_DENSE>>,
+    many: Box<DenseSolver<T, MANY>>,
+    most: Box<DenseSolver<T, MAX_DENSE>>,
     factored: Box<FactoredSolver<T>>,
     /// Problems that wait for a lane, by [`Kind`].
-    waiting: [VecDeque<usize>; 3],
+    waiting: [VecDeque<usize>; 4],
     groups: Groups,
 }
 
@@ -75,6 +76,7 @@ pub struct Queue<T: Lane> {
 enum Kind {
     Few,
     Many,
+    Most,
     Factored,
 }
 
@@ -82,6 +84,8 @@ impl Kind {
     fn of(problem: &ContactProblem) -> Self {
         if problem.is_factored() {
             Self::Factored
+        } else if problem.n_contacts > MANY {
+            Self::Most
         } else if problem.n_contacts > FEW {
             Self::Many
         } else {
@@ -144,8 +148,9 @@ impl<T: Lane> Queue<T> {
             token,
             few: Box::new(DenseSolver::new(token)),
             many: Box::new(DenseSolver::new(token)),
+            most: Box::new(DenseSolver::new(token)),
             factored: Box::new(FactoredSolver::new(token)),
-            waiting: [const { VecDeque::new() }; 3],
+            waiting: [const { VecDeque::new() }; 4],
             groups: Groups {
                 n_lanes: T::LANES,
                 ..Groups::default()
@@ -157,6 +162,7 @@ impl<T: Lane> Queue<T> {
     pub fn begin(&mut self, n: usize) {
         self.few.clear();
         self.many.clear();
+        self.most.clear();
         self.factored.clear();
         self.waiting.iter_mut().for_each(VecDeque::clear);
         self.groups.left.clear();
@@ -207,9 +213,10 @@ impl<T: Lane> Queue<T> {
             let mut counts = self.waiting.each_ref().map(VecDeque::len);
             counts[0] += self.few.n_active();
             counts[1] += self.many.n_active();
-            counts[2] += self.factored.n_active();
+            counts[2] += self.most.n_active();
+            counts[3] += self.factored.n_active();
             let (mut kind, mut most, mut n_others) = (Kind::Few, counts[0], 0);
-            for other in [Kind::Many, Kind::Factored] {
+            for other in [Kind::Many, Kind::Most, Kind::Factored] {
                 let count = counts[other as usize];
                 n_others = n_others.max(count.min(most));
                 if count > most {
@@ -240,6 +247,7 @@ impl<T: Lane> Queue<T> {
         let Self {
             few,
             many,
+            most,
             factored,
             ..
         } = self;
@@ -258,6 +266,11 @@ impl<T: Lane> Queue<T> {
                 token,
                 #[inline(always)]
                 || many.run(token, problems, tolerances, &mut line),
+            ),
+            Kind::Most => T::vectorize(
+                token,
+                #[inline(always)]
+                || most.run(token, problems, tolerances, &mut line),
             ),
             Kind::Factored => T::vectorize(
                 token,

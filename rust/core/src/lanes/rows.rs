@@ -8,15 +8,18 @@ use std::sync::Arc;
 
 use super::by_lane::OneLane;
 use super::contacts::{Contacts, Slot};
+use super::joint_slots::JointRow;
 use super::machine::Machine;
 use super::pattern::Pattern;
 use super::problem::{ContactProblem, Triple, block};
-use crate::contact::Contact;
 use crate::contact::jacobian::{add_impulse, for_each_row};
-use crate::contact::rows::{Path, Place, add, close_stop, product, square};
+use crate::contact::rows::{Path, Place, add, add_scaled, product, square};
+use crate::contact::{Contact, rollers};
+use crate::multibody::loops::Placed;
 use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::system::loops::Loops;
 
 /// What is read of a problem.
 #[derive(Clone, Copy, Debug)]
@@ -31,13 +34,15 @@ pub enum Answer {
 #[derive(Clone, Debug)]
 pub struct Rows<T: Lane> {
     token: T::Token,
-    /// Bodies of the parts: wheels, spare slots, and joints with stops; none of a spare slot with
-    /// all velocities.
+    /// Bodies of the parts: wheels, spare slots, and joints; none of a spare slot with all
+    /// velocities.
     bodies: Vec<Option<usize>>,
     /// Velocities of the joints that move each part, from the trunk outwards.
     movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
+    /// Whether wheels have rollers.
+    has_rollers: bool,
     /// Length of the longest path.
     stride: usize,
     /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
@@ -46,12 +51,19 @@ pub struct Rows<T: Lane> {
     /// positions among them.
     pub(super) W: Vec<[T; 9]>,
     /// Pattern of the problems with factors.
-    pattern: Option<Arc<Pattern>>,
+    pattern: Arc<Pattern>,
     /// Diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
     pub(super) diagonal: Vec<[T; 9]>,
     pub(super) softness: Vec<T>,
-    /// The motion in [`Self::sweep`] (nv, factor coordinates).
+    /// W's entry of the normal of a joint's dry friction by slot, 1/kg; 0 of others.
+    pub(super) normal: Vec<T>,
+    /// The motion in [`Self::sweep`] (nv, factor coordinates), and the products of the loops with
+    /// it.
     pub(super) swept: Vec<T>,
+    pub(super) swept_loops: Vec<T>,
+    /// The closed loops of the machine, which number the contacts by their slots.
+    pub(super) loops: Option<Box<Loops<T>>>,
+    n_slots: usize,
     /// Local velocity `Hᵀ v` before the step by slot, m/s.
     pub u_before: Vec<Triple<T>>,
 }
@@ -62,9 +74,9 @@ impl<T: Lane> Rows<T> {
     pub fn new(token: T::Token, machine: &Machine, n_slots: usize) -> Self {
         let wheels = machine.wheels.iter().map(|wheel| Some(wheel.body));
         let spares = machine.spares.iter().copied();
-        let stops = machine.stops.iter();
-        let stops = stops.map(|stop| Some(machine.joints[stop.joint].body));
-        let bodies: Vec<Option<usize>> = wheels.chain(spares).chain(stops).collect();
+        let joints = machine.joints_with_slots();
+        let joints = joints.map(|joint| Some(machine.joints[joint].body));
+        let bodies: Vec<Option<usize>> = wheels.chain(spares).chain(joints).collect();
         let whole: Vec<usize> = (0..machine.nv()).collect();
         let paths: Vec<&[usize]> = (bodies.iter())
             .map(|body| body.map_or(&whole[..], |body| machine.path(body)))
@@ -87,19 +99,44 @@ impl<T: Lane> Rows<T> {
             .collect();
         let stride = paths.iter().map(|path| path.len()).max().unwrap_or(0);
         let zero = T::splat(token, 0.0);
+        let loops = Loops::new(token, machine, &machine.loops, 0);
         Self {
             token,
             bodies,
             movers,
             common,
+            has_rollers: (machine.wheels.iter()).any(|wheel| wheel.rollers.is_some()),
             stride,
             Z: vec![[zero; 3]; n_slots * stride],
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
-            pattern: machine.pattern.clone(),
+            pattern: Arc::clone(&machine.pattern),
             diagonal: vec![[zero; 9]; n_slots],
             softness: vec![zero; n_slots],
+            normal: vec![zero; n_slots],
             swept: vec![zero; machine.nv()],
+            swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
+            loops,
+            n_slots,
             u_before: vec![[zero; 3]; n_slots],
+        }
+    }
+
+    /// The loops at the midpoint of the step, where the joints have the coordinates `joints`.
+    /// [`Self::assemble`] follows.
+    pub fn begin_loops(
+        &mut self,
+        machine: &Machine,
+        middle: &Poses<T>,
+        joints: &[T],
+        factor: &Factor<T>,
+    ) {
+        if let Some(loops) = &mut self.loops {
+            let placed = Placed {
+                mechanism: machine,
+                poses: middle,
+                joints,
+            };
+            loops.begin(&placed, factor, self.n_slots);
         }
     }
 
@@ -123,6 +160,13 @@ impl<T: Lane> Rows<T> {
             || {
                 for &slot in contacts.used() {
                     self.build(machine, end, factor, contacts, v, slot);
+                }
+                self.multiply_loops(contacts);
+                for &slot in contacts.used_by_joints() {
+                    if let Some((_, JointRow::Friction)) = contacts.joint_row(slot) {
+                        let (_, rows) = self.of(contacts, slot);
+                        self.normal[slot] = square(self.normal[slot].like(0.0), rows)[4];
+                    }
                 }
                 self.multiply(contacts);
                 if contacts.factored() != 0 {
@@ -154,8 +198,9 @@ impl<T: Lane> Rows<T> {
         let path = Path::from_trunk(&self.movers[part]);
         let rows = &mut self.Z[slot * self.stride..][..path.len()];
         let u = &mut self.u_before[slot];
-        if let Some((_, sign)) = contacts.stop(slot) {
-            *u = path.write_stop(sign, v, rows);
+        if let Some((_, row)) = contacts.joint_row(slot) {
+            let (which, entry) = row.entry(v[0]);
+            *u = path.write_joint(which, entry, v, rows);
         } else {
             let place = place_of(contacts.slot(slot));
             *u = path.write(|m| end.motions[m], &place, v, rows);
@@ -173,6 +218,22 @@ impl<T: Lane> Rows<T> {
             Some(body) => factor.half_solve_path(machine, body, rows),
             None => factor.half_solve_columns(machine, 0..v.len(), rows),
         }
+    }
+
+    /// Products of the loops with the contacts from Z.
+    #[inline(always)]
+    fn multiply_loops(&mut self, contacts: &Contacts<T>) {
+        let Some(mut loops) = self.loops.take() else {
+            return;
+        };
+        let none = [T::splat(self.token, 0.0); 3];
+        for row in 0..loops.m() {
+            for &slot in contacts.used() {
+                let (path, rows) = self.of(contacts, slot);
+                *loops.product_mut(row, slot) = path.add_local(rows, loops.q(row), none);
+            }
+        }
+        self.loops = Some(loops);
     }
 
     /// Diagonal blocks of W from Z.
@@ -197,6 +258,9 @@ impl<T: Lane> Rows<T> {
                 let x = &self.Z[row * self.stride..][..shared];
                 let y = &self.Z[column * self.stride..][..shared];
                 self.W[at] = product(zero, x, y);
+                if let Some(loops) = &self.loops {
+                    loops.project_block([row, column], &mut self.W[at]);
+                }
                 at += 1;
             }
             self.W[at] = self.own_block(contacts, row);
@@ -209,8 +273,13 @@ impl<T: Lane> Rows<T> {
     fn own_block(&self, contacts: &Contacts<T>, slot: usize) -> [T; 9] {
         let (_, rows) = self.of(contacts, slot);
         let mut own = square(T::splat(self.token, 0.0), rows);
-        if contacts.stop(slot).is_some() {
-            close_stop(&mut own);
+        if let Some((_, row)) = contacts.joint_row(slot) {
+            row.close(&mut own);
+        } else if self.has_rollers {
+            rollers::close(&mut own);
+        }
+        if let Some(loops) = &self.loops {
+            loops.project_block([slot, slot], &mut own);
         }
         own
     }
@@ -266,6 +335,18 @@ impl<T: Lane> Rows<T> {
             let (path, rows) = self.of(contacts, slot);
             path.push(contacts.slot(slot).active & lanes, rows, &p[slot], y);
         }
+        if let Some(loops) = &self.loops {
+            loops.answer(&in_slots(contacts, lanes, p), y);
+        }
+    }
+
+    /// Finds the impulses of the loops with those of the contacts by slot, N s, in the lanes of a
+    /// mask.
+    #[inline(always)]
+    pub fn find_loop_impulses(&mut self, contacts: &Contacts<T>, lanes: T::Mask, p: &[Triple<T>]) {
+        if let Some(loops) = &mut self.loops {
+            loops.find_impulses(&in_slots(contacts, lanes, p));
+        }
     }
 
     /// `out = H p` (nv): generalized impulse, N s and N m s, of impulses by slot, N s, in the lanes
@@ -308,11 +389,12 @@ impl<T: Lane> Rows<T> {
         if (lanes & T::mask(self.token, guests)).any() {
             add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
-        for &slot in contacts.used_by_stops() {
+        for &slot in contacts.used_by_joints() {
             let here = contacts.slot(slot).active & lanes;
             let mover = self.movers[contacts.part(slot)].last();
-            if let (Some((_, sign)), Some(mover)) = (contacts.stop(slot), mover) {
-                add(here, &mut out[mover.velocity], sign * p[slot][0]);
+            if let (Some((_, row)), Some(mover)) = (contacts.joint_row(slot), mover) {
+                let (which, entry) = row.entry(zero);
+                add(here, &mut out[mover.velocity], entry * p[slot][which]);
             }
         }
     }
@@ -339,12 +421,11 @@ impl<T: Lane> Rows<T> {
                 for (lane, problem) in problems.iter_mut().enumerate() {
                     problem.n_contacts = contacts.list(lane).n;
                     problem.has_start = false;
-                    match &self.pattern {
-                        Some(pattern) if factored >> lane & 1 == 1 => {
-                            problem.factored.adopt(pattern);
-                            problem.factored.slots = 0;
-                        }
-                        _ => problem.factored.pattern = None,
+                    if factored >> lane & 1 == 1 {
+                        problem.factored.adopt(&self.pattern);
+                        problem.factored.slots = 0;
+                    } else {
+                        problem.factored.pattern = None;
                     }
                 }
                 for &slot in contacts.used() {
@@ -418,15 +499,13 @@ impl<T: Lane> Rows<T> {
     /// Writes a slot's part of the factors.
     #[inline(always)]
     fn write_factors(&self, contacts: &Contacts<T>, slot: usize, problems: &mut [ContactProblem]) {
-        let Some(pattern) = &self.pattern else {
-            return;
-        };
+        let pattern = &*self.pattern;
         let places = contacts.places(slot);
         let active = contacts.slot(slot).active & T::mask(self.token, contacts.factored());
         let movers = &self.movers[contacts.part(slot)];
         let n = BASE + movers.len();
         let (stride, length) = (pattern.stride(), BASE + pattern.joints(slot).len());
-        let softness = store_all(&[self.softness[slot]]);
+        let softness = store_all(&[self.softness[slot], self.normal[slot]]);
         let diagonal = store_all(&self.diagonal[slot]);
         each::<T>(
             active,
@@ -435,6 +514,7 @@ impl<T: Lane> Rows<T> {
                 let (contact, out) = (usize::from(places[lane]), &mut problems[lane].factored);
                 out.slots |= 1 << slot;
                 out.softness[contact] = softness[0][lane];
+                out.normal[contact] = softness[1][lane];
                 let own = &mut out.diagonal[contact];
                 for k in 0..9 {
                     own[k] = diagonal[k][lane];
@@ -460,6 +540,43 @@ impl<T: Lane> Rows<T> {
                     let out = &mut problems[lane].factored.Z[at];
                     for i in 0..3 {
                         out[i] = values[i][lane];
+                    }
+                },
+            );
+        }
+        if self.loops.is_some() {
+            self.project_factors(contacts, active, slot, problems);
+        }
+    }
+
+    /// `Z − Qᵀ B` in place of a slot's Z, which the problems have along all velocities.
+    #[inline(always)]
+    fn project_factors(
+        &self,
+        contacts: &Contacts<T>,
+        active: T::Mask,
+        slot: usize,
+        problems: &mut [ContactProblem],
+    ) {
+        let Some(loops) = &self.loops else {
+            return;
+        };
+        let (zero, stride) = (T::splat(self.token, 0.0), self.pattern.stride());
+        let places = contacts.places(slot);
+        for k in 0..stride {
+            let mut taken = [zero; 3];
+            for row in 0..loops.m() {
+                add_scaled(&mut taken, loops.product(row, slot), loops.q(row)[k]);
+            }
+            let taken = store_all(&taken);
+            each::<T>(
+                active,
+                #[inline(always)]
+                |lane| {
+                    let at = usize::from(places[lane]) * stride + k;
+                    let out = &mut problems[lane].factored.Z[at];
+                    for i in 0..3 {
+                        out[i] -= taken[i][lane];
                     }
                 },
             );
@@ -565,6 +682,20 @@ fn write_guest<T: Lane>(
             u[i].set(lane, u[i].get(lane) + x * v);
         }
     });
+}
+
+/// Impulses of the slots in use, and where they have one among the lanes of a mask.
+#[inline(always)]
+fn in_slots<'a, T: Lane>(
+    contacts: &'a Contacts<T>,
+    lanes: T::Mask,
+    p: &'a [Triple<T>],
+) -> impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone + 'a {
+    let slots = contacts.used().iter();
+    slots.map(
+        #[inline(always)]
+        move |&slot| (slot, contacts.slot(slot).active & lanes, p[slot]),
+    )
 }
 
 /// The numbers of all lanes.

@@ -78,7 +78,9 @@ impl<T: Lane> Rows<T> {
     ) {
         let zero = T::splat(contacts.token, 0.0);
         let mut motion = std::mem::take(&mut self.swept);
+        let mut of_loops = std::mem::take(&mut self.swept_loops);
         motion.fill(zero);
+        of_loops.fill(zero);
         for &slot in contacts.used() {
             let active = contacts.slot(slot).active;
             for p in &mut p[slot] {
@@ -86,13 +88,20 @@ impl<T: Lane> Rows<T> {
             }
             let (path, rows) = self.of(contacts, slot);
             path.push(active, rows, &p[slot], &mut motion);
+            self.push_loops(slot, &p[slot], &mut of_loops);
         }
         for _ in 0..n {
             for &slot in contacts.used() {
                 let (path, rows) = self.of(contacts, slot);
                 let mut u = q[slot];
                 add_scaled(&mut u, &p[slot], self.softness[slot]);
-                let u = path.add_local(rows, &motion, u);
+                u[0] += self.normal[slot] * p[slot][0];
+                let mut u = path.add_local(rows, &motion, u);
+                if let Some(loops) = &self.loops {
+                    for (row, z) in of_loops.iter().enumerate() {
+                        add_scaled(&mut u, loops.product(row, slot), -*z);
+                    }
+                }
                 let new = solve(&self.diagonal[slot], mu[slot], &p[slot], &u);
                 let active = contacts.slot(slot).active;
                 let mut change = [zero; 3];
@@ -101,9 +110,21 @@ impl<T: Lane> Rows<T> {
                     p[slot][k] += change[k];
                 }
                 path.push(active, rows, &change, &mut motion);
+                self.push_loops(slot, &change, &mut of_loops);
             }
         }
         self.swept = motion;
+        self.swept_loops = of_loops;
+    }
+
+    /// `z += B p` of a slot's impulse, which is zero in lanes without a contact there.
+    #[inline(always)]
+    fn push_loops(&self, slot: usize, p: &Triple<T>, z: &mut [T]) {
+        if let Some(loops) = &self.loops {
+            for (row, z) in z.iter_mut().enumerate() {
+                *z += along(loops.product(row, slot), p);
+            }
+        }
     }
 }
 

@@ -13,42 +13,50 @@
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 8.
 
-#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
-
-use super::mechanism::Mechanism;
-use super::model::closed_loop::{BodyPose, Closure};
+use super::kinematics::Kinematics;
+use super::mechanism::{BASE, Mechanism};
+use super::model::closed_loop::{BodyPose, Closure, widths};
 use super::model::{Loop, LoopGap, Model};
 use super::poses::Poses;
 use crate::scalar::{Lane, Vec3};
 
-/// Pose of a body.
-#[inline(always)]
-fn pose<T: Lane>(mechanism: &Mechanism, poses: &Poses<T>, b: usize) -> BodyPose<T> {
-    BodyPose {
-        R: poses.bodies[b].R,
-        r: poses.bodies[b].r,
-        origin: poses.origin_of(mechanism.tree_of_body(b)),
+/// Poses of a mechanism, and the coordinates of its joints there.
+#[derive(Clone, Copy)]
+pub(crate) struct Placed<'a, T: Lane> {
+    pub mechanism: &'a Mechanism,
+    pub poses: &'a Poses<T>,
+    pub joints: &'a [T],
+}
+
+impl<T: Lane> Placed<'_, T> {
+    /// Pose of a body.
+    #[inline(always)]
+    fn pose(&self, b: usize) -> BodyPose<T> {
+        let own = &self.poses.bodies[b];
+        BodyPose {
+            R: own.R,
+            r: own.r,
+            origin: self.poses.origin_of(self.mechanism.tree_of_body(b)),
+        }
     }
 }
 
 impl Loop {
     /// Writes the rows of A (n_rows, nv), row-major.
     #[inline(always)]
-    pub fn write_rows<T: Lane>(
-        &self,
-        mechanism: &Mechanism,
-        poses: &Poses<T>,
-        joints: &[T],
-        rows: &mut [T],
-    ) {
+    fn write_rows<T: Lane>(&self, placed: &Placed<'_, T>, rows: &mut [T]) {
         let zero = rows[0].like(0.0);
         rows.fill(zero);
         match &self.closure {
             Closure::Bodies(ends) => {
                 for (end, sign) in ends.iter().zip([1.0, -1.0]) {
                     if let Some(body) = end.body {
-                        let x = end.place(&pose(mechanism, poses, body));
-                        add_rows(mechanism, poses, (body, x), zero.like(sign), rows);
+                        let [x, _] = end.place(
+                            zero.token(),
+                            #[inline(always)]
+                            |b| placed.pose(b),
+                        );
+                        add_rows(placed, (body, x), zero.like(sign), rows);
                     }
                 }
             }
@@ -59,9 +67,11 @@ impl Loop {
             } => {
                 rows[own.velocity] += zero.like(own.ratio);
                 if let Some(other) = other {
-                    let x = other.value(joints);
-                    let terms = polynomial.iter().enumerate().skip(1).rev();
-                    let slope = terms.fold(zero, |p, (k, c)| p * x + zero.like(k as f64 * c));
+                    let x = other.value(placed.joints);
+                    let mut slope = zero;
+                    for (k, c) in polynomial.iter().enumerate().skip(1).rev() {
+                        slope = slope * x + x.like(k as f64 * c);
+                    }
                     rows[other.velocity] -= slope * zero.like(other.ratio);
                 }
             }
@@ -72,41 +82,78 @@ impl Loop {
 /// Adds `sign` times the velocity of a body's material point at `x`, and of a weld the body's
 /// angular velocity, per unit of each velocity.
 #[inline(always)]
-fn add_rows<T: Lane>(
-    mechanism: &Mechanism,
-    poses: &Poses<T>,
-    (body, x): (usize, Vec3<T>),
-    sign: T,
-    rows: &mut [T],
-) {
-    let zero = sign.like(0.0);
+fn add_rows<T: Lane>(placed: &Placed<'_, T>, (body, x): (usize, Vec3<T>), sign: T, rows: &mut [T]) {
+    let Placed {
+        mechanism, poses, ..
+    } = *placed;
+    let token = sign.token();
     for (i, row) in rows.chunks_exact_mut(mechanism.nv()).enumerate() {
-        let mut unit = [0.0; 3];
-        unit[i % 3] = 1.0;
-        let direction = Vec3::splat(zero.token(), unit);
-        let is_turn = i >= 3;
+        let (axis, is_turn) = (i % 3, i >= 3);
+        let mut direction = [0.0; 3];
+        direction[axis] = 1.0;
+        let direction = Vec3::splat(token, direction);
         let moment = x.cross(direction);
         if let Some(first) = mechanism.base_of(body) {
-            let numbers = |v: Vec3<T>| [v.x, v.y, v.z];
-            let (moves, turns) = if is_turn {
-                ([zero; 3], numbers(direction))
+            let base = &mut row[first..first + BASE];
+            if is_turn {
+                base[3 + axis] += sign;
             } else {
-                (numbers(direction), numbers(moment))
-            };
-            for (own, x) in row[first..].iter_mut().zip(moves.into_iter().chain(turns)) {
-                *own += sign * x;
+                base[axis] += sign;
+                base[3] += sign * moment.x;
+                base[4] += sign * moment.y;
+                base[5] += sign * moment.z;
             }
         }
         for mover in mechanism.movers(body) {
             let motion = &poses.motions[mover.motion];
-            row[mover.velocity] += sign
-                * if is_turn {
-                    motion.axis.dot(direction)
-                } else {
-                    motion.power(direction, moment)
-                };
+            let rate = if is_turn {
+                motion.axis.dot(direction)
+            } else {
+                motion.power(direction, moment)
+            };
+            row[mover.velocity] += sign * rate;
         }
     }
+}
+
+/// Writes the gaps of loops, and the rows of A (n_loop_rows, nv) if there is room for them.
+#[inline(always)]
+pub(crate) fn write_loops<T: Lane>(
+    loops: &[Loop],
+    placed: &Placed<'_, T>,
+    gaps: &mut [T],
+    rows: &mut [T],
+) {
+    let (mut first, nv) = (0, placed.mechanism.nv());
+    for closure in loops {
+        let end = first + closure.n_rows();
+        closure.write_gaps(
+            #[inline(always)]
+            |b| placed.pose(b),
+            placed.joints,
+            &mut gaps[first..end],
+        );
+        if !rows.is_empty() {
+            closure.write_rows(placed, &mut rows[first * nv..end * nv]);
+        }
+        first = end;
+    }
+}
+
+/// The widest of the gaps of loops, m or rad; not a number if one is none.
+#[inline(always)]
+pub(crate) fn widest<T: Lane>(loops: &[Loop], gaps: &[T]) -> T {
+    let zero = gaps[0].like(0.0);
+    let (mut first, mut widest) = (0, zero);
+    for closure in loops {
+        let end = first + closure.n_rows();
+        for width in widths(&gaps[first..end]) {
+            let stays = width.le(widest) | !widest.le(widest);
+            widest = T::select(stays, widest, width);
+        }
+        first = end;
+    }
+    widest
 }
 
 impl Model {
@@ -116,26 +163,20 @@ impl Model {
         self.loops().iter().map(Loop::n_rows).sum()
     }
 
-    /// Writes the gaps of all loops, and the rows of A (n_loop_rows, nv) if there is room for them.
-    #[inline(always)]
-    pub fn write_loops<T: Lane>(
+    /// The gaps of all loops, and the rows of A (n_loop_rows, nv) if there is room for them.
+    pub fn write_loops(
         &self,
-        poses: &Poses<T>,
-        joints: &[T],
-        gaps: &mut [T],
-        rows: &mut [T],
+        kinematics: &Kinematics,
+        joints: &[f64],
+        gaps: &mut [f64],
+        rows: &mut [f64],
     ) {
-        let (mechanism, nv) = (self.mechanism(), self.nv());
-        let mut first = 0;
-        for closure in self.loops() {
-            let end = first + closure.n_rows();
-            let own = &mut gaps[first..end];
-            closure.write_gaps(|b| pose(mechanism, poses, b), joints, own);
-            if !rows.is_empty() {
-                closure.write_rows(mechanism, poses, joints, &mut rows[first * nv..end * nv]);
-            }
-            first = end;
-        }
+        let placed = Placed {
+            mechanism: self.mechanism(),
+            poses: kinematics.poses(),
+            joints,
+        };
+        write_loops(self.loops(), &placed, gaps, rows);
     }
 
     /// The loop that is open farthest with these gaps; none of a tree.

@@ -81,7 +81,7 @@ pub use mass_matrix::MassMatrix;
 pub use mechanism::Mechanism;
 pub(crate) use model::fingerprint;
 pub use model::{
-    BASE, Body, BodyPose, Changes, Collider, ColliderForm, CollisionBox, CollisionSphere, Frame,
+    BASE, Body, Changes, Collider, ColliderForm, CollisionBox, CollisionSphere, Frame,
     JointProperties, Loop, LoopGap, MachineSpan, Model, Passive, Tree, Wheel,
 };
 pub use momentum::Momentum;

@@ -66,6 +66,7 @@ impl RoverScene {
             warm_start: step.warm_start,
             drive_work: &mut step.parts.drive_work,
             wheel_torque: &mut step.memory.wheel_torque,
+            loop_impulses: step.parts.tree.loop_impulses_mut(),
             sand: step.memory.sand.as_mut(),
         };
         block.load_rover(0, &mut lane_rover);
@@ -167,6 +168,7 @@ impl RoverSimulation {
             warm_start: &mut self.warm_start,
             drive_work: &mut self.parts.drive_work,
             wheel_torque: &mut self.memory.wheel_torque,
+            loop_impulses: self.parts.tree.loop_impulses_mut(),
             sand: self.memory.sand.as_mut(),
         }
     }

@@ -14,26 +14,29 @@
 //! `A(q⁺) v = 0`, both along `M̂⁻¹ Aᵀ`. The second changes v by O(h²) and takes energy of O(h⁴),
 //! which the energy audit gives back to free motion.
 //!
-//! The sources run over any scalar whose lanes hold the numbers of one machine: plain numbers, or
-//! dual ones with a direction a lane ([`super::tangent`]). What is decided, such as the rows that
-//! are left out, is decided by the first lane.
-//!
 //! Rows that follow from earlier ones, such as those across the plane of a planar linkage, are left
 //! out: their part outside the span is below `DEPENDENT` of the loop's longest row. Their
 //! reactions count as zero.
 //!
 //! Source: Gear et al. 1985, for constraints on both levels; Featherstone 2008, ch. 8, for loops
 //! closed on a tree.
+//!
+//! Written over the scalar: a rover of the general step, those of a block (`crate::lanes`), or dual
+//! numbers of one rover with a direction a lane ([`super::tangent`]). A row that some lanes leave
+//! out is zero there, so that no lane depends on its neighbours.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::contact::ContactSystem;
+use crate::contact::rows::{Triple, along};
 use crate::integrator::report::MOST_OPEN;
 use crate::multibody::error::StateError;
+use crate::multibody::loops::{Placed, widest, write_loops};
+use crate::multibody::model::Loop;
 use crate::multibody::{
     Configuration, Factor, Inertias, Kinematics, LaneConfiguration, LoopGap, MassMatrix, Mechanism,
     Model, Poses,
 };
-use crate::scalar::{Lane, Single};
+use crate::scalar::{Lane, LaneMask, Single};
 
 /// Part of a row outside the span of earlier rows, relative to the longest of its loop, below which
 /// it follows from them.
@@ -54,102 +57,89 @@ const LONGEST: f64 = 0.3;
 /// The rows of the loops at one configuration, and a basis of them in factor coordinates.
 #[derive(Clone, Debug)]
 struct Basis<T: Lane> {
-    token: T::Token,
     /// φ of all rows (m).
     gaps: Vec<T>,
     /// A (m, nv), row-major.
     rows: Vec<T>,
-    /// The rows of A that do not follow from earlier ones (r).
-    kept: Vec<usize>,
-    /// Orthonormal rows (r, nv).
+    /// Where each row does not follow from earlier ones (m).
+    kept: Vec<T::Mask>,
+    /// Orthonormal rows (m, nv), zero where a row is not kept.
     Q: Vec<T>,
-    /// Lower triangle of R in `G = R Q` of the kept rows (r (r + 1) / 2), by rows.
+    /// Lower triangle of R in `G = R Q` (m (m + 1) / 2), by rows; that of the unit matrix where a
+    /// row is not kept.
     R: Vec<T>,
 }
 
 impl<T: Lane> Basis<T> {
-    fn new(token: T::Token, model: &Model) -> Self {
-        let (m, nv) = (model.n_loop_rows(), model.nv());
-        let zero = T::splat(token, 0.0);
+    fn new(token: T::Token, mechanism: &Mechanism, loops: &[Loop]) -> Self {
+        let m = loops.iter().map(Loop::n_rows).sum::<usize>();
+        let zeros = |n: usize| vec![T::splat(token, 0.0); n];
         Self {
-            token,
-            gaps: vec![zero; m],
-            rows: vec![zero; m * nv],
-            kept: Vec::with_capacity(m),
-            Q: Vec::with_capacity(m * nv),
-            R: Vec::with_capacity(m * (m + 1) / 2),
+            gaps: zeros(m),
+            rows: zeros(m * mechanism.nv()),
+            kept: vec![T::mask(token, 0); m],
+            Q: zeros(m * mechanism.nv()),
+            R: zeros(m * (m + 1) / 2),
         }
     }
 
     /// Gaps, rows and their basis at a configuration, with the factor of M̂.
-    fn update(&mut self, model: &Model, poses: &Poses<T>, joints: &[T], factor: &Factor<T>) {
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || self.update_here(model, poses, joints, factor),
-        );
-    }
-
     #[inline(always)]
-    fn update_here(&mut self, model: &Model, poses: &Poses<T>, joints: &[T], factor: &Factor<T>) {
-        model.write_loops(poses, joints, &mut self.gaps, &mut self.rows);
-        let nv = model.nv();
-        self.kept.clear();
-        self.Q.clear();
-        self.R.clear();
+    fn update(&mut self, loops: &[Loop], placed: &Placed<'_, T>, factor: &Factor<T>) {
+        write_loops(loops, placed, &mut self.gaps, &mut self.rows);
+        let nv = placed.mechanism.nv();
+        self.Q.copy_from_slice(&self.rows);
         let mut first = 0;
-        for closure in model.loops() {
-            let rows = first..first + closure.n_rows();
-            let begin = self.Q.len();
+        for closure in loops {
+            let end = first + closure.n_rows();
             // The rows of the loop first: their length is the measure of each.
-            self.Q
-                .extend_from_slice(&self.rows[rows.start * nv..rows.end * nv]);
-            let mut longest = 0.0_f64;
-            for row in self.Q[begin..].chunks_exact_mut(nv) {
-                factor.half_solve(model.mechanism(), row);
-                longest = longest.max(norm(row).get(0));
+            let mut longest = self.Q[0].like(0.0);
+            for row in self.Q[first * nv..end * nv].chunks_exact_mut(nv) {
+                factor.half_solve(placed.mechanism, row);
+                longest = longest.max(norm(row));
             }
-            for (i, row) in rows.clone().enumerate() {
-                let from = begin + i * nv;
-                let to = self.kept.len() * nv;
-                self.Q.copy_within(from..from + nv, to);
-                if self.orthogonalise(nv, longest) {
-                    self.kept.push(row);
-                }
+            for row in first..end {
+                self.orthogonalise(row, nv, longest);
             }
-            self.Q.truncate(self.kept.len() * nv);
-            first = rows.end;
+            first = end;
         }
     }
 
-    /// Makes the next row of Q orthogonal to those before it and of unit length; false if nothing
-    /// of it is left.
+    /// Makes a row of Q orthogonal to those before it and of unit length, or zero if nothing of it
+    /// is left.
     #[inline(always)]
-    fn orthogonalise(&mut self, nv: usize, longest: f64) -> bool {
-        let r = self.kept.len();
-        let begin = self.R.len();
-        self.R.resize(begin + r + 1, T::splat(self.token, 0.0));
-        let (before, own) = self.Q.split_at_mut(r * nv);
+    fn orthogonalise(&mut self, row: usize, nv: usize, longest: T) {
+        let (zero, one) = (longest.like(0.0), longest.like(1.0));
+        let coefficients = &mut self.R[row * (row + 1) / 2..][..=row];
+        coefficients.fill(zero);
+        let (before, own) = self.Q.split_at_mut(row * nv);
         let own = &mut own[..nv];
         // Twice is enough.
         for _ in 0..2 {
-            for (q, coefficient) in before.chunks_exact(nv).zip(&mut self.R[begin..]) {
+            for (q, coefficient) in before.chunks_exact(nv).zip(&mut *coefficients) {
                 let share = dot(q, own);
                 add(own, q, -share);
                 *coefficient += share;
             }
         }
         let length = norm(own);
-        let size = length.get(0);
-        if size.is_nan() || size <= DEPENDENT * longest {
-            self.R.truncate(begin);
-            return false;
-        }
+        let kept = (longest.like(DEPENDENT) * longest).lt(length);
+        self.kept[row] = kept;
+        coefficients[row] = length;
+        let length = T::select(kept, length, one);
         for x in own {
-            *x /= length;
+            *x = T::select(kept, *x / length, zero);
         }
-        self.R[begin + r] = length;
-        true
+        for (k, coefficient) in coefficients.iter_mut().enumerate() {
+            let unit = if k == row { one } else { zero };
+            *coefficient = T::select(kept, *coefficient, unit);
+        }
+    }
+
+    /// Number of rows.
+    #[inline(always)]
+    fn m(&self) -> usize {
+        self.kept.len()
     }
 
     /// `z = R⁻¹ z`, in place.
@@ -157,11 +147,11 @@ impl<T: Lane> Basis<T> {
     fn solve(&self, z: &mut [T]) {
         let mut row = 0;
         for i in 0..z.len() {
-            if i > 0 {
-                let known = dot(&self.R[row..row + i], &z[..i]);
-                z[i] -= known;
+            let (known, own) = z.split_at_mut(i);
+            for (r, z) in self.R[row..row + i].iter().zip(known) {
+                own[0] -= *r * *z;
             }
-            z[i] /= self.R[row + i];
+            own[0] /= self.R[row + i];
             row += i + 1;
         }
     }
@@ -169,8 +159,7 @@ impl<T: Lane> Basis<T> {
     /// `z = R⁻ᵀ z`, in place.
     #[inline(always)]
     fn solve_transposed(&self, z: &mut [T]) {
-        let r = z.len();
-        for i in (0..r).rev() {
+        for i in (0..z.len()).rev() {
             let row = i * (i + 1) / 2;
             z[i] /= self.R[row + i];
             let value = z[i];
@@ -180,27 +169,38 @@ impl<T: Lane> Basis<T> {
         }
     }
 
-    /// `A v` of a kept row.
+    /// `A v` of a row, zero where it is not kept.
     #[inline(always)]
     fn rate(&self, row: usize, v: &[T]) -> T {
-        dot(&self.rows[row * v.len()..][..v.len()], v)
+        let rate = dot(&self.rows[row * v.len()..][..v.len()], v);
+        T::select(self.kept[row], rate, rate.like(0.0))
+    }
+
+    /// A row of Q.
+    #[inline(always)]
+    fn q(&self, row: usize, nv: usize) -> &[T] {
+        &self.Q[row * nv..][..nv]
     }
 
     /// `y += Qᵀ z`.
     #[inline(always)]
     fn add_transposed(&self, z: &[T], y: &mut [T]) {
-        for (q, z) in self.Q.chunks_exact(y.len()).zip(z) {
-            add(y, q, *z);
+        for (row, z) in z.iter().enumerate() {
+            let nv = y.len();
+            add(y, self.q(row, nv), *z);
         }
     }
 }
 
-/// `a · b` of at least one number each.
 #[inline(always)]
 fn dot<T: Lane>(a: &[T], b: &[T]) -> T {
-    let mut sum = a[0].like(0.0);
-    for (a, b) in a.iter().zip(b) {
-        sum += *a * *b;
+    let (Some((first, a)), Some((other, b))) = (a.split_first(), b.split_first()) else {
+        unreachable!("invariant: a machine with loops has velocities")
+    };
+    let mut sum = *first * *other;
+    let b = &b[..a.len()];
+    for k in 0..a.len() {
+        sum += a[k] * b[k];
     }
     sum
 }
@@ -213,92 +213,167 @@ fn norm<T: Lane>(a: &[T]) -> T {
 /// `y += a x`.
 #[inline(always)]
 fn add<T: Lane>(y: &mut [T], x: &[T], a: T) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += a * *x;
+    let x = &x[..y.len()];
+    for k in 0..y.len() {
+        y[k] += a * x[k];
     }
-}
-
-/// A machine whose loops are closed: its inertias, and the factor of M̂.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Closing<'a, T: Lane> {
-    pub model: &'a Model,
-    pub inertias: &'a Inertias<T>,
-    pub factor: &'a Factor<T>,
 }
 
 /// The loops of a machine in a step.
 #[derive(Clone, Debug)]
 pub(crate) struct Loops<T: Lane> {
     token: T::Token,
+    closures: Vec<Loop>,
     /// At the midpoint of the step.
     middle: Basis<T>,
     /// At its end.
     end: Basis<T>,
+    /// Poses at the end, and a configuration on the way to it.
     poses: Poses<T>,
-    q: LaneConfiguration<T>,
+    moved: LaneConfiguration<T>,
     /// Least number of Newton steps of a projection: one for a derivative, which changes with a
     /// position that is closed.
     least: usize,
-    /// `B = Q Z` of the contacts (r, 3 n_c).
-    B: Vec<T>,
-    /// Change of Q y by the last [`Self::close`] (r).
+    /// `B = Q Z` of the contacts (m, n), by the numbers that they have there.
+    B: Vec<Triple<T>>,
+    n: usize,
+    /// Change of Q y by the last [`Self::close`] (m).
     change: Vec<T>,
     /// Impulses of all rows in the last step (m), N s or N m s.
     impulses: Vec<T>,
-    /// Scratch (r), (nv) and (m).
+    /// Scratch (m) and (nv).
     z: Vec<T>,
     y: Vec<T>,
-    values: Vec<f64>,
+}
+
+/// What the end of a step is projected with.
+#[derive(Clone, Copy)]
+pub(crate) struct Projector<'a, T: Lane> {
+    pub mechanism: &'a Mechanism,
+    pub inertias: &'a Inertias<T>,
+    pub factor: &'a Factor<T>,
+    /// Lanes whose configuration and velocity are projected.
+    pub lanes: T::Mask,
 }
 
 impl<T: Lane> Loops<T> {
     /// None for a machine that has none. `least`: number of Newton steps of a projection.
-    pub(super) fn of(token: T::Token, model: &Model, least: usize) -> Option<Box<Self>> {
-        let zero = T::splat(token, 0.0);
-        (!model.loops().is_empty()).then(|| {
+    pub(crate) fn new(
+        token: T::Token,
+        mechanism: &Mechanism,
+        loops: &[Loop],
+        least: usize,
+    ) -> Option<Box<Self>> {
+        let middle = Basis::new(token, mechanism, loops);
+        let zeros = |n: usize| vec![T::splat(token, 0.0); n];
+        (!loops.is_empty()).then(|| {
             Box::new(Self {
                 token,
-                middle: Basis::new(token, model),
-                end: Basis::new(token, model),
-                poses: Poses::new(token, model.mechanism()),
-                q: LaneConfiguration::new(token, model.mechanism()),
+                closures: loops.to_vec(),
+                end: middle.clone(),
+                poses: Poses::new(token, mechanism),
+                moved: LaneConfiguration::new(token, mechanism),
                 least,
                 B: Vec::new(),
-                change: Vec::new(),
-                impulses: vec![zero; model.n_loop_rows()],
-                z: Vec::new(),
-                y: vec![zero; model.nv()],
-                values: vec![0.0; model.n_loop_rows()],
+                n: 0,
+                change: zeros(middle.m()),
+                impulses: zeros(middle.m()),
+                z: zeros(middle.m()),
+                y: zeros(mechanism.nv()),
+                middle,
             })
         })
     }
 
-    /// The basis at the midpoint, once M̂ is factored.
-    pub(super) fn begin(
-        &mut self,
-        model: &Model,
-        poses: &Poses<T>,
-        joints: &[T],
-        factor: &Factor<T>,
-    ) {
-        self.middle.update(model, poses, joints, factor);
-        self.B.clear();
+    /// The basis at the midpoint, once M̂ is factored, for `n` contacts.
+    pub(crate) fn begin(&mut self, placed: &Placed<'_, T>, factor: &Factor<T>, n: usize) {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.middle.update(&self.closures, placed, factor),
+        );
+        self.set_size(n);
     }
 
-    /// `y −= Qᵀ B p`: what the loops make of the impulses p (3 n_c).
-    pub(super) fn answer(&self, p: &[T], y: &mut [T]) {
-        if p.is_empty() {
-            return;
+    /// Makes room for the products of `n` contacts.
+    fn set_size(&mut self, n: usize) {
+        let none = [T::splat(self.token, 0.0); 3];
+        self.n = n;
+        self.B.resize(self.middle.m() * n, none);
+    }
+
+    /// Number of rows.
+    #[inline(always)]
+    pub(crate) fn m(&self) -> usize {
+        self.middle.m()
+    }
+
+    /// A row of Q (nv).
+    #[inline(always)]
+    pub(crate) fn q(&self, row: usize) -> &[T] {
+        self.middle.q(row, self.y.len())
+    }
+
+    /// The product `Q Z` of a row with a contact.
+    #[inline(always)]
+    pub(crate) fn product(&self, row: usize, contact: usize) -> &Triple<T> {
+        &self.B[row * self.n + contact]
+    }
+
+    /// The same, to be set.
+    #[inline(always)]
+    pub(crate) fn product_mut(&mut self, row: usize, contact: usize) -> &mut Triple<T> {
+        &mut self.B[row * self.n + contact]
+    }
+
+    /// `W − Bᵀ B` of two contacts, whose block of W without loops is given.
+    #[inline(always)]
+    pub(crate) fn project_block(&self, [c, d]: [usize; 2], block: &mut [T; 9]) {
+        for row in 0..self.m() {
+            let (x, y) = (self.product(row, c), self.product(row, d));
+            for i in 0..3 {
+                for j in 0..3 {
+                    block[3 * i + j] -= x[i] * y[j];
+                }
+            }
         }
-        for (q, b) in (self.middle.Q.chunks_exact(y.len())).zip(self.B.chunks_exact(p.len())) {
-            add(y, q, -dot(b, p));
+    }
+
+    /// `y −= Qᵀ B p` in the lanes of a mask: what the loops make of impulses, given by contact and
+    /// the lanes in which there is one.
+    #[inline(always)]
+    pub(crate) fn answer(
+        &self,
+        impulses: &(impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone),
+        y: &mut [T],
+    ) {
+        for row in 0..self.m() {
+            let z = self.reaction(row, impulses.clone());
+            add(y, self.q(row), -z);
         }
+    }
+
+    /// `B p` of a row.
+    #[inline(always)]
+    fn reaction(
+        &self,
+        row: usize,
+        impulses: impl Iterator<Item = (usize, T::Mask, Triple<T>)>,
+    ) -> T {
+        let zero = T::splat(self.token, 0.0);
+        let mut sum = zero;
+        for (contact, here, p) in impulses {
+            let own = along(self.product(row, contact), &p);
+            sum += T::select(here, own, zero);
+        }
+        sum
     }
 
     /// `y −= Qᵀ Q y`: what the loops leave of any change of the velocity.
     #[inline(always)]
     pub(super) fn restrict(&self, y: &mut [T]) {
-        for q in self.middle.Q.chunks_exact(y.len()) {
+        for row in 0..self.m() {
+            let q = self.q(row);
             let share = dot(q, y);
             add(y, q, -share);
         }
@@ -307,149 +382,161 @@ impl<T: Lane> Loops<T> {
     /// Changes y so that after the change of `v` by `F⁻¹ y` the mean with `v_begin` obeys the
     /// loops.
     #[inline(always)]
-    pub(super) fn close(&mut self, theta: f64, v_begin: &[T], v: &[T], y: &mut [T]) {
-        let (basis, z) = (&self.middle, &mut self.z);
-        z.clear();
-        let share = T::splat(self.token, (1.0 - theta) / theta);
-        for &row in &basis.kept {
-            z.push(-(basis.rate(row, v) + share * basis.rate(row, v_begin)));
+    pub(crate) fn close(&mut self, theta: f64, v_begin: &[T], v: &[T], y: &mut [T]) {
+        let (basis, z) = (&self.middle, &mut self.change);
+        for (row, z) in z.iter_mut().enumerate() {
+            let rate = basis.rate(row, v);
+            let share = rate.like((1.0 - theta) / theta);
+            *z = -(rate + share * basis.rate(row, v_begin));
         }
         basis.solve(z);
-        for (z, q) in z.iter_mut().zip(basis.Q.chunks_exact(y.len())) {
-            *z -= dot(q, y);
+        for (row, z) in z.iter_mut().enumerate() {
+            *z -= dot(basis.q(row, y.len()), y);
         }
         basis.add_transposed(z, y);
-        self.change.clone_from(z);
     }
 
-    /// The impulses λ of the last [`Self::close`] with the contacts' p (3 n_c), from
+    /// The impulses λ of the last [`Self::close`] with those of the contacts, from
     /// `Rᵀ λ = Δ(Q y)`.
-    fn find_impulses(&mut self, p: &[T]) {
-        let z = &mut self.z;
-        z.clone_from(&self.change);
-        if !p.is_empty() {
-            for (z, b) in z.iter_mut().zip(self.B.chunks_exact(p.len())) {
-                *z -= dot(b, p);
-            }
+    #[inline(always)]
+    pub(crate) fn find_impulses(
+        &mut self,
+        impulses: &(impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone),
+    ) {
+        for row in 0..self.m() {
+            self.impulses[row] = self.change[row] - self.reaction(row, impulses.clone());
         }
-        self.middle.solve_transposed(z);
-        self.impulses.fill(T::splat(self.token, 0.0));
-        for (&row, z) in self.middle.kept.iter().zip(&*z) {
-            self.impulses[row] = *z;
-        }
+        self.middle.solve_transposed(&mut self.impulses);
     }
 
-    /// `out += Aᵀ λ` (nv) with these impulses.
-    pub(super) fn add_generalized_impulse(&mut self, p: &[T], out: &mut [T]) {
-        self.find_impulses(p);
-        let rows = self.middle.rows.chunks_exact(out.len());
-        for (row, impulse) in rows.zip(&self.impulses) {
-            add(out, row, *impulse);
-        }
+    /// Newton's iteration on `φ(q) = 0` along `M̂⁻¹ Aᵀ`, and the basis at its end. Returns the
+    /// widest gap that is left, m or rad.
+    pub(crate) fn project_position(
+        &mut self,
+        with: &Projector<'_, T>,
+        q: &mut LaneConfiguration<T>,
+    ) -> T {
+        self.project_in(with, MOST_IN_STEP, q)
     }
 
     /// Projects a configuration from elsewhere onto the loops, and the velocity onto their rates.
     /// Returns the widest gap that is left.
     pub(super) fn project(
         &mut self,
-        machine: Closing<'_, T>,
+        with: &Projector<'_, T>,
         q: &mut LaneConfiguration<T>,
         v: &mut [T],
-    ) -> f64 {
-        self.project_within(MOST_ELSEWHERE, machine, q, v)
+    ) -> T {
+        let gap = self.project_in(with, MOST_ELSEWHERE, q);
+        self.project_velocity(with, v);
+        gap
     }
 
     /// The same at the end of a step.
     pub(super) fn project_end(
         &mut self,
-        machine: Closing<'_, T>,
+        with: &Projector<'_, T>,
         q: &mut LaneConfiguration<T>,
         v: &mut [T],
-    ) -> f64 {
-        self.project_within(MOST_IN_STEP, machine, q, v)
-    }
-
-    fn project_within(
-        &mut self,
-        most: usize,
-        machine: Closing<'_, T>,
-        q: &mut LaneConfiguration<T>,
-        v: &mut [T],
-    ) -> f64 {
-        let gap = self.project_position(most, machine, q);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || self.project_velocity(machine, v),
-        );
+    ) -> T {
+        let gap = self.project_position(with, q);
+        self.project_velocity(with, v);
         gap
     }
 
-    /// Newton's iteration on `φ(q) = 0` along `M̂⁻¹ Aᵀ`, and the basis at its end.
-    fn project_position(
+    fn project_in(
         &mut self,
+        with: &Projector<'_, T>,
         most: usize,
-        machine: Closing<'_, T>,
         q: &mut LaneConfiguration<T>,
-    ) -> f64 {
-        let mut last = f64::INFINITY;
-        let mut iteration = 0;
-        loop {
-            let (model, mechanism) = (machine.model, machine.model.mechanism());
-            self.poses.update(mechanism, machine.inertias, q);
-            (self.end).update(model, &self.poses, &q.joints, machine.factor);
-            let values = self.values.iter_mut().zip(&self.end.gaps);
-            values.for_each(|(value, gap)| *value = gap.get(0));
-            let gap = model.widest_gap(&self.values).map_or(0.0, |gap| gap.value);
-            let is_stuck = gap >= 0.5 * last && gap < MOST_OPEN;
-            let is_closed = (gap <= TIGHT || is_stuck) && iteration >= self.least;
-            if is_closed || iteration == most || gap.is_nan() {
-                return gap;
+    ) -> T {
+        let token = self.token;
+        let mut last = T::splat(token, f64::INFINITY);
+        let mut left = T::splat(token, 0.0);
+        let mut moving = with.lanes;
+        for iteration in 0..=most {
+            self.poses.update(with.mechanism, with.inertias, q);
+            let gap = T::vectorize(
+                token,
+                #[inline(always)]
+                || self.look(with, q),
+            );
+            let is_stuck = (gap.like(0.5) * last).le(gap) & gap.lt(gap.like(MOST_OPEN));
+            let is_closed = gap.le(gap.like(TIGHT)) | is_stuck;
+            let may_stop = if iteration < self.least {
+                T::mask(token, 0)
+            } else {
+                is_closed
+            };
+            let is_done = may_stop | !gap.is_finite();
+            left = T::select(moving, gap, left);
+            moving = moving & !is_done;
+            if !moving.any() || iteration == most {
+                break;
             }
             last = gap;
-            iteration += 1;
             T::vectorize(
-                self.token,
+                token,
                 #[inline(always)]
-                || {
-                    let (basis, z) = (&self.end, &mut self.z);
-                    z.clear();
-                    for &row in &basis.kept {
-                        z.push(-basis.gaps[row]);
-                    }
-                    self.move_along(machine);
-                    let sizes = self.y.iter().map(|x| x.get(0).abs());
-                    let share = (LONGEST / sizes.fold(0.0, f64::max)).min(1.0);
-                    self.q.clone_from(q);
-                    q.set_moved(mechanism, &self.q, &self.y, share);
-                    q.normalise();
-                },
+                || self.approach(with, moving, q),
             );
         }
+        left
+    }
+
+    /// The basis at a configuration, and its widest gap.
+    #[inline(always)]
+    fn look(&mut self, with: &Projector<'_, T>, q: &LaneConfiguration<T>) -> T {
+        let placed = Placed {
+            mechanism: with.mechanism,
+            poses: &self.poses,
+            joints: &q.joints,
+        };
+        self.end.update(&self.closures, &placed, with.factor);
+        widest(&self.closures, &self.end.gaps)
+    }
+
+    /// Moves a configuration along `M̂⁻¹ Aᵀ` by what closes the loops at the rates there.
+    #[inline(always)]
+    fn approach(&mut self, with: &Projector<'_, T>, moving: T::Mask, q: &mut LaneConfiguration<T>) {
+        let zero = T::splat(self.token, 0.0);
+        for (row, z) in self.z.iter_mut().enumerate() {
+            *z = T::select(self.end.kept[row], -self.end.gaps[row], zero);
+        }
+        self.move_along(with);
+        let mut farthest = zero;
+        for y in &self.y {
+            farthest = farthest.max(y.abs());
+        }
+        let share = (zero.like(LONGEST) / farthest).min(zero.like(1.0));
+        for y in &mut self.y {
+            *y *= share;
+        }
+        self.moved.set_moved(with.mechanism, q, &self.y, 1.0);
+        self.moved.normalise();
+        q.select_from(moving, &self.moved);
     }
 
     /// Removes from a velocity what would open the loops at the end of the step.
     #[inline(always)]
-    fn project_velocity(&mut self, machine: Closing<'_, T>, v: &mut [T]) {
-        let (basis, z) = (&self.end, &mut self.z);
-        z.clear();
-        for &row in &basis.kept {
-            z.push(-basis.rate(row, v));
+    pub(crate) fn project_velocity(&mut self, with: &Projector<'_, T>, v: &mut [T]) {
+        for (row, z) in self.z.iter_mut().enumerate() {
+            *z = -self.end.rate(row, v);
         }
-        self.move_along(machine);
-        add(v, &self.y, T::splat(self.token, 1.0));
+        self.move_along(with);
+        for (v, y) in v.iter_mut().zip(&self.y) {
+            *v = T::select(with.lanes, *v + *y, *v);
+        }
     }
 
     /// The change `self.y` of the velocity along `M̂⁻¹ Aᵀ` that changes the rates of the kept rows
     /// at the end by `self.z`.
     #[inline(always)]
-    fn move_along(&mut self, machine: Closing<'_, T>) {
-        let (basis, z) = (&self.end, &mut self.z);
-        basis.solve(z);
+    fn move_along(&mut self, with: &Projector<'_, T>) {
+        self.end.solve(&mut self.z);
         self.y.fill(T::splat(self.token, 0.0));
-        basis.add_transposed(z, &mut self.y);
-        let mechanism = machine.model.mechanism();
-        machine.factor.half_solve_back(mechanism, &mut self.y);
+        self.end.add_transposed(&self.z, &mut self.y);
+        with.factor.half_solve_back(with.mechanism, &mut self.y);
     }
 
     /// Impulses of all rows in the last step (m): along x, y and z in N s, about them in N m s, and
@@ -457,50 +544,100 @@ impl<T: Lane> Loops<T> {
     pub(crate) fn impulses(&self) -> &[T] {
         &self.impulses
     }
+
+    /// The same, to be set.
+    pub(super) fn impulses_mut(&mut self) -> &mut [T] {
+        &mut self.impulses
+    }
 }
 
 impl Loops<f64> {
+    /// None for a machine that has none.
+    pub(crate) fn of(model: &Model) -> Option<Box<Self>> {
+        Self::new(Single::best(), model.mechanism(), model.loops(), 0)
+    }
+
     /// Computes B, and subtracts `Bᵀ B` from W.
     pub(super) fn project_operator(&mut self, model: &Model, system: &mut ContactSystem) {
-        let size = 3 * system.n_contacts();
-        self.B.resize(self.middle.kept.len() * size, 0.0);
-        if size == 0 {
+        let n = system.n_contacts();
+        self.set_size(n);
+        if n == 0 {
             return;
         }
-        let nv = model.nv();
-        for (q, b) in (self.middle.Q.chunks_exact(nv)).zip(self.B.chunks_exact_mut(size)) {
-            system.local(model, q, b);
+        let size = 3 * n;
+        for row in 0..self.m() {
+            let b = self.B[row * n..][..n].as_flattened_mut();
+            system.local(model, self.middle.q(row, model.nv()), b);
         }
-        for b in self.B.chunks_exact(size) {
-            for (row, x) in system.W.chunks_exact_mut(size).zip(b) {
-                add(row, b, -x);
+        for b in self.B.chunks_exact(n) {
+            for (row, x) in system.W.chunks_exact_mut(size).zip(b.as_flattened()) {
+                add(row, b.as_flattened(), -x);
             }
         }
     }
 
-    /// Projects the end of a step, and keeps the impulses of a step with the contacts' p. Returns
-    /// the widest gap that is left.
+    /// `out += Aᵀ λ` (nv) with the impulses of the last [`Self::close`] and the contacts'.
+    pub(super) fn add_generalized_impulse(&mut self, p: &[f64], out: &mut [f64]) {
+        self.find_impulses(&each(p));
+        let rows = self.middle.rows.chunks_exact(out.len());
+        for (row, impulse) in rows.zip(&self.impulses) {
+            add(out, row, *impulse);
+        }
+    }
+
+    /// Projects the configuration onto the loops and the velocity onto their rates, and keeps the
+    /// impulses of a step with the contacts' p. Returns the widest gap that is left.
     pub(super) fn end(
         &mut self,
-        machine: Closing<'_, f64>,
+        model: &Model,
+        factor: &Factor<f64>,
         p: &[f64],
         q: &mut LaneConfiguration<f64>,
         v: &mut [f64],
     ) -> f64 {
-        self.find_impulses(p);
-        self.project_end(machine, q, v)
+        self.find_impulses(&each(p));
+        self.project_end(&projector(model, factor), q, v)
     }
 }
 
+/// What a single machine is projected with.
+fn projector<'a>(model: &'a Model, factor: &'a Factor<f64>) -> Projector<'a, f64> {
+    Projector {
+        mechanism: model.mechanism(),
+        inertias: model.inertias(),
+        factor,
+        lanes: true,
+    }
+}
+
+/// The impulses p (3 n_c) of a single machine, by contact.
+pub(super) fn each(p: &[f64]) -> impl Iterator<Item = (usize, bool, Triple<f64>)> + Clone {
+    let all = p.chunks_exact(3).map(|p| [p[0], p[1], p[2]]);
+    all.enumerate().map(|(contact, p)| (contact, true, p))
+}
+
 /// The factor of a machine's mass matrix M.
-fn factor_of(model: &Model, poses: &Poses<f64>) -> Option<Factor<f64>> {
+fn factor_of(model: &Model, kinematics: &Kinematics) -> Option<Factor<f64>> {
     let (token, mechanism): (_, &Mechanism) = (Single::best(), model.mechanism());
     let mut mass_matrix = MassMatrix::new(token, mechanism);
-    mass_matrix.update(mechanism, model.inertias(), poses);
+    mass_matrix.update(mechanism, model.inertias(), kinematics.poses());
     let mut factor = Factor::new(token, mechanism);
     mass_matrix
         .factorise(mechanism, &mut factor)
         .then_some(factor)
+}
+
+/// The poses of a single machine.
+pub(super) fn placed<'a>(
+    model: &'a Model,
+    kinematics: &'a Kinematics,
+    joints: &'a [f64],
+) -> Placed<'a, f64> {
+    Placed {
+        mechanism: model.mechanism(),
+        poses: kinematics.poses(),
+        joints,
+    }
 }
 
 /// The loop that is open farthest in a configuration; none of a tree.
@@ -508,7 +645,7 @@ fn factor_of(model: &Model, poses: &Poses<f64>) -> Option<Factor<f64>> {
 pub fn widest_gap(model: &Model, q: &Configuration) -> Option<LoopGap> {
     let mut gaps = vec![0.0; model.n_loop_rows()];
     let kinematics = Kinematics::of(model, q);
-    model.write_loops(kinematics.poses(), &q.joints, &mut gaps, &mut []);
+    model.write_loops(&kinematics, &q.joints, &mut gaps, &mut []);
     model.widest_gap(&gaps)
 }
 
@@ -538,21 +675,14 @@ pub fn closed(
     v: &mut [f64],
 ) -> Result<Configuration, StateError> {
     let mut q = q.clone();
-    let token = Single::best();
-    let Some(mut loops) = Loops::of(token, model, 0) else {
+    let Some(mut loops) = Loops::of(model) else {
         return Ok(q);
     };
     let kinematics = Kinematics::of(model, &q);
-    if let Some(factor) = &factor_of(model, kinematics.poses()) {
-        let inertias = model.inertias();
-        let machine = Closing {
-            model,
-            inertias,
-            factor,
-        };
-        let mut lane = LaneConfiguration::new(token, model.mechanism());
+    if let Some(factor) = factor_of(model, &kinematics) {
+        let mut lane = LaneConfiguration::new(Single::best(), model.mechanism());
         lane.set_lane(0, &q);
-        loops.project(machine, &mut lane, v);
+        loops.project(&projector(model, &factor), &mut lane, v);
         lane.to_lane(0, &mut q);
     }
     match widest_gap(model, &q) {
@@ -571,15 +701,16 @@ pub fn closed(
 #[must_use]
 pub fn redundant_rows(model: &Model, q: &Configuration) -> Vec<usize> {
     let kinematics = Kinematics::of(model, q);
-    let mut basis = Basis::new(Single::best(), model);
-    if let Some(factor) = factor_of(model, kinematics.poses()) {
-        basis.update(model, kinematics.poses(), &q.joints, &factor);
+    let mut basis = Basis::new(Single::best(), model.mechanism(), model.loops());
+    if let Some(factor) = factor_of(model, &kinematics) {
+        let placed = placed(model, &kinematics, &q.joints);
+        basis.update(model.loops(), &placed, &factor);
     }
     let mut first = 0;
     let redundant = model.loops().iter().map(|closure| {
         let rows = first..first + closure.n_rows();
         first = rows.end;
-        rows.filter(|row| !basis.kept.contains(row)).count()
+        rows.filter(|row| !basis.kept[*row]).count()
     });
     redundant.collect()
 }

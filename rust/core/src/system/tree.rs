@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::command::Command;
 use super::extent::{Turning, displacement};
-use super::loops::Closing;
+use super::loops::{each, placed};
 use super::momentum_balance::BalanceScene;
 use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use super::sand_patch::SandScene;
@@ -101,7 +101,8 @@ impl TreeSystem<'_> {
             ..
         } = &mut *self.parts;
         if let Some(loops) = loops {
-            loops.begin(self.model, kinematics.poses(), joints_middle, factor);
+            let placed = placed(self.model, kinematics, joints_middle);
+            loops.begin(&placed, factor, 0);
         }
     }
 
@@ -556,7 +557,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
         self.parts.system.add_impulses(self.model, p, y);
         if let Some(loops) = &self.parts.loops {
-            loops.answer(p, y);
+            loops.answer(&each(p), y);
         }
     }
 
@@ -584,13 +585,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         let Some(loops) = loops else {
             return 0.0;
         };
-        let machine = Closing {
-            model: self.model,
-            inertias: self.model.inertias(),
-            factor,
-        };
         lane.set_lane(0, q);
-        let gap = loops.end(machine, p, lane, v);
+        let gap = loops.end(self.model, factor, p, lane, v);
         lane.to_lane(0, q);
         gap
     }

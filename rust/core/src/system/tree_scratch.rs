@@ -82,7 +82,7 @@ impl TreeScratch {
             system: ContactSystem::with_capacity(model, n),
             friction: Vec::with_capacity(model.rubbing_joints().len()),
             sand: None,
-            loops: Loops::of(token, model, 0),
+            loops: Loops::of(model),
         }
     }
 
@@ -147,6 +147,13 @@ impl TreeScratch {
     #[must_use]
     pub fn loop_impulses(&self) -> &[f64] {
         self.loops.as_ref().map_or(&[], |loops| loops.impulses())
+    }
+
+    /// The same, to be set by a step that was taken elsewhere.
+    pub(crate) fn loop_impulses_mut(&mut self) -> &mut [f64] {
+        self.loops
+            .as_mut()
+            .map_or(&mut [], |loops| loops.impulses_mut())
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.

@@ -6,6 +6,7 @@ use super::{Block, Fallback};
 use crate::contact::Contact;
 use crate::lanes::contacts::Sight;
 use crate::lanes::forecast::Forecast;
+use crate::lanes::joint_slots::JointRow;
 use crate::lanes::problem::{ContactProblem, Triple};
 use crate::scalar::{Lane, LaneMask};
 
@@ -25,20 +26,19 @@ impl<T: Lane> Block<T> {
         };
         let fallbacks = self.contacts.detect(&mut self.ground, &sight);
         self.fall_back(Fallback::Contact, fallbacks);
-        if !self.machine.stops.is_empty() {
+        if self.machine.joints_with_slots().next().is_some() {
             let (machine, places) = (&*self.machine, (&self.middle, &self.end));
             let end = &self.poses_end;
             let too_many = self
                 .contacts
-                .detect_stops(machine, places, end, &self.v, &forecast);
+                .detect_joints(machine, places, end, &self.v, &forecast);
             self.fall_back(Fallback::Contact, too_many);
         }
         for &slot in self.contacts.used() {
-            let is_stop = self.contacts.stop(slot).is_some();
-            self.mu[slot] = if is_stop {
-                self.number(0.0)
-            } else {
-                self.friction
+            self.mu[slot] = match self.contacts.joint_row(slot) {
+                None => self.friction,
+                Some((_, JointRow::Stop(_))) => self.number(0.0),
+                Some((_, JointRow::Friction)) => self.number(1.0),
             };
         }
         if !self.options.materials.is_empty() {

@@ -101,6 +101,7 @@ impl<T: Lane> Block<T> {
             }
         }
         self.factor.half_solve(&self.machine, &mut self.y);
+        self.close_loops();
         self.factor.half_solve_back(&self.machine, &mut self.y);
         for ((mean, v), change) in self.v_mean.iter_mut().zip(&self.v).zip(&self.y) {
             *mean = *v + share * *change;
@@ -120,7 +121,27 @@ impl<T: Lane> Block<T> {
             }
         }
         self.factor.half_solve(&self.machine, &mut self.y);
+        self.close_loops();
         self.rows.local(&self.contacts, &self.y, &mut self.u);
         self.yields.shift(&self.contacts, &mut self.u);
+        self.hold_joints(-h);
+    }
+
+    /// Makes the free change of the velocity obey the loops.
+    #[inline(always)]
+    fn close_loops(&mut self) {
+        if let Some(loops) = &mut self.rows.loops {
+            loops.close(self.options.theta, &self.v, &self.v, &mut self.y);
+        }
+    }
+
+    /// Adds the most friction that a joint has in `duration` to its normal velocity, as
+    /// [`crate::contact::joint_friction`] says.
+    #[inline(always)]
+    pub(super) fn hold_joints(&mut self, duration: T) {
+        let slots = self.contacts.slots_of_friction();
+        for (slot, most) in slots.zip(&self.dry_friction) {
+            self.u[slot][0] += duration * *most * self.rows.normal[slot];
+        }
     }
 }

@@ -51,6 +51,10 @@ impl<T: Lane> Block<T> {
     fn fill(&mut self, lane: usize, rover: &LaneRover<'_>) {
         if !(self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model)) {
             self.inertias.set_lane(lane, rover.model.inertias());
+            let joints = rover.model.joints();
+            for (own, &joint) in self.dry_friction.iter_mut().zip(&self.machine.rubbing) {
+                own.set(lane, joints[joint].passive.friction);
+            }
             self.models[lane] = Some(Arc::clone(rover.model));
         }
         self.gravity.set(lane, rover.options.gravity.into());
@@ -76,6 +80,11 @@ impl<T: Lane> Block<T> {
         if self.has_persistent.get(lane) {
             let persistent = self.persistent.iter().map(|x| x.get(lane));
             rover.warm_start.persistent.extend(persistent);
+        }
+        if let Some(loops) = &self.rows.loops {
+            for (impulse, own) in rover.loop_impulses.iter_mut().zip(loops.impulses()) {
+                *impulse = own.get(lane);
+            }
         }
         let h = self.options.time_step;
         self.drives.to_lane(lane, rover.drive_work);

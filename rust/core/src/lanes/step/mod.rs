@@ -13,9 +13,10 @@
 //! A lane whose step cannot be taken falls back to the general one: its state stays as it was.
 //!
 //! `loading`: rovers come and go; `phases`: the three parts, and what they are made of:
-//! `contact_list`, `forces`, `sinking`, `impacts`, `balance`, `projection`.
+//! `contact_list`, `forces`, `sinking`, `impacts`, `balance`, `projection`, `closing`.
 
 mod balance;
+mod closing;
 mod contact_list;
 mod forces;
 mod impacts;
@@ -61,6 +62,8 @@ pub enum Fallback {
     Energy,
     /// The position projection was not solved, or moves too far.
     Projection,
+    /// A loop stays open.
+    Loop,
     /// Something is not finite.
     NotFinite,
 }
@@ -99,6 +102,8 @@ pub struct Block<T: Lane> {
     /// Friction coefficient of contacts without a law of their materials, and of each slot.
     friction: T,
     mu: Vec<T>,
+    /// Most dry friction of each joint that has it, N m or N.
+    dry_friction: Vec<T>,
     ground: Ground<T>,
     drives: Drives<T>,
     /// The sand under the wheels, once a rover stands on soft ground, and the ruts of each lane's
@@ -183,6 +188,7 @@ impl<T: Lane> Block<T> {
             inertias: Inertias::new(token, machine),
             gravity: Vec3::splat(token, [0.0; 3]),
             friction: zero,
+            dry_friction: vec![zero; machine.rubbing.len()],
             ground: Ground::new(token, machine.wheels.len(), machine.boxes.len()),
             drives: Drives::new(token, machine),
             sand: None,

@@ -6,7 +6,7 @@ use crate::integrator::{Phase, Probe, StepReport};
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::extent::Turning;
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
@@ -59,6 +59,8 @@ impl<T: Lane> Block<T> {
         self.fall_back(Fallback::MassMatrix, !is_definite);
         probe.end(Phase::Factor);
         let (machine, end) = (&*self.machine, &self.poses_end);
+        let (middle, joints) = (&self.poses_middle, &self.middle.joints);
+        self.rows.begin_loops(machine, middle, joints, &self.factor);
         self.rows
             .assemble(machine, end, &self.factor, &self.contacts, &self.v);
         if is_first {
@@ -176,12 +178,17 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.move_on(problems),
         );
+        self.close_end(self.going);
         if (self.drives.has_motors() || self.sand.is_some()) && self.revise(problems, probe) {
             return Next::Retake;
         }
         let (after, momentum) = self.energy(State::End);
         self.balance.after = after.kinetic_and_potential();
-        self.balance.momentum = momentum;
+        self.balance.momentum = if self.machine.holds_the_world {
+            Vec3::splat(token, [0.0; 3])
+        } else {
+            momentum
+        };
         let of_sand = self.work_of_sand();
         T::vectorize(
             token,
@@ -246,6 +253,8 @@ impl<T: Lane> Block<T> {
         self.rows
             .read(&self.contacts, problems, Answer::Velocities, &mut self.u);
         self.yields.unshift(&self.contacts, &self.p, &mut self.u);
+        let (h, _) = self.time_step();
+        self.hold_joints(h);
         self.rows
             .add_impulses(&self.contacts, self.occupied, &self.p, &mut self.y);
         self.factor.half_solve_back(&self.machine, &mut self.y);
@@ -337,6 +346,7 @@ impl<T: Lane> Block<T> {
         self.fall_back(Fallback::NotFinite, !is_finite);
         let going = self.going;
         let (h, _) = self.time_step();
+        self.rows.find_loop_impulses(&self.contacts, going, &self.p);
         let persists = self.is_same & self.in_touch() & !self.has_impact;
         let (contacts, end) = (&self.contacts, &self.poses_end);
         self.rows.generalized_impulse(

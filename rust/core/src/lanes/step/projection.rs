@@ -113,6 +113,7 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.displace(problems),
         );
+        self.close_end(self.is_deep & self.going);
         let lifted = self.energy(State::End).0.kinetic_and_potential();
         let is_moved = self.is_deep & self.going;
         let [kinetic, potential] = self.balance.after;

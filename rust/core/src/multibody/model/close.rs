@@ -44,7 +44,7 @@ impl Model {
                 closure,
             };
             let mut gaps = vec![0.0; made.n_rows()];
-            made.write_gaps(|b| placed(poses[b]), &joints, &mut gaps);
+            made.write_gaps(|b| poses[b].into(), &joints, &mut gaps);
             let gap = made.gap(i, &gaps);
             let has_place =
                 made.kind != LoopKind::Joint && is_placed(&self.description, &described, &solids);
@@ -72,7 +72,7 @@ impl Model {
         i: usize,
         described: &mut LoopDescription,
         solids: &HashMap<&str, usize>,
-        poses: &[Place],
+        poses: &[ZeroPose],
     ) -> Result<[End; 2], ModelError> {
         let frame = |name: &str| solids.get(name).map(|&k| &self.frames[k]);
         let (first, second) = (
@@ -149,23 +149,32 @@ fn without(described: &LoopDescription) -> &'static str {
     }
 }
 
-/// Attitude of a body and its origin in the world, m.
-type Place = (Matrix3<f64>, Vector3<f64>);
+/// Attitude and origin (world, m) of a body with all joints at zero.
+#[derive(Clone, Copy, Debug)]
+struct ZeroPose {
+    R: Matrix3<f64>,
+    r: Vector3<f64>,
+}
 
-fn placed((R, r): Place) -> BodyPose<f64> {
-    BodyPose {
-        R: R.into(),
-        r: r.into(),
-        origin: Vector3::zeros().into(),
+impl From<ZeroPose> for BodyPose<f64> {
+    fn from(pose: ZeroPose) -> Self {
+        Self {
+            R: pose.R.into(),
+            r: pose.r.into(),
+            origin: Vector3::zeros().into(),
+        }
     }
 }
 
-/// Places of all bodies with all joints at zero.
-fn zero_poses(bodies: &[Body]) -> Vec<Place> {
-    let mut poses: Vec<Place> = Vec::with_capacity(bodies.len());
+/// Poses of all bodies.
+fn zero_poses(bodies: &[Body]) -> Vec<ZeroPose> {
+    let mut poses: Vec<ZeroPose> = Vec::with_capacity(bodies.len());
     for body in bodies {
-        let nowhere = (Matrix3::identity(), Vector3::zeros());
-        let carrier = body.parent.map_or(nowhere, |parent| poses[parent]);
+        let carrier = body
+            .parent
+            .map_or((Matrix3::identity(), Vector3::zeros()), |parent| {
+                (poses[parent].R, poses[parent].r)
+            });
         let frame = body.rotation.map_or(carrier.0, |R| carrier.0 * R);
         let lock = match &body.joint {
             Joint::Coupled(Coupled { moves, coupling }) => match moves {
@@ -175,15 +184,18 @@ fn zero_poses(bodies: &[Body]) -> Vec<Place> {
             _ => Lock::AtZero,
         };
         let (displacement, R) = lock.place(&frame);
-        poses.push((R, carrier.1 + carrier.0 * body.position + displacement));
+        poses.push(ZeroPose {
+            R,
+            r: carrier.1 + carrier.0 * body.position + displacement,
+        });
     }
     poses
 }
 
 /// Attitude and origin of a solid's frame in the world; the identity for the world itself.
-fn pose(frame: Option<&Frame>, poses: &[Place]) -> Place {
+fn pose(frame: Option<&Frame>, poses: &[ZeroPose]) -> (Matrix3<f64>, Vector3<f64>) {
     frame.map_or((Matrix3::identity(), Vector3::zeros()), |frame| {
-        let (R, r) = poses[frame.body];
+        let ZeroPose { R, r } = poses[frame.body];
         (R * frame.rotation, r + R * frame.position)
     })
 }
@@ -206,13 +218,13 @@ fn end(frame: Option<&Frame>, point: &Vector3<f64>, axes: &Matrix3<f64>) -> End 
     match frame {
         None => End {
             body: None,
-            point: *point,
-            axes: *axes,
+            point: (*point).into(),
+            axes: (*axes).into(),
         },
         Some(frame) => End {
             body: Some(frame.body),
-            point: frame.position + frame.rotation * point,
-            axes: frame.rotation * axes,
+            point: (frame.position + frame.rotation * point).into(),
+            axes: (frame.rotation * axes).into(),
         },
     }
 }
@@ -240,9 +252,11 @@ mod tests {
             let description = crate::multibody::ModelDescription::named(name).unwrap();
             let model = Model::from_description(description).unwrap();
             let kinematics = Kinematics::of(&model, &Configuration::zero(&model));
-            for (b, (R, r)) in zero_poses(model.bodies()).iter().enumerate() {
+            for (b, pose) in zero_poses(model.bodies()).iter().enumerate() {
                 let place = kinematics.r(b) + kinematics.origin(b);
-                assert!((r - place).norm() < 1e-14 && (R - kinematics.R(b)).norm() < 1e-14);
+                assert!(
+                    (pose.r - place).norm() < 1e-14 && (pose.R - kinematics.R(b)).norm() < 1e-14
+                );
             }
         }
     }

@@ -1,14 +1,12 @@
 //! A closed loop: what it compares, and how far it is open.
 
-use nalgebra::{Matrix3, Vector3};
-
 use crate::multibody::description::LoopKind;
 use crate::multibody::joint::{Joint, JointModel};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Attitude of a body, its origin relative to that of its tree, m, and the latter in the world, m.
 #[derive(Clone, Copy, Debug)]
-pub struct BodyPose<T> {
+pub(in crate::multibody) struct BodyPose<T> {
     /// `R_WB`.
     pub R: Mat3<T>,
     /// World axes, m.
@@ -17,20 +15,8 @@ pub struct BodyPose<T> {
     pub origin: Vec3<T>,
 }
 
-impl<T: Lane> BodyPose<T> {
-    /// That of the world's frame.
-    fn of_world(token: T::Token) -> Self {
-        let nowhere = Vec3::splat(token, [0.0; 3]);
-        Self {
-            R: Mat3::identity(token),
-            r: nowhere,
-            origin: nowhere,
-        }
-    }
-}
-
 /// A constraint of a machine.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Loop {
     /// Its name.
     pub name: String,
@@ -40,7 +26,7 @@ pub struct Loop {
 }
 
 /// What a loop compares.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(in crate::multibody) enum Closure {
     /// The common point, and of a weld the common axes, as each end carries them.
     Bodies([End; 2]),
@@ -54,18 +40,18 @@ pub(in crate::multibody) enum Closure {
 }
 
 /// One end of a loop between bodies.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(in crate::multibody) struct End {
     /// `None` for the world.
     pub body: Option<usize>,
     /// The common point in the body's frame, m.
-    pub point: Vector3<f64>,
+    pub point: [f64; 3],
     /// The common axes in the body's frame, as columns.
-    pub axes: Matrix3<f64>,
+    pub axes: [[f64; 3]; 3],
 }
 
 /// The coordinate of a joint, also of one that follows another: `ratio q + offset`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::multibody) struct JointReading {
     /// Index among the coordinates of joints, and of its velocity.
     pub joint: usize,
@@ -103,28 +89,32 @@ impl JointReading {
 
     #[inline(always)]
     pub(in crate::multibody) fn value<T: Lane>(&self, joints: &[T]) -> T {
-        let x = joints[self.joint];
-        x.like(self.ratio) * x + x.like(self.offset)
+        let q = joints[self.joint];
+        q.like(self.ratio) * q + q.like(self.offset)
     }
 }
 
 impl End {
-    /// Pose of its body.
+    /// Point (world, m) relative to the origin of its tree, and that origin.
     #[inline(always)]
-    fn pose<T: Lane>(&self, token: T::Token, pose: impl Fn(usize) -> BodyPose<T>) -> BodyPose<T> {
-        (self.body).map_or_else(|| BodyPose::of_world(token), pose)
+    pub(in crate::multibody) fn place<T: Lane>(
+        &self,
+        token: T::Token,
+        pose: impl Fn(usize) -> BodyPose<T>,
+    ) -> [Vec3<T>; 2] {
+        match self.body.map(pose) {
+            None => [self.point, [0.0; 3]].map(|x| Vec3::splat(token, x)),
+            Some(pose) => [pose.r + pose.R.times_shared(self.point), pose.origin],
+        }
     }
 
-    /// Point (world, m) relative to the origin of its tree.
+    /// The common axes in world axes, as columns.
     #[inline(always)]
-    pub(in crate::multibody) fn place<T: Lane>(&self, pose: &BodyPose<T>) -> Vec3<T> {
-        pose.r + pose.R.times_shared(self.point.into())
-    }
-
-    /// The common axes in world axes.
-    #[inline(always)]
-    fn axes<T: Lane>(&self, pose: &BodyPose<T>) -> Mat3<T> {
-        pose.R.times_columns(&self.axes.into())
+    fn axes<T: Lane>(&self, token: T::Token, pose: impl Fn(usize) -> BodyPose<T>) -> [Vec3<T>; 3] {
+        match self.body.map(pose) {
+            None => self.axes.map(|axis| Vec3::splat(token, axis)),
+            Some(pose) => pose.R.times_columns(&self.axes).columns(),
+        }
     }
 }
 
@@ -150,24 +140,26 @@ impl Loop {
 
     /// Writes φ (n_rows). `pose`: of each body; `joints`: coordinates of the joints there.
     #[inline(always)]
-    pub fn write_gaps<T: Lane>(
+    pub(in crate::multibody) fn write_gaps<T: Lane>(
         &self,
         pose: impl Fn(usize) -> BodyPose<T>,
         joints: &[T],
         out: &mut [T],
     ) {
-        let number = |x: f64| out[0].like(x);
+        let token = out[0].token();
         match &self.closure {
-            Closure::Bodies(ends) => {
-                let token = out[0].token();
-                let [a, b] = ends.each_ref().map(|end| end.pose(token, &pose));
-                let apart = ends[0].place(&a) - ends[1].place(&b) + (a.origin - b.origin);
-                out[..3].copy_from_slice(&[apart.x, apart.y, apart.z]);
+            Closure::Bodies([a, b]) => {
+                let ([x_a, o_a], [x_b, o_b]) = (a.place(token, &pose), b.place(token, &pose));
+                let gap = (x_a - x_b) + (o_a - o_b);
+                out[..3].copy_from_slice(&[gap.x, gap.y, gap.z]);
                 if let Some(turn) = out.get_mut(3..6) {
-                    let [e, f] = [ends[0].axes(&a), ends[1].axes(&b)];
-                    let sum = f.x.cross(e.x) + f.y.cross(e.y) + f.z.cross(e.z);
-                    let sum = sum * sum.x.like(0.5);
-                    turn.copy_from_slice(&[sum.x, sum.y, sum.z]);
+                    let (e, f) = (a.axes(token, &pose), b.axes(token, &pose));
+                    let mut sum = Vec3::splat(token, [0.0; 3]);
+                    for i in 0..3 {
+                        sum += f[i].cross(e[i]);
+                    }
+                    let turned = sum * gap.x.like(0.5);
+                    turn.copy_from_slice(&[turned.x, turned.y, turned.z]);
                 }
             }
             Closure::Joints {
@@ -175,10 +167,15 @@ impl Loop {
                 other,
                 polynomial,
             } => {
-                let x = other.map_or(number(0.0), |other| other.value(joints));
-                let terms = polynomial.iter().rev();
-                let followed = terms.fold(number(0.0), |p, c| p * x + x.like(*c));
-                out[0] = own.value(joints) - followed;
+                let mut sum = out[0].like(0.0);
+                let x = match other {
+                    Some(other) => other.value(joints),
+                    None => sum,
+                };
+                for c in polynomial.iter().rev() {
+                    sum = sum * x + x.like(*c);
+                }
+                out[0] = own.value(joints) - sum;
             }
         }
     }
@@ -186,9 +183,7 @@ impl Loop {
     /// How far it is open with these φ (n_rows). `index`: its place among the loops.
     #[must_use]
     pub fn gap(&self, index: usize, gaps: &[f64]) -> LoopGap {
-        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let (way, turn) = gaps.split_at(gaps.len().min(3));
-        let (way, turn) = (norm(way), norm(turn));
+        let [way, turn] = widths(gaps);
         let is_angle = match &self.closure {
             Closure::Joints { own, .. } => own.turns,
             Closure::Bodies(_) => turn > way,
@@ -199,4 +194,14 @@ impl Loop {
             unit: if is_angle { "rad" } else { "m" },
         }
     }
+}
+
+/// How far a loop is open with these φ (n_rows): m, or of a joint its own; and rad.
+#[inline(always)]
+pub(in crate::multibody) fn widths<T: Lane>(gaps: &[T]) -> [T; 2] {
+    let mut squares = [gaps[0].like(0.0); 2];
+    for (k, gap) in gaps.iter().enumerate() {
+        squares[k / 3] += *gap * *gap;
+    }
+    [squares[0].sqrt(), squares[1].sqrt()]
 }

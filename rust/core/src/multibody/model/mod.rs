@@ -19,7 +19,7 @@ mod tree;
 use nalgebra::Vector3;
 
 pub use body::Body;
-pub use closed_loop::{BodyPose, Loop, LoopGap};
+pub use closed_loop::{Loop, LoopGap};
 pub use edit::Changes;
 pub use machines::MachineSpan;
 pub use parts::{Collider, ColliderForm, CollisionBox, CollisionSphere, Frame, Wheel};

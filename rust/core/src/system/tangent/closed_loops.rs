@@ -3,8 +3,9 @@
 
 use super::held_tree::TangentScene;
 use super::scratch::{Tangent, VaryingLoops};
-use crate::scalar::Lane;
-use crate::system::loops::Closing;
+use crate::multibody::loops::Placed;
+use crate::scalar::{Dual, Lane};
+use crate::system::loops::Projector;
 
 impl<T: Lane> Tangent<T> {
     /// Closes the loops at the start of the step, where what varies would open them.
@@ -12,16 +13,17 @@ impl<T: Lane> Tangent<T> {
         let Some(VaryingLoops { loops, factor }) = &mut self.loops else {
             return;
         };
-        let (model, mechanism, inertias) = (scene.model, scene.model.mechanism(), &self.inertias);
+        let (mechanism, inertias) = (scene.model.mechanism(), &self.inertias);
         (self.poses_middle).update(mechanism, inertias, &self.start);
         (self.mass_matrix).update(mechanism, inertias, &self.poses_middle);
         self.mass_matrix.factorise(mechanism, factor);
-        let machine = Closing {
-            model,
+        let with = Projector {
+            mechanism,
             inertias,
             factor,
+            lanes: !Dual::<T>::mask(self.token, 0),
         };
-        loops.project(machine, &mut self.start, &mut self.v);
+        loops.project(&with, &mut self.start, &mut self.v);
     }
 
     /// The loops' rows at the midpoint, once M̂ is known.
@@ -29,8 +31,14 @@ impl<T: Lane> Tangent<T> {
         let Some(VaryingLoops { loops, factor }) = &mut self.loops else {
             return;
         };
-        self.mass_matrix.factorise(scene.model.mechanism(), factor);
-        loops.begin(scene.model, &self.poses_middle, &self.middle.joints, factor);
+        let mechanism = scene.model.mechanism();
+        self.mass_matrix.factorise(mechanism, factor);
+        let placed = Placed {
+            mechanism,
+            poses: &self.poses_middle,
+            joints: &self.middle.joints,
+        };
+        loops.begin(&placed, factor, 0);
     }
 
     /// `y ← M̂⁻¹ y` of a machine with loops; `closes`: to a change of `v` after which the mean
@@ -56,16 +64,17 @@ impl<T: Lane> Tangent<T> {
         let Some(VaryingLoops { loops, factor }) = &mut self.loops else {
             return;
         };
-        let machine = Closing {
-            model: scene.model,
+        let with = Projector {
+            mechanism: scene.model.mechanism(),
             inertias: &self.inertias,
             factor,
+            lanes: !Dual::<T>::mask(self.token, 0),
         };
         let q = if is_projected {
             &mut self.reached
         } else {
             &mut self.end
         };
-        loops.project_end(machine, q, &mut self.v_end);
+        loops.project_end(&with, q, &mut self.v_end);
     }
 }

@@ -116,7 +116,7 @@ impl<T: Lane> Tangent<T> {
             d_stiffness: zero,
             d_damping: zero,
             correction: Correction::None,
-            loops: Loops::of(token, model, 1).map(|loops| VaryingLoops {
+            loops: Loops::new(token, mechanism, model.loops(), 1).map(|loops| VaryingLoops {
                 loops,
                 factor: Factor::new(token, mechanism),
             }),
