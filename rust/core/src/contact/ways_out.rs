@@ -56,8 +56,9 @@ pub(crate) struct OverSurfaces<'a> {
 
 impl OverSurfaces<'_> {
     /// Whether the part overlaps a piece at one of its points (behind its plane), after a motion by
-    /// `shift`, m: that point of the part is in the ground, or the piece is in the part; of an
-    /// edge also the ground behind it. What is behind the plane may also be beyond the far side of a ridge or a rock.
+    /// `shift`, m: that point of the part is in the ground, or the piece is in the part; of an edge
+    /// also the ground behind it. What is behind the plane may also be beyond the far side of a
+    /// ridge or a rock.
     pub fn overlaps(
         &self,
         (id, piece): (u32, &Primitive),
