@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod contact_scenes;
-mod heap_scenes;
+pub mod heap_scenes;
 
 mod derivatives;
 mod heaps;

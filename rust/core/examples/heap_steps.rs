@@ -17,7 +17,7 @@ fn main() {
         given.map_or(usual, |text| text.parse().expect("a number"))
     };
     let (side, steps, seed) = (number(0, 3), number(1, 200), number(2, 1));
-    let mut simulation = heap_scenes::heap(usize::try_from(side).expect("few"), seed);
+    let mut simulation = heap_scenes::heap_of_boxes(usize::try_from(side).expect("few"), seed);
     let begin = Instant::now();
     let (mut unsolved, mut most) = (0, 0);
     for step in 0..steps {

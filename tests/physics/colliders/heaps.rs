@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use rover_core::contact::{Activation, PairSearch, detect_pairs};
 use rover_core::geometry::{Plane, Terrain};
-use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Model, ModelDescription};
-use rover_core::nalgebra::{UnitQuaternion, Vector3};
+use rover_core::nalgebra::Vector3;
 use rover_core::simulation::RoverSimulation;
 
 use super::collider_scenes::prism;
+use crate::contacts::heap_scenes::heap;
 use crate::spheres::sphere_scenes::Random;
 use crate::surfaces::surface_scenes::map;
 
@@ -25,7 +24,7 @@ fn stone(random: &mut Random) -> String {
     format!("kind = 'hull', points = [{}]", points.join(", "))
 }
 
-fn heap(n: usize, seed: u64, ground: Arc<dyn Terrain>) -> RoverSimulation {
+fn heap_of_all_shapes(n: usize, seed: u64, ground: Arc<dyn Terrain>) -> RoverSimulation {
     let mut random = Random(seed);
     let solids: Vec<String> = (0..n)
         .map(|i| {
@@ -38,37 +37,17 @@ fn heap(n: usize, seed: u64, ground: Arc<dyn Terrain>) -> RoverSimulation {
                 _ if i % 2 == 0 => "kind = 'box', size = [0.2, 0.16, 0.24]".to_owned(),
                 _ => "kind = 'sphere', radius = 0.1".to_owned(),
             };
-            format!(
-                "[[solids]]\nname = 'b{i}'\njoint = 'free'\nmass = {}\n\
-                 shapes = [{{ {shape}, collides = true }}]\n",
-                random.between(4.0, 8.0)
-            )
+            let mass = random.between(4.0, 8.0);
+            format!("mass = {mass}\nshapes = [{{ {shape}, collides = true }}]")
         })
         .collect();
-    let text = format!("name = 'heap'\n{}", solids.concat());
-    let description = ModelDescription::from_toml(&text).unwrap();
-    let model = Arc::new(Model::from_description(description).unwrap());
-    let mut q = Configuration::zero(&model);
-    for i in 0..n {
+    let places = (0..n).map(|i| {
         let grid = Vector3::new((i % 2) as f64, (i / 4) as f64, (i / 2 % 2) as f64);
         let mut x = || random.between(-1.0, 1.0);
         let position = 0.45 * grid + Vector3::new(0.02 * x(), 0.35 + 0.02 * x(), 0.02 * x());
-        let attitude = UnitQuaternion::from_scaled_axis(Vector3::new(x(), x(), x()) * 2.0);
-        if i == 0 {
-            (q.position, q.attitude) = (position, attitude);
-        } else {
-            let other = &mut q.others[i - 1];
-            (other.position, other.attitude) = (position, attitude);
-        }
-    }
-    let v = vec![0.0; model.nv()];
-    let options = StepOptions {
-        time_step: 2e-3,
-        ..StepOptions::default()
-    };
-    let mut simulation = RoverSimulation::new(model, ground, options).unwrap();
-    simulation.set_state(q, v);
-    simulation
+        [position, Vector3::new(x(), x(), x()) * 2.0]
+    });
+    heap(ground, &solids, places)
 }
 
 /// Deepest overlap of two bodies, m.
@@ -87,7 +66,7 @@ fn a_heap_of_all_shapes_falls_and_lies_without_gaining_energy() {
     let rough = map(30, 0.15, |x, z| 0.05 * ((7.0 * x).sin() + (5.0 * z).cos()));
     let grounds: [Arc<dyn Terrain>; 2] = [Arc::new(Plane::ground()), Arc::new(rough)];
     for (seed, ground) in grounds.into_iter().enumerate() {
-        let mut simulation = heap(14, 3 + seed as u64, ground);
+        let mut simulation = heap_of_all_shapes(14, 3 + seed as u64, ground);
         let mut before = simulation.energy();
         let start = before.potential;
         let (mut deepest, mut most) = (0.0_f64, 0);

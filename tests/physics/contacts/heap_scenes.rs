@@ -1,8 +1,8 @@
-//! Heaps: loose boxes that fall onto each other and onto the ground.
+//! Heaps: loose bodies that fall onto each other and onto the ground.
 
 use std::sync::Arc;
 
-use rover_core::geometry::Plane;
+use rover_core::geometry::{Plane, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
@@ -25,31 +25,23 @@ impl Numbers {
     }
 }
 
-/// `side³` boxes of about 0.2 m and 6 to 10 kg, turned anyhow, on a grid that leaves some
-/// centimetres between them; they fall with a millimetre's start on level ground.
-pub fn heap(side: usize, seed: u64) -> RoverSimulation {
-    let mut numbers = Numbers(seed);
-    let count = side * side * side;
-    let boxes: Vec<String> = (0..count)
-        .map(|i| {
-            let size = Vector3::new(0.2, 0.16, 0.24) + 0.03 * numbers.vector();
-            let mass = 8.0 + 2.0 * numbers.next();
-            format!(
-                "[[solids]]\nname = \"box{i}\"\njoint = \"free\"\nmass = {mass}\ncollides = true\n\
-                 shape = {{ kind = \"box\", size = [{}, {}, {}] }}\n",
-                size.x, size.y, size.z
-            )
-        })
+/// Free bodies at rest on a ground, with steps of 2 ms. `solids`: what the description says of each
+/// but its name and joint. `places`: position and scaled axis of rotation of each.
+pub fn heap(
+    ground: Arc<dyn Terrain>,
+    solids: &[String],
+    places: impl Iterator<Item = [Vector3<f64>; 2]>,
+) -> RoverSimulation {
+    let solids = solids.iter().enumerate();
+    let solids: Vec<String> = solids
+        .map(|(i, own)| format!("[[solids]]\nname = 'b{i}'\njoint = 'free'\n{own}\n"))
         .collect();
-    let boxes = boxes.concat();
-    let description = ModelDescription::from_toml(&format!("name = \"heap\"\n{boxes}")).unwrap();
+    let text = format!("name = 'heap'\n{}", solids.concat());
+    let description = ModelDescription::from_toml(&text).unwrap();
     let model = Arc::new(Model::from_description(description).unwrap());
     let mut q = Configuration::zero(&model);
-    for i in 0..count {
-        let (level, row, column) = (i / (side * side), i / side % side, i % side);
-        let grid = 0.3 * Vector3::new(column as f64, level as f64, row as f64);
-        let position = grid + Vector3::new(0.0, 0.2, 0.0) + 0.02 * numbers.vector();
-        let attitude = UnitQuaternion::from_scaled_axis(numbers.vector());
+    for (i, [position, turn]) in places.enumerate() {
+        let attitude = UnitQuaternion::from_scaled_axis(turn);
         if i == 0 {
             (q.position, q.attitude) = (position, attitude);
         } else {
@@ -62,8 +54,32 @@ pub fn heap(side: usize, seed: u64) -> RoverSimulation {
         time_step: 2e-3,
         ..StepOptions::default()
     };
-    let ground = Arc::new(Plane::ground());
     let mut simulation = RoverSimulation::new(model, ground, options).unwrap();
     simulation.set_state(q, v);
     simulation
+}
+
+/// `side³` boxes of about 0.2 m and 6 to 10 kg, turned anyhow, on a grid that leaves some
+/// centimetres between them; they fall with a millimetre's start on level ground.
+pub fn heap_of_boxes(side: usize, seed: u64) -> RoverSimulation {
+    let mut numbers = Numbers(seed);
+    let count = side * side * side;
+    let boxes: Vec<String> = (0..count)
+        .map(|_| {
+            let size = Vector3::new(0.2, 0.16, 0.24) + 0.03 * numbers.vector();
+            let mass = 8.0 + 2.0 * numbers.next();
+            format!(
+                "mass = {mass}\ncollides = true\n\
+                 shape = {{ kind = \"box\", size = [{}, {}, {}] }}",
+                size.x, size.y, size.z
+            )
+        })
+        .collect();
+    let places = (0..count).map(|i| {
+        let (level, row, column) = (i / (side * side), i / side % side, i % side);
+        let grid = 0.3 * Vector3::new(column as f64, level as f64, row as f64);
+        let position = grid + Vector3::new(0.0, 0.2, 0.0) + 0.02 * numbers.vector();
+        [position, numbers.vector()]
+    });
+    heap(Arc::new(Plane::ground()), &boxes, places)
 }

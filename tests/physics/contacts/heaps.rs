@@ -1,10 +1,10 @@
 //! Heaps of loose boxes, in which many contacts share few loads: every step is solved.
 
-use super::heap_scenes::heap;
+use super::heap_scenes::heap_of_boxes;
 
 /// Drops `side³` boxes; the most contacts of a step.
 fn solve_every_step(side: usize, seed: u64, steps: usize) -> usize {
-    let mut simulation = heap(side, seed);
+    let mut simulation = heap_of_boxes(side, seed);
     let mut most = 0;
     for step in 0..steps {
         let report = simulation.step(1).unwrap();

@@ -140,24 +140,31 @@ pub fn mass_matrix(model: &Model, units: &[Vec<Moving>]) -> DMatrix<f64> {
     M
 }
 
-/// Kinetic energy, potential energy (J) and momentum (kg m/s).
-pub fn energy(
-    model: &Model,
-    bodies: &[Moving],
-    v: &[f64],
-    gravity: &Vector3<f64>,
-) -> (f64, f64, Vector3<f64>) {
-    let (mut kinetic, mut potential, mut momentum) = (0.0, 0.0, Vector3::zeros());
+/// Sums over the bodies, and over the magnitudes of the terms where these may cancel.
+#[derive(Default)]
+pub struct Energy {
+    /// J.
+    pub kinetic: f64,
+    /// J.
+    pub potential: (f64, f64),
+    /// kg m/s.
+    pub momentum: (Vector3<f64>, f64),
+}
+
+pub fn energy(model: &Model, bodies: &[Moving], v: &[f64], gravity: &Vector3<f64>) -> Energy {
+    let mut sum = Energy::default();
     for (body, own) in model.bodies().iter().zip(bodies) {
         let turning = own.omega.dot(&(inertia(body, own) * own.omega));
-        kinetic += 0.5 * (body.mass * own.c_dot.norm_squared() + turning);
-        potential -= body.mass * gravity.dot(&own.c);
-        momentum += own.c_dot * body.mass;
+        sum.kinetic += 0.5 * (body.mass * own.c_dot.norm_squared() + turning);
+        sum.potential.0 -= body.mass * gravity.dot(&own.c);
+        sum.potential.1 += body.mass * gravity.norm() * own.c.norm();
+        sum.momentum.0 += own.c_dot * body.mass;
+        sum.momentum.1 += own.c_dot.norm() * body.mass;
     }
     for &(k, rotor) in model.armatures() {
-        kinetic += 0.5 * rotor * v[k] * v[k];
+        sum.kinetic += 0.5 * rotor * v[k] * v[k];
     }
-    (kinetic, potential, momentum)
+    sum
 }
 
 /// `Σ Jᵀ (ṗ − m g) + J_ωᵀ L̇` along the motion with the constant velocity v, by differences of

@@ -319,16 +319,36 @@ fn overlaps_grow_from_zero(bodies: &[(Model, Part)], least: usize) {
 }
 
 /// Wheels in a map of 0.1 m of noise in cells of 0.25 m were said to overlap it by up to 0.44 m
-/// where they had to rise by 0.03 m: the face of another ridge, far behind them, counted.
+/// where they had to rise by 0.03 m: the face of another ridge, far behind them, counted. One in
+/// 2000 was said to be free of it, since its lowest point was beyond the far side of the ridge that
+/// pierced it, or a tip was beyond its middle.
 #[test]
-fn a_wheel_that_is_lowered_into_a_spiky_map_overlaps_it_by_no_more_than_it_was_lowered() {
-    for bodies in [bodies(), colliders()] {
-        overlaps_are_as_deep_as_lowered(&bodies);
-    }
+fn a_part_that_is_lowered_into_a_spiky_map_overlaps_it_by_no_more_than_it_was_lowered() {
+    overlaps_are_as_deep_as_lowered([0, 1, 5, 7, 33]);
 }
 
-fn overlaps_are_as_deep_as_lowered(bodies: &[(Model, Part)]) {
-    let mut random = Random(23);
+/// Ignored because it takes a minute: `make test-all` runs it.
+#[test]
+#[ignore = "tests/physics/surfaces/first_touch.rs::a_part_that_is_lowered_into_a_spiky_map_overlaps_it_by_no_more_than_it_was_lowered"]
+fn parts_that_are_lowered_into_many_spiky_maps_overlap_them_by_no_more_than_they_were_lowered() {
+    overlaps_are_as_deep_as_lowered(0..60);
+}
+
+fn overlaps_are_as_deep_as_lowered(numbers: impl IntoIterator<Item = u64>) {
+    let (bodies, colliders) = (bodies(), colliders());
+    let mut wrong = Vec::new();
+    for number in numbers {
+        for bodies in [&bodies, &colliders] {
+            let tried = lower_into_a_spiky_map(bodies, 23 + 977 * number, &mut wrong);
+            assert!(tried > 900, "{tried}");
+        }
+    }
+    assert!(wrong.is_empty(), "{} {wrong:#?}", wrong.len());
+}
+
+/// Adds what overlaps more than it should, or not at all. Returns how many were tried.
+fn lower_into_a_spiky_map(bodies: &[(Model, Part)], seed: u64, wrong: &mut Vec<String>) -> usize {
+    let mut random = Random(seed);
     let mut tried = 0;
     for round in 0..40 {
         let mut numbers = Random(random.0 ^ round);
@@ -338,7 +358,7 @@ fn overlaps_are_as_deep_as_lowered(bodies: &[(Model, Part)]) {
             radius: 1.0,
             terrain: Arc::new(field),
         };
-        for body in bodies {
+        for (k, body) in bodies.iter().enumerate() {
             let mut path = Path::random(body, &mut random);
             let mut beside = || random.between(-0.6, 0.6);
             path.start = Vector3::new(beside(), 2.0, beside());
@@ -348,20 +368,75 @@ fn overlaps_are_as_deep_as_lowered(bodies: &[(Model, Part)]) {
             };
             for lowered in [0.003, 0.01, 0.03, 0.06] {
                 tried += 1;
-                let place = || format!("{round} {:?} {lowered}", path.shape(touch));
+                let mut fails = |what: &str, value: f64| {
+                    let shape = path.shape(touch);
+                    wrong.push(format!(
+                        "{seed} {round} {k} {lowered} {what} {value} {shape:?}"
+                    ));
+                };
                 let shallow = 1.001e-3 * path.part.bound(path.model);
                 let most = lowered + shallow;
                 let depth = path.depth(&*ground.terrain, touch + lowered);
-                assert!(depth <= most, "{}: {depth}", place());
+                // A polytope so deep may have no edge or vertex that the ridge pushes.
+                let is_hull = matches!(path.shape(touch), PlacedShape::Hull(_));
+                if depth > most || depth <= 0.0 && !is_hull {
+                    fails("depth", depth);
+                }
                 if let Part::Wheel(i) = path.part {
                     let poses = Kinematics::of(path.model, &path.at(touch + lowered));
                     let gap = wheel_contact(path.model, &poses, &*ground.terrain, i).gap;
-                    assert!(gap < 0.0 && gap >= -most, "{}: gap {gap}", place());
+                    if !(-most..0.0).contains(&gap) {
+                        fails("gap", gap);
+                    }
                 }
             }
         }
     }
-    assert!(tried > 900, "{tried}");
+    tried
+}
+
+/// A lying wheel counted as free of a tip that had passed its middle, and a box as free of one
+/// that came through its far side.
+#[test]
+fn a_tip_beyond_the_middle_of_a_part_pushes_it_back() {
+    let field = map(
+        14,
+        0.1,
+        |x, z| if x.abs() + z.abs() < 0.05 { 0.5 } else { 0.0 },
+    );
+    for (shape, half, axis) in [
+        (
+            "wheel\nwidth = 0.1\nrounding = 0.02",
+            0.05,
+            Vector3::x_axis(),
+        ),
+        (
+            "wheel\nwidth = 0.1\nrounding = 0.05",
+            0.05,
+            Vector3::x_axis(),
+        ),
+        (
+            "wheel\nwidth = 0.12\nrounding = 0.0",
+            0.06,
+            Vector3::x_axis(),
+        ),
+        (
+            "kind = \"box\", size = [0.6, 0.06, 0.4]",
+            0.03,
+            Vector3::y_axis(),
+        ),
+    ] {
+        let body = body(shape);
+        let mut path = Path::random(&body, &mut Random(1));
+        (path.start, path.direction) = (Vector3::new(0.01, 1.0, 0.02), -Vector3::y());
+        path.attitude = UnitQuaternion::from_axis_angle(&axis, std::f64::consts::FRAC_PI_2);
+        path.turning = 0.0;
+        let touch = path.start.y - 0.5 - half;
+        for depth in [0.5, 0.9, 1.1, 1.5].map(|share| share * half) {
+            let deepest = path.depth(&field, touch + depth);
+            assert!((deepest - depth).abs() < 1e-6, "{shape} {depth} {deepest}");
+        }
+    }
 }
 
 /// A rover that stranded on a spike or a boulder was thrown sideways: one step after its chassis

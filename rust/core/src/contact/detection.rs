@@ -305,8 +305,7 @@ pub(crate) fn visit_on_surface(
             }
         }),
         Primitive::Edge(edge) => dispatch::visit_at_edge(shape, edge, base, reach, |point| {
-            let within = || base + point.point + edge.into_wedge(&point.n, point.gap);
-            if overlaps(point) || terrain.is_inside(id, &within()) {
+            if overlaps(point) {
                 visit(point);
             }
         }),

@@ -17,8 +17,8 @@
 
 use nalgebra::Vector3;
 
-use crate::geometry::query::SurfacePoint;
-use crate::geometry::{PlacedShape, Primitive, Terrain};
+use crate::geometry::query::{SurfacePoint, convex};
+use crate::geometry::{PlacedShape, Primitive, SupportMap, Terrain};
 
 /// Most points that are compared, those of the smallest overlaps.
 const MOST: usize = 24;
@@ -56,35 +56,38 @@ pub(crate) struct OverSurfaces<'a> {
 
 impl OverSurfaces<'_> {
     /// Whether the part overlaps a piece at one of its points (behind its plane), after a motion by
-    /// `shift`, m: that point of the part is in the ground, or that of the piece is in the part.
-    /// What is behind the plane may also be beyond the far side of a ridge or a rock.
+    /// `shift`, m: that point of the part is in the ground, or the piece is in the part; of an edge
+    /// also the ground behind it. What is behind the plane may also be beyond the far side of a
+    /// ridge or a rock.
     pub fn overlaps(
         &self,
         (id, piece): (u32, &Primitive),
         point: &SurfacePoint,
         shift: &Vector3<f64>,
     ) -> bool {
-        let is_inside = |x: Vector3<f64>| self.terrain.is_inside(id, &(self.base + x + shift));
-        if is_inside(point.point) {
-            return true;
-        }
-        let tip = point.point - point.n * point.gap;
-        match piece {
-            Primitive::Edge(edge) => {
-                let start = edge.start - self.base;
-                let place = (tip - start).dot(&edge.along);
-                match self.shape {
-                    PlacedShape::Disc(disc) => {
-                        let to_plane = disc.axle.dot(&(disc.centre + shift - start));
-                        let place = to_plane / disc.axle.dot(&edge.along);
-                        let crossing = start + edge.along * place - disc.centre - shift;
-                        edge.has(place, 0.0) && crossing.norm() <= disc.radius
-                    }
-                    solid => edge.has(place, 0.0) && solid.holds(&(tip - shift)),
+        let origin = self.base + shift;
+        let is_inside = |x: &Vector3<f64>| self.terrain.is_inside(id, x);
+        let is_in_ground = || is_inside(&(origin + point.point));
+        let meets = |corners: [Vector3<f64>; 3]| {
+            let corners = Corners(corners.map(|x| x - origin));
+            convex::meet(self.shape, &corners, &point.n)
+        };
+        match (piece, self.shape) {
+            (Primitive::Face(face), _) => is_in_ground() || meets(face.corners(&origin)),
+            (Primitive::Edge(edge), _) => {
+                is_in_ground() || {
+                    let behind = edge.behind(&point.n, &(self.base + point.point));
+                    let last = if is_inside(&behind) {
+                        behind
+                    } else {
+                        edge.start
+                    };
+                    meets([edge.start, edge.end(), last])
                 }
             }
-            Primitive::Vertex(vertex) => self.shape.holds(&(vertex.place - self.base - shift)),
-            Primitive::Face(_) | Primitive::Plane(_) | Primitive::Sphere(_) => false,
+            (Primitive::Vertex(_), PlacedShape::Disc(_)) => is_in_ground(),
+            (Primitive::Vertex(vertex), solid) => solid.holds(&(vertex.place - origin)),
+            (Primitive::Plane(_) | Primitive::Sphere(_), _) => false,
         }
     }
 
@@ -103,8 +106,7 @@ impl OverSurfaces<'_> {
         let overlaps_at = |rise: f64| self.overlaps(piece, point, &(Vector3::y() * rise));
         let shallow = Self::shallow(self.shape);
         if !overlaps_at(0.0) {
-            // The place just behind a sharp crest or a tip is in the ground. A tip pierces a part
-            // no deeper than that.
+            // The place just behind a tip is in the ground. It pierces a disc no deeper than that.
             let is_tip = matches!(piece.1, Primitive::Vertex(_));
             return if is_tip { -point.gap - shallow } else { 0.0 };
         }
@@ -127,7 +129,35 @@ impl OverSurfaces<'_> {
     /// near a sharp ridge, is pierced and still pushes.
     #[inline]
     pub fn shallow(shape: &PlacedShape<'_>) -> f64 {
-        SHALLOW * crate::geometry::SupportMap::bound(shape)
+        SHALLOW * shape.bound()
+    }
+}
+
+/// A triangle as a convex body, from the origin of the part's coordinates, m.
+struct Corners([Vector3<f64>; 3]);
+
+impl SupportMap for Corners {
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let [a, b, c] = &self.0;
+        let further = |x, y| {
+            if direction.dot(y) > direction.dot(x) {
+                y
+            } else {
+                x
+            }
+        };
+        *further(further(a, b), c)
+    }
+
+    fn centre(&self) -> Vector3<f64> {
+        self.0.iter().sum::<Vector3<f64>>() / 3.0
+    }
+
+    fn bound(&self) -> f64 {
+        let centre = self.centre();
+        self.0
+            .iter()
+            .fold(0.0, |most: f64, x| most.max((x - centre).norm()))
     }
 }
 

@@ -45,22 +45,25 @@ pub fn nearest_local(
     if distance > 0.0 {
         return (point, inward / distance, distance);
     }
-    through_side(x, half_size, (half_size - x.abs()).imin())
+    let axis = (half_size - x.abs()).imin();
+    let side = if x[axis] < 0.0 { -1.0 } else { 1.0 };
+    through_side(x, half_size, axis, side)
 }
 
-/// The same of a point inside, through the nearer of the sides across an axis.
+/// The same of a point inside, through one of the sides across an axis: the positive one (1) or the
+/// other (−1).
 #[inline]
 #[must_use]
 pub fn through_side(
     x: &Vector3<f64>,
     half_size: &Vector3<f64>,
     axis: usize,
+    side: f64,
 ) -> (Vector3<f64>, Vector3<f64>, f64) {
-    let side = if x[axis] < 0.0 { -1.0 } else { 1.0 };
     let (mut point, mut n) = (*x, Vector3::zeros());
     point[axis] = side * half_size[axis];
     n[axis] = -side;
-    (point, n, x[axis].abs() - half_size[axis])
+    (point, n, side * x[axis] - half_size[axis])
 }
 
 /// The box's point over the tangent plane (normal n) at the point `touch`

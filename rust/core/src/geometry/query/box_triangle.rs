@@ -164,7 +164,8 @@ pub fn nearest_at_vertex(
     let (mut point, mut n, mut distance) = box_sphere::nearest_local(&local, &solid.half_size);
     let admits = |n: &Vector3<f64>| vertex.admits(&(solid.R * n));
     if distance < 0.0 && !admits(&n) {
-        let sides = (0..3).map(|k| box_sphere::through_side(&local, &solid.half_size, k));
+        let through = |k, side| box_sphere::through_side(&local, &solid.half_size, k, side);
+        let sides = (0..3).flat_map(|k| [through(k, 1.0), through(k, -1.0)]);
         let open = sides.filter(|(_, n, _)| admits(n));
         if let Some(side) = open.max_by(|a, b| a.2.total_cmp(&b.2)) {
             (point, n, distance) = side;

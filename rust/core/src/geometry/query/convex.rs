@@ -69,6 +69,33 @@ pub fn nearest_points(first: &impl SupportMap, second: &impl SupportMap) -> Pair
     overlapping(first, second, size)
 }
 
+/// Whether two shapes touch or overlap. `direction`, of any length: from the second to the first,
+/// where they may be separate.
+#[must_use]
+pub fn meet(first: &impl SupportMap, second: &impl SupportMap, direction: &Vector3<f64>) -> bool {
+    let near = TOUCHING * (first.bound() + second.bound());
+    let mut simplex = Simplex {
+        vertices: [Vertex::ZERO; 4],
+        n: 0,
+    };
+    let mut v = *direction;
+    for _ in 0..MAX_ITERATIONS {
+        let next = Vertex::furthest(first, second, &-v);
+        if v.dot(&next.w) > near * v.norm() {
+            return false;
+        }
+        simplex.push(next);
+        let Some((a, b)) = simplex.reduce() else {
+            return true;
+        };
+        v = a - b;
+        if v.norm() <= near {
+            return true;
+        }
+    }
+    true
+}
+
 /// Distance, as a share of the shapes' size, below which [`refined`] moves them apart, and by which
 /// it does so.
 const CLOSE: f64 = 1e-2;
@@ -585,6 +612,18 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn shapes_meet_where_they_are_not_apart(
+            kinds in (0..3_usize, 0..3_usize), x in prop::array::uniform3(-0.5..0.5),
+            turns in (prop::array::uniform3(-3.0..3.0), prop::array::uniform3(-3.0..3.0)),
+            direction in prop::array::uniform3(-1.0..1.0),
+        ) {
+            let (first, second) = (shape(kinds.0, [0.0; 3], turns.0), shape(kinds.1, x, turns.1));
+            let gap = nearest_points(&first, &second).gap;
+            prop_assume!(gap.abs() > 1e-9);
+            prop_assert_eq!(meet(&first, &second, &direction.into()), gap < 0.0, "{}", gap);
+        }
+
         #[test]
         fn no_direction_parts_them_further(
             kinds in (0..3_usize, 0..3_usize), x in prop::array::uniform3(-0.5..0.5),

@@ -16,17 +16,11 @@
 
 use nalgebra::Vector3;
 
+use super::crossing::crossing;
 use super::disc_plane::{rim_point_over, rim_points};
 use super::{NEAREST, SurfacePoint, disc_sphere};
 use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
 use crate::geometry::{Disc, Sphere};
-
-/// Most iterations for the normal at an edge. Of 3000 random edges whose faces lean by up to 0.3
-/// radians each, none needs more than 20; the mean is 5.
-const MAX_ITERATIONS: usize = 60;
-
-/// Every how many-th of them halves.
-const HALVED: usize = 8;
 
 /// Rim points over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
 #[inline]
@@ -235,35 +229,10 @@ impl Slopes {
 fn over_edge(disc: &Disc, edge: &Edge, start: &Vector3<f64>, bracket: &Bracket) -> SurfacePoint {
     let [first, second] = &bracket.ends;
     let slopes = Slopes::new(disc, edge, start, &bracket.ends);
-    let (mut a, mut fa, mut b, mut fb) = (0.0, bracket.low, 1.0, bracket.high);
-    let (mut root, mut last) = (0.0, 0.0);
-    for k in 0..MAX_ITERATIONS {
-        // By Illinois' rule an end that stays twice counts half, so that both ends move.
-        let secant = (a * fb - b * fa) / (fb - fa);
-        let tau = if k % HALVED == HALVED - 1 || !(secant > a && secant < b) {
-            0.5 * (a + b)
-        } else {
-            secant
-        };
-        let (f, length) = slopes.at(tau);
-        root = tau;
-        if f.abs() <= 2e-15 * disc.radius * length || b - a <= f64::EPSILON || !(tau > a && tau < b)
-        {
-            break;
-        }
-        if f < 0.0 {
-            if last < 0.0 {
-                fb *= 0.5;
-            }
-            (a, fa) = (tau, f);
-        } else {
-            if last > 0.0 {
-                fa *= 0.5;
-            }
-            (b, fb) = (tau, f);
-        }
-        last = f;
-    }
+    let root = crossing([bracket.low, bracket.high], |tau| {
+        let (slope, length) = slopes.at(tau);
+        (slope, 2e-15 * disc.radius * length)
+    });
     let n = (first * (1.0 - root) + second * root).normalize();
     rim_point_over(disc, &n, start, NEAREST)
 }

@@ -9,15 +9,10 @@
 
 use nalgebra::Vector3;
 
+use super::crossing::crossing;
 use super::{NEAREST, SurfacePoint, ellipsoid_plane, ellipsoid_sphere};
 use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
 use crate::geometry::{Ellipsoid, Sphere, SupportMap};
-
-/// Most iterations for the normal at an edge; the mean is 8.
-const MAX_ITERATIONS: usize = 60;
-
-/// Every how many-th of them halves.
-const HALVED: usize = 8;
 
 /// The lowest point, if it lies over the face; `base` as in [`super::dispatch`].
 #[must_use]
@@ -56,7 +51,12 @@ pub fn nearest_at_edge(solid: &Ellipsoid, edge: &Edge, base: &Vector3<f64>) -> S
     } else if high <= 0.0 {
         *second
     } else {
-        normal_between(solid, edge, &start, [low, high])
+        // Where the lean vanishes.
+        let at = |tau: f64| (first * (1.0 - tau) + second * tau).normalize();
+        let near = 2e-15 * solid.bound();
+        at(crossing([low, high], |tau| {
+            (lean(solid, edge, &start, &at(tau)), near)
+        }))
     };
     let point = solid.support(&-n);
     SurfacePoint::of_normal(NEAREST, point, &n, n.dot(&(point - start)))
@@ -65,43 +65,6 @@ pub fn nearest_at_edge(solid: &Ellipsoid, edge: &Edge, base: &Vector3<f64>) -> S
 /// Derivative of the gap along the edge's normals, with the sign reversed.
 fn lean(solid: &Ellipsoid, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) -> f64 {
     edge.lean(n, &(solid.support(&-n) - start))
-}
-
-/// The normal where the lean vanishes; `[low, high]`: at the normals of the two faces.
-fn normal_between(
-    solid: &Ellipsoid,
-    edge: &Edge,
-    start: &Vector3<f64>,
-    [low, high]: [f64; 2],
-) -> Vector3<f64> {
-    let [first, second] = &edge.normals;
-    let (mut a, mut fa, mut b, mut fb) = (0.0, low, 1.0, high);
-    let (mut n, mut last) = (*first, 0.0);
-    for k in 0..MAX_ITERATIONS {
-        // By Illinois' rule an end that stays twice counts half, so that both ends move.
-        let secant = (a * fb - b * fa) / (fb - fa);
-        let is_halved = k % HALVED == HALVED - 1 || !(secant > a && secant < b);
-        let tau = if is_halved { 0.5 * (a + b) } else { secant };
-        n = (first * (1.0 - tau) + second * tau).normalize();
-        let f = lean(solid, edge, start, &n);
-        let is_done = f.abs() <= 2e-15 * solid.bound() || b - a <= f64::EPSILON;
-        if is_done || !(tau > a && tau < b) {
-            break;
-        }
-        if f < 0.0 {
-            if last < 0.0 {
-                fb *= 0.5;
-            }
-            (a, fa) = (tau, f);
-        } else {
-            if last > 0.0 {
-                fa *= 0.5;
-            }
-            (b, fb) = (tau, f);
-        }
-        last = f;
-    }
-    n
 }
 
 /// The point nearest to a vertex, wherever it is.

@@ -28,6 +28,7 @@ pub mod box_plane;
 pub mod box_sphere;
 pub mod box_triangle;
 pub mod convex;
+mod crossing;
 pub mod disc_box;
 pub mod disc_disc;
 pub mod disc_plane;

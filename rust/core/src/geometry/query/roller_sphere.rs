@@ -27,10 +27,11 @@ const FLAT: f64 = 0.05;
 
 /// A side of the rectangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Side {
+enum Side {
     Tread,
-    /// The nearer of the two.
-    Face,
+    /// The nearer of the two faces.
+    Near,
+    Far,
 }
 
 /// A place relative to a wheel.
@@ -67,25 +68,26 @@ impl<'a> Seen<'a> {
 
     /// Depth under a side, m; negative beyond it.
     #[inline]
-    pub(super) fn depth(&self, side: Side) -> f64 {
+    fn depth(&self, side: Side) -> f64 {
         match side {
             Side::Tread => self.roller.core.radius - self.away,
-            Side::Face => self.roller.half - self.along.abs(),
+            Side::Near => self.roller.half - self.along.abs(),
+            Side::Far => self.roller.half + self.along.abs(),
         }
     }
 
     /// Whether it is in the rectangle.
     #[inline]
-    pub(super) fn is_inside(&self) -> bool {
-        self.depth(Side::Tread) > 0.0 && self.depth(Side::Face) > 0.0
+    fn is_inside(&self) -> bool {
+        self.depth(Side::Tread) > 0.0 && self.depth(Side::Near) > 0.0
     }
 
     /// The wheel's nearest point; for a place that is inside, the one on the nearer side.
     #[inline]
     pub(super) fn nearest(&self) -> SurfacePoint {
         if self.is_inside() {
-            let is_tread = self.depth(Side::Tread) <= self.depth(Side::Face);
-            return self.through(if is_tread { Side::Tread } else { Side::Face });
+            let is_tread = self.depth(Side::Tread) <= self.depth(Side::Near);
+            return self.through(if is_tread { Side::Tread } else { Side::Near });
         }
         let Roller { core, half, .. } = self.roller;
         let out = self.away.min(core.radius);
@@ -101,16 +103,40 @@ impl<'a> Seen<'a> {
         self.point([out, along], n, distance)
     }
 
-    /// The wheel's point on one of its sides, for a place that is inside.
+    /// The wheel's point for a place that is in the wheel, on the nearest side through which it may
+    /// leave along the normal; if there is none, the nearest.
+    #[cold]
+    pub(super) fn nearest_open(&self, is_open: impl Fn(&Vector3<f64>) -> bool) -> SurfacePoint {
+        // Abreast of the faces, and under the tread.
+        let (beside, under) = (self.depth(Side::Tread), self.depth(Side::Near));
+        let sides = [
+            (Side::Tread, under),
+            (Side::Near, beside),
+            (Side::Far, beside),
+        ];
+        let sides = sides.into_iter().filter(|(_, inside)| *inside > 0.0);
+        let open = sides
+            .map(|(side, _)| self.through(side))
+            .filter(|point| is_open(&point.n));
+        open.max_by(|a, b| a.gap.total_cmp(&b.gap))
+            .unwrap_or_else(|| self.nearest())
+    }
+
+    /// The wheel's point on one of its sides.
     #[inline]
-    pub(super) fn through(&self, side: Side) -> SurfacePoint {
+    fn through(&self, side: Side) -> SurfacePoint {
         let Roller { core, half, .. } = self.roller;
         let depth = self.depth(side);
         match side {
             Side::Tread => self.point([core.radius, self.along], -self.outward, -depth),
-            Side::Face => {
-                let n = core.axle * -1.0_f64.copysign(self.along);
-                self.point([self.away, half.copysign(self.along)], n, -depth)
+            Side::Near | Side::Far => {
+                let toward = if side == Side::Near {
+                    self.along
+                } else {
+                    -self.along
+                };
+                let n = core.axle * -1.0_f64.copysign(toward);
+                self.point([self.away, half.copysign(toward)], n, -depth)
             }
         }
     }

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use super::CIRCLE;
 use super::roller_plane::{rim_points, swept};
-use super::roller_sphere::{Seen, Side};
+use super::roller_sphere::Seen;
 use super::{SurfacePoint, disc_triangle, sphere_triangle};
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{Roller, Sphere};
@@ -143,13 +143,9 @@ fn on_tread(roller: &Roller, edge: &Edge, base: &Vector3<f64>) -> Option<(Surfac
 #[must_use]
 pub fn nearest_at_vertex(roller: &Roller, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
     let seen = Seen::at(roller, &(vertex.place - base - roller.core.centre));
-    if !seen.is_inside() {
-        return seen.nearest();
+    let near = seen.nearest();
+    if near.gap < 0.0 && !vertex.admits(&near.n) {
+        return seen.nearest_open(|n| vertex.admits(n));
     }
-    let (tread, face) = (seen.through(Side::Tread), seen.through(Side::Face));
-    match (vertex.admits(&tread.n), vertex.admits(&face.n)) {
-        (true, false) => tread,
-        (false, true) => face,
-        _ => seen.nearest(),
-    }
+    near
 }

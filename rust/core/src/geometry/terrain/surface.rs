@@ -79,6 +79,19 @@ impl Face {
     pub fn admits(&self, x: &Vector3<f64>) -> bool {
         self.walls.iter().all(|wall| wall.admits(x))
     }
+
+    /// Its corners, world, m; `near` (world, m): a place near them, for accuracy.
+    #[must_use]
+    pub fn corners(&self, near: &Vector3<f64>) -> [Vector3<f64>; 3] {
+        let (n, height) = (self.plane.normal(), self.plane.distance(near));
+        // n · x = −height, and a · x = p, b · x = q of the walls through two edges.
+        [[0, 1], [1, 2], [2, 0]].map(|walls| {
+            let [a, b] = walls.map(|k| &self.walls[k].normal);
+            let [p, q] = walls.map(|k| self.walls[k].offset - self.walls[k].normal.dot(near));
+            let across = a.cross(b);
+            near + (b.cross(n) * p + n.cross(a) * q - across * height) / n.dot(&across)
+        })
+    }
 }
 
 /// A convex edge.
@@ -120,20 +133,20 @@ impl Edge {
         self.lean(first, n) < 0.0 && self.lean(second, n) > 0.0
     }
 
-    /// From a point behind the edge along an admissible unit normal n, by its `gap` (m), to a place
-    /// about as deep between the two faces, m. Zero but at an edge sharper than a right angle,
-    /// where −n may lead out through the face on the far side.
-    #[inline]
+    /// Where it ends, world, m.
     #[must_use]
-    pub fn into_wedge(&self, n: &Vector3<f64>, gap: f64) -> Vector3<f64> {
-        let [first, second] = &self.normals;
-        let outside = first.dot(n).min(second.dot(n));
-        if outside >= 0.0 {
-            return Vector3::zeros();
-        }
-        let far = if first.dot(n) < 0.0 { first } else { second };
-        let bisector = (first + second).normalize();
-        (bisector * WITHIN - far * outside) * gap
+    pub fn end(&self) -> Vector3<f64> {
+        self.start + self.along * self.length
+    }
+
+    /// The place midway between its faces' planes that is as far behind the edge, along an
+    /// admissible unit normal n, as the point x; world, m.
+    #[must_use]
+    pub fn behind(&self, n: &Vector3<f64>, x: &Vector3<f64>) -> Vector3<f64> {
+        let from = x - self.start;
+        let place = from.dot(&self.along).clamp(0.0, self.length);
+        let outward = self.normals[0] + self.normals[1];
+        self.start + self.along * place + outward * (n.dot(&from) / n.dot(&outward))
     }
 
     /// Whether a place along the edge (m from its start) belongs to it, for a part that is `depth`
@@ -152,9 +165,6 @@ pub const LEAN: f64 = 0.2;
 
 /// Cosine of the angle between the normals of a sharp edge.
 const SHARP: f64 = 0.2;
-
-/// How far within a sharp edge's faces its place is, in depths.
-const WITHIN: f64 = 0.01;
 
 /// Most edges that bound a vertex.
 pub const MAX_SPOKES: usize = 12;
@@ -260,6 +270,29 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_face_knows_its_corners(
+            heights in prop::array::uniform3(-1.0..1.0),
+            others in prop::array::uniform3(prop::array::uniform2(-1.0..1.0)),
+            near in prop::array::uniform3(-5.0..5.0),
+        ) {
+            let [a, b, c] = heights;
+            let corners = [
+                Vector3::new(0.0, a, 0.0), Vector3::new(0.2, b, 1.0), Vector3::new(1.1, c, 0.1),
+            ];
+            let [p, q, r] = corners;
+            let n = (q - p).cross(&(r - p)).normalize();
+            let mut walls = [[p, q], [q, r], [r, p]].into_iter().zip(others).map(|([a, b], [x, z])| {
+                let beyond = Vector3::new(x, 1.0, z).normalize();
+                Hinge::new(&a, &b, [&n, &beyond]).walls[0]
+            });
+            let plane = Plane::through(&p, n);
+            let face = Face { plane, walls: std::array::from_fn(|_| walls.next().unwrap()) };
+            for (found, expected) in face.corners(&near.into()).iter().zip([q, r, p]) {
+                prop_assert!((found - expected).norm() < 1e-12, "{found} {expected}");
+            }
+        }
+
         #[test]
         fn one_of_two_faces_answers_at_an_edge_that_is_not_convex(
             left in -1.0..1.0, bend in 0.0..1.0, x in prop::array::uniform3(-1.0..1.0),

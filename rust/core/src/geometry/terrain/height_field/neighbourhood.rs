@@ -10,7 +10,7 @@ use fearless_simd::{f64x4, f64x8};
 use nalgebra::Vector3;
 
 use super::planes::{AT_EDGE, Heights, upright};
-use super::{Half, HeightField, PIECES, index, narrow, number};
+use super::{HeightField, PIECES, index, narrow, number};
 use crate::geometry::shape::{OrientedBox, PlacedShape};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
 use crate::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
@@ -153,16 +153,6 @@ impl HeightField {
         };
         let columns = range(0, centre.x, self.columns)?;
         Some([columns, range(1, centre.z, self.rows)?])
-    }
-
-    pub(super) fn corners(&self, i: usize, j: usize) -> [Vector3<f64>; 4] {
-        let [i, j] = [narrow(i), narrow(j)];
-        [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[u, v]| self.point([i + u, j + v]))
-    }
-
-    pub(super) fn upright_normals(&self, i: usize, j: usize) -> [Vector3<f64>; 2] {
-        let own = [narrow(i), narrow(j)];
-        [Half::Low, Half::High].map(|half| self.normal(own, half).unwrap_or_else(Vector3::y))
     }
 
     /// Visits the pieces of a corner whose kinds are among the bits of `kinds`.

@@ -156,13 +156,10 @@ impl HeightField {
         region: &Region,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        let (solid, c) = (wheel.part.solid(), &wheel.part.centre);
+        let c = &wheel.part.centre;
         let mut cells = Cells::new();
         let mut visit = |(cell, kinds): ([usize; 2], u32)| {
-            let [i, j] = cell;
-            if !solid.is_clear_of(&self.corners(i, j), || self.upright_normals(i, j)) {
-                self.visit_kinds(cell, kinds, visit);
-            }
+            self.visit_kinds(cell, kinds, visit);
             true
         };
         for j in region.rows[0]..=region.rows[1] {
