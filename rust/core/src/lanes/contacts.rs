@@ -24,7 +24,7 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
-use super::problem::{MANY, MAX_CONTACTS, MAX_DENSE};
+use super::problem::{MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
 use crate::geometry::query::sweep::DEEP;
@@ -117,7 +117,7 @@ pub struct Contacts<T: Lane> {
     pub(super) slots: Vec<Slot<T>>,
     /// Part of each slot: a wheel, or, counted on from the wheels, a spare slot or a joint.
     pub(super) part_of: Vec<usize>,
-    /// Most contacts of a rover whose problem has the whole operator.
+    /// Most contacts of a rover whose problem has the whole operator, dry joints among them.
     most_dense: usize,
     pub(super) used: Vec<usize>,
     /// How many of them are not of joints.
@@ -207,10 +207,10 @@ impl<T: Lane> Contacts<T> {
             slots: vec![slot; n_slots],
             by_lane: ByLane::new(machine, first_spare),
             part_of,
-            most_dense: match (machine.has_lines(), machine.rubbing.is_empty()) {
-                (true, _) => 0,
-                (_, true) => MANY,
-                _ => MAX_DENSE,
+            most_dense: if machine.has_lines() || machine.rubbing.len() > MAX_DRY {
+                0
+            } else {
+                MAX_DENSE + machine.rubbing.len()
             },
             used: Vec::with_capacity(n_slots),
             n_of_shapes: 0,

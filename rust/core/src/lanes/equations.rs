@@ -12,7 +12,7 @@
 //! equations, whatever the condition of `W + α I`. Rows are not exchanged; that leaves the number
 //! of steps as it is.
 
-use super::problem::{ContactProblem, MAX_BLOCKS, block};
+use super::problem::{ContactProblem, DENSE_BLOCKS, block};
 use super::system::{Loaded, solve_one};
 use crate::law::coulomb::ContactMode;
 use crate::scalar::Lane;
@@ -23,7 +23,7 @@ pub(super) type Block<T> = [T; 9];
 
 /// Block (i, j) of a symmetric `W`.
 #[inline(always)]
-fn block_of<T: Lane>(W: &[Block<T>; MAX_BLOCKS], i: usize, j: usize) -> Block<T> {
+fn block_of<T: Lane>(W: &[Block<T>; DENSE_BLOCKS], i: usize, j: usize) -> Block<T> {
     if j <= i {
         W[block(i, j)]
     } else {
@@ -34,8 +34,8 @@ fn block_of<T: Lane>(W: &[Block<T>; MAX_BLOCKS], i: usize, j: usize) -> Block<T>
 
 /// `u = W p + q`.
 #[inline(always)]
-fn velocities<T: Lane, const C: usize>(
-    W: &[Block<T>; MAX_BLOCKS],
+pub(super) fn velocities<T: Lane, const C: usize>(
+    W: &[Block<T>; DENSE_BLOCKS],
     q: &[Triple<T>; C],
     p: &[Triple<T>; C],
     u: &mut [Triple<T>; C],
@@ -107,7 +107,7 @@ fn assemble<T: Lane>(
 }
 
 /// Factors of the system, `L` with ones on its diagonal and `U` with the inverse of its own.
-type Factors<T, const C: usize> = [[Block<T>; C]; C];
+pub(super) type Factors<T, const C: usize> = [[Block<T>; C]; C];
 
 /// `x − L U`.
 #[inline(always)]
@@ -167,8 +167,8 @@ fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
 
 /// Factors the system of the modes.
 #[inline(always)]
-fn factorise<T: Lane, const C: usize>(
-    W: &[Block<T>; MAX_BLOCKS],
+pub(super) fn factorise<T: Lane, const C: usize>(
+    W: &[Block<T>; DENSE_BLOCKS],
     alpha: T,
     modes: &[Mode<T>; C],
     factors: &mut Factors<T, C>,
@@ -198,9 +198,9 @@ fn factorise<T: Lane, const C: usize>(
     }
 }
 
-/// Solves the factored system for a right-hand side `y`, in place.
+/// `y ← L⁻¹ y`.
 #[inline(always)]
-fn solve<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C]) {
+pub(super) fn forward<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C]) {
     for k in 0..C {
         let mut own = y[k];
         for m in 0..k {
@@ -211,6 +211,11 @@ fn solve<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C
         own[2] = own[2] - pivot[6] * own[0] - pivot[7] * own[1];
         y[k] = own;
     }
+}
+
+/// `y ← U⁻¹ y`.
+#[inline(always)]
+pub(super) fn backward<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C]) {
     for k in (0..C).rev() {
         let mut own = y[k];
         for m in k + 1..C {
@@ -220,6 +225,30 @@ fn solve<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C
         own[2] *= f[8];
         own[1] = (own[1] - f[5] * own[2]) * f[4];
         own[0] = (own[0] - f[1] * own[1] - f[2] * own[2]) * f[0];
+        y[k] = own;
+    }
+}
+
+/// `y ← U⁻ᵀ y`, of a row to the left of U.
+#[inline(always)]
+pub(super) fn backward_row<T: Lane, const C: usize>(
+    factors: &Factors<T, C>,
+    y: &mut [Triple<T>; C],
+) {
+    for k in 0..C {
+        let mut own = y[k];
+        for m in 0..k {
+            let (u, known) = (&factors[m][k], y[m]);
+            for c in 0..3 {
+                own[c] -= known[0] * u[c];
+                own[c] -= known[1] * u[3 + c];
+                own[c] -= known[2] * u[6 + c];
+            }
+        }
+        let f = &factors[k][k];
+        own[0] *= f[0];
+        own[1] = (own[1] - own[0] * f[1]) * f[4];
+        own[2] = (own[2] - own[0] * f[2] - own[1] * f[5]) * f[8];
         y[k] = own;
     }
 }
@@ -237,7 +266,7 @@ fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
 /// Operators with all their blocks; a contact's place is its number.
 #[derive(Clone, Debug)]
 pub(super) struct DenseSystem<T: Lane, const C: usize> {
-    W: [Block<T>; MAX_BLOCKS],
+    W: [Block<T>; DENSE_BLOCKS],
     pub(super) q: [Triple<T>; C],
     factors: Factors<T, C>,
 }
@@ -271,7 +300,8 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
         for k in 0..C {
             r[k] = modes[k].across(r[k]);
         }
-        solve(&self.factors, r);
+        forward(&self.factors, r);
+        backward(&self.factors, r);
         for k in 0..C {
             r[k] = modes[k].impulse(r[k]);
         }
@@ -296,7 +326,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
     fn new(token: T::Token) -> Self {
         let zero = T::splat(token, 0.0);
         Self {
-            W: [[zero; 9]; MAX_BLOCKS],
+            W: [[zero; 9]; DENSE_BLOCKS],
             q: [[zero; 3]; C],
             factors: [[[zero; 9]; C]; C],
         }

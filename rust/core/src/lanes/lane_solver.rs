@@ -3,6 +3,7 @@
 //! A lane takes the next problem when its own is done, so that the cost follows the mean of the
 //! steps and not the largest. No lane's bits depend on its neighbours.
 
+use super::dry_equations::{DrySystem, PLACES};
 use super::equations::DenseSystem;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE};
 use super::system::Loaded;
@@ -33,6 +34,9 @@ pub(super) trait ProblemSource {
 
 /// Lanes for problems with their whole operator.
 pub(super) type DenseSolver<T, const C: usize> = LaneSolver<T, C, DenseSystem<T, C>>;
+
+/// Lanes for those with dry joints.
+pub(super) type DrySolver<T> = LaneSolver<T, PLACES, DrySystem<T>>;
 
 /// Lanes for problems with a factored operator.
 pub(super) type FactoredSolver<T> = LaneSolver<T, MAX_CONTACTS, VelocitySystem<T, MAX_CONTACTS>>;

@@ -16,7 +16,7 @@
 //!   velocities a contact moves;
 //! - [`problem`]: a rover's friction-contact problem; [`queue`], `lane_solver`, `sweeps`: how the
 //!   problems of many are solved, by [`crate::solver`]'s pivoting; `system`, `equations`,
-//!   `velocity_equations`, `tree_matrix`: its linear systems;
+//!   `dry_equations`, `velocity_equations`, `tree_matrix`: its linear systems;
 //! - [`step`]: the step. The dynamics of the tree are those of [`crate::multibody`], its drives
 //!   those of [`crate::system`].
 //!
@@ -53,6 +53,7 @@ pub mod admission;
 mod by_lane;
 mod contact_plane;
 pub mod contacts;
+mod dry_equations;
 mod equations;
 pub mod forecast;
 mod free_slots;

@@ -9,18 +9,20 @@ pub(crate) use crate::solver::pivoting::Triple;
 /// Most contacts of a problem.
 pub const MAX_CONTACTS: usize = 32;
 
-/// Most contacts of a problem with `W` itself, if those of dry joints are among them: factors solve
-/// a tenth of such problems on rigid wheels only after many attempts, or never.
-pub const MAX_DENSE: usize = 16;
+/// Most contacts of a problem with `W` itself, and most dry joints beside them.
+pub const MAX_DENSE: usize = 8;
 
-/// The same without dry joints.
-pub const MANY: usize = 8;
+/// See above.
+pub const MAX_DRY: usize = 10;
 
 /// Most unknowns.
 pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 
-/// Blocks of the lower triangle of `W`.
-pub const MAX_BLOCKS: usize = MAX_DENSE * (MAX_DENSE + 1) / 2;
+/// Blocks of the lower triangle of `W` without dry joints, and with them.
+pub const DENSE_BLOCKS: usize = block(MAX_DENSE, 0);
+
+/// See above.
+pub const MAX_BLOCKS: usize = block(MAX_DENSE + MAX_DRY, 0);
 
 /// Index of block (i, j), `j <= i`, in [`ContactProblem::W`].
 #[inline(always)]
@@ -35,8 +37,11 @@ pub const fn block(i: usize, j: usize) -> usize {
 /// unknowns are its normal and two tangents. A problem has either `W` or its factors.
 #[derive(Debug)]
 pub struct ContactProblem {
-    /// Number of contacts, at most [`MAX_DENSE`], or [`MAX_CONTACTS`] with factors.
+    /// Number of contacts, at most [`MAX_DENSE`], or [`MAX_CONTACTS`] with factors; dry joints are
+    /// counted, too.
     pub n_contacts: usize,
+    /// Number of dry joints, which come last: at most [`MAX_DRY`], any number with factors.
+    pub n_dry: usize,
     /// Factors of the operator; without a pattern there are none.
     pub factored: Factored,
     /// Lower triangle of the symmetric Delassus operator by 3 x 3 blocks, each row-major, 1/kg:
@@ -140,6 +145,7 @@ impl Clone for ContactProblem {
     /// Copies without allocating where there is room.
     fn clone_from(&mut self, other: &Self) {
         self.n_contacts = other.n_contacts;
+        self.n_dry = other.n_dry;
         self.factored.copy_from(&other.factored);
         if !other.is_factored() {
             let used = block(other.n_contacts, 0);
@@ -158,6 +164,7 @@ impl Default for ContactProblem {
     fn default() -> Self {
         Self {
             n_contacts: 0,
+            n_dry: 0,
             factored: Factored::default(),
             W: [[0.0; 9]; MAX_BLOCKS],
             q: [0.0; MAX_UNKNOWNS],

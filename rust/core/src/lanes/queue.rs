@@ -10,8 +10,8 @@
 
 use std::collections::VecDeque;
 
-use super::lane_solver::{DenseSolver, FactoredSolver, ProblemSource};
-use super::problem::{ContactProblem, MANY, MAX_CONTACTS, MAX_DENSE};
+use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, ProblemSource};
+use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::problem::Residual;
 use crate::scalar::Lane;
 use crate::solver::SolverOptions;
@@ -33,12 +33,13 @@ impl ContactProblem {
     /// # Panics
     /// If there are more contacts than fit.
     fn begin(&mut self) {
-        let most = if self.is_factored() {
-            MAX_CONTACTS
+        let (most, most_dry) = if self.is_factored() {
+            (MAX_CONTACTS, MAX_CONTACTS)
         } else {
-            MAX_DENSE
+            (MAX_DENSE + self.n_dry, MAX_DRY)
         };
         assert!(self.n_contacts <= most, "at most {most} contacts");
+        assert!(self.n_dry <= most_dry, "at most {most_dry} dry joints");
         let n = self.n_unknowns();
         let at_rest = self.q[..n].iter().all(|x| *x == 0.0);
         self.iterations = 0;
@@ -63,8 +64,8 @@ impl ContactProblem {
 pub struct Queue<T: Lane> {
     token: T::Token,
     few: Box<DenseSolver<T, FEW>>,
-    many: Box<DenseSolver<T, MANY>>,
-    most: Box<DenseSolver<T, MAX_DENSE>>,
+    many: Box<DenseSolver<T, MAX_DENSE>>,
+    dry: Box<DrySolver<T>>,
     factored: Box<FactoredSolver<T>>,
     /// Problems that wait for a lane, by [`Kind`].
     waiting: [VecDeque<usize>; 4],
@@ -76,7 +77,7 @@ pub struct Queue<T: Lane> {
 enum Kind {
     Few,
     Many,
-    Most,
+    Dry,
     Factored,
 }
 
@@ -84,8 +85,8 @@ impl Kind {
     fn of(problem: &ContactProblem) -> Self {
         if problem.is_factored() {
             Self::Factored
-        } else if problem.n_contacts > MANY {
-            Self::Most
+        } else if problem.n_dry > 0 {
+            Self::Dry
         } else if problem.n_contacts > FEW {
             Self::Many
         } else {
@@ -148,7 +149,7 @@ impl<T: Lane> Queue<T> {
             token,
             few: Box::new(DenseSolver::new(token)),
             many: Box::new(DenseSolver::new(token)),
-            most: Box::new(DenseSolver::new(token)),
+            dry: Box::new(DrySolver::new(token)),
             factored: Box::new(FactoredSolver::new(token)),
             waiting: [const { VecDeque::new() }; 4],
             groups: Groups {
@@ -162,7 +163,7 @@ impl<T: Lane> Queue<T> {
     pub fn begin(&mut self, n: usize) {
         self.few.clear();
         self.many.clear();
-        self.most.clear();
+        self.dry.clear();
         self.factored.clear();
         self.waiting.iter_mut().for_each(VecDeque::clear);
         self.groups.left.clear();
@@ -213,10 +214,10 @@ impl<T: Lane> Queue<T> {
             let mut counts = self.waiting.each_ref().map(VecDeque::len);
             counts[0] += self.few.n_active();
             counts[1] += self.many.n_active();
-            counts[2] += self.most.n_active();
+            counts[2] += self.dry.n_active();
             counts[3] += self.factored.n_active();
             let (mut kind, mut most, mut n_others) = (Kind::Few, counts[0], 0);
-            for other in [Kind::Many, Kind::Most, Kind::Factored] {
+            for other in [Kind::Many, Kind::Dry, Kind::Factored] {
                 let count = counts[other as usize];
                 n_others = n_others.max(count.min(most));
                 if count > most {
@@ -247,7 +248,7 @@ impl<T: Lane> Queue<T> {
         let Self {
             few,
             many,
-            most,
+            dry,
             factored,
             ..
         } = self;
@@ -267,10 +268,10 @@ impl<T: Lane> Queue<T> {
                 #[inline(always)]
                 || many.run(token, problems, tolerances, &mut line),
             ),
-            Kind::Most => T::vectorize(
+            Kind::Dry => T::vectorize(
                 token,
                 #[inline(always)]
-                || most.run(token, problems, tolerances, &mut line),
+                || dry.run(token, problems, tolerances, &mut line),
             ),
             Kind::Factored => T::vectorize(
                 token,

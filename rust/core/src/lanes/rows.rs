@@ -420,6 +420,7 @@ impl<T: Lane> Rows<T> {
                 let factored = contacts.factored();
                 for (lane, problem) in problems.iter_mut().enumerate() {
                     problem.n_contacts = contacts.list(lane).n;
+                    problem.n_dry = contacts.slots_of_friction().len();
                     problem.has_start = false;
                     if factored >> lane & 1 == 1 {
                         problem.factored.adopt(&self.pattern);

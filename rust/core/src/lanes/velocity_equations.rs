@@ -399,7 +399,7 @@ pub(super) mod tests {
     use super::*;
     use crate::lanes::equations::DenseSystem;
     use crate::lanes::machine::Machine;
-    use crate::lanes::problem::{MANY, MAX_CONTACTS, block};
+    use crate::lanes::problem::{MAX_CONTACTS, MAX_DENSE, block};
     use crate::multibody::{Model, ModelDescription};
     use crate::scalar::Single;
     use crate::solver::pivoting::rests;
@@ -420,18 +420,18 @@ pub(super) mod tests {
         numbers: &mut impl Iterator<Item = f64>,
     ) -> ContactProblem {
         let mut problem = ContactProblem {
-            n_contacts: MANY,
+            n_contacts: MAX_DENSE,
             ..ContactProblem::default()
         };
         problem.factored.adopt(pattern);
-        problem.factored.slots = (1 << MANY) - 1;
+        problem.factored.slots = (1 << MAX_DENSE) - 1;
         for (z, x) in problem.factored.Z.iter_mut().flatten().zip(numbers) {
             *z = x;
         }
         let row = |Z: &[Triple<f64>], i: usize| -> Vec<Triple<f64>> {
             Z[i * pattern.stride()..][..pattern.stride()].to_vec()
         };
-        for i in 0..MANY {
+        for i in 0..MAX_DENSE {
             problem.factored.softness[i] = 0.01 * i as f64;
             for j in 0..=i {
                 let shared = pattern.shared(i, j);
@@ -456,21 +456,21 @@ pub(super) mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn systems_in_velocities_have_the_answers_of_those_in_impulses(
-            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MANY),
+            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MAX_DENSE),
         ) {
             let token = Single::best();
             let pattern = pattern();
             let problem = problem(&pattern, &mut numbers.iter().copied());
-            let mut dense = DenseSystem::<f64, MANY>::new(token);
+            let mut dense = DenseSystem::<f64, MAX_DENSE>::new(token);
             let mut own = VelocitySystem::<f64, MAX_CONTACTS>::new(token);
             dense.load(0, &problem);
-            prop_assert_eq!(own.load(0, &problem).count(), MANY);
-            let mut few = [[[0.0; 3]; MANY]; 4];
+            prop_assert_eq!(own.load(0, &problem).count(), MAX_DENSE);
+            let mut few = [[[0.0; 3]; MAX_DENSE]; 4];
             let mut many = [[[0.0; 3]; MAX_CONTACTS]; 4];
-            let mut of_few = [Mode::open(0.0); MANY];
+            let mut of_few = [Mode::open(0.0); MAX_DENSE];
             let mut of_many = [Mode::open(0.0); MAX_CONTACTS];
             let mut more = numbers.iter().rev();
-            for i in 0..MANY {
+            for i in 0..MAX_DENSE {
                 for (few, many) in few.iter_mut().zip(&mut many) {
                     for k in 0..3 {
                         few[i][k] = *more.next().unwrap();
@@ -482,7 +482,7 @@ pub(super) mod tests {
                 of_few[i] = Mode::of(0.3, modes[i] > 0, modes[i] == 1, p, &u);
                 of_many[i] = of_few[i];
             }
-            let close = |few: &[Triple<f64>; MANY], many: &[Triple<f64>; MAX_CONTACTS]| {
+            let close = |few: &[Triple<f64>; MAX_DENSE], many: &[Triple<f64>; MAX_CONTACTS]| {
                 let scale = few.iter().flatten().fold(1.0, |most: f64, x| most.max(x.abs()));
                 few.iter().flatten().zip(many.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-7 * scale)
             };
@@ -499,21 +499,21 @@ pub(super) mod tests {
             dense.solve(&of_few, &mut few[3]);
             own.solve(&of_many, &mut many[3]);
             prop_assume!(few[3].iter().flatten().all(|x| x.abs() < 1e3));
-            prop_assert!(close(&few[3], &many[3]), "{:?} {:?}", few[3], &many[3][..MANY]);
+            prop_assert!(close(&few[3], &many[3]), "{:?} {:?}", few[3], &many[3][..MAX_DENSE]);
         }
 
         #[test]
         fn the_newton_point_of_a_small_alpha_is_as_accurate_as_that_of_a_large_one(
-            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MANY),
+            numbers in prop::collection::vec(-1.0..1.0_f64, 600), modes in prop::collection::vec(0..3, MAX_DENSE),
         ) {
             let pattern = pattern();
             let problem = problem(&pattern, &mut numbers.iter().copied());
             let mut own = VelocitySystem::<f64, MAX_CONTACTS>::new(Single::best());
-            prop_assert_eq!(own.load(0, &problem).count(), MANY);
+            prop_assert_eq!(own.load(0, &problem).count(), MAX_DENSE);
             let mut centre = [[0.0; 3]; MAX_CONTACTS];
             let mut of_many = [Mode::open(0.0); MAX_CONTACTS];
             let mut more = numbers.iter().rev().copied();
-            for i in 0..MANY {
+            for i in 0..MAX_DENSE {
                 for x in own.q[i].iter_mut().chain(&mut centre[i]) {
                     *x = more.next().unwrap();
                 }
