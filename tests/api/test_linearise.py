@@ -121,7 +121,8 @@ def test_dry_friction_in_joints_is_a_contact_that_sticks_or_slips():
             solid["friction"] = 30.0
         elif solid["name"].startswith("wheel"):
             solid["friction"] = 0.2
-    model = RoverModel.from_dict(description)
+    # Wheels that yield: locked bogies leave the loads of rigid ones undetermined.
+    model = RoverModel.from_dict(description).replace(wheel_stiffness=2e4, wheel_damping=200.0)
     sim = Simulation(model)
     q, v = model.resting_pose(sim.terrain, (0.0, 0.0), 0.0), np.zeros(model.nv)
     v[0] = 0.3
@@ -132,10 +133,8 @@ def test_dry_friction_in_joints_is_a_contact_that_sticks_or_slips():
     kinds = dict(zip(linear.bodies[-8:], linear.modes[-8:], strict=True))
     assert kinds["left_bogie"] == kinds["right_bogie"] == "stick"
     assert all(kinds[f"wheel_{name}"] == "slip" for name in model.wheel_names)
-    held = dict(zip(model.dof_names, linear.holds[model.nv : 2 * model.nv], strict=True))
-    assert all(held[name] for name in ("x", "pitch", "left_bogie", "wheel_FL"))
-    assert linear.holds.mean() > 0.6
-    assert linear.errors[linear.holds].max() < 1e-4
+    assert linear.holds.all()
+    assert linear.errors.max() < 1e-6
     # A wheel whose bearing slips takes its friction from any torque; a bogie that sticks stays.
     bogie = model.nv + model.dof_names.index("left_bogie")
     np.testing.assert_allclose(linear.a[bogie], 0.0, atol=1e-12)

@@ -83,7 +83,7 @@ def test_without_the_extra_the_error_names_it(monkeypatch: pytest.MonkeyPatch, t
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("moon",), "error: CONFIG: must be a YAML file or one of anywhere, rocks"),
+        (("moon",), "error: CONFIG: must be a YAML file or one of anywhere, longer, rocks"),
         (("rocks", "--seeds", "499"), "498"),
     ],
 )

@@ -4,7 +4,7 @@
 //! the model. Lengths are in m.
 
 use std::ops::Deref;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
@@ -57,8 +57,18 @@ pub struct Machine {
     pub(super) spares: Vec<Option<usize>>,
     /// Whether its bodies can touch each other.
     pub(super) has_pairs: bool,
-    /// Pattern of its contact problems.
-    pub(super) pattern: Arc<Pattern>,
+    pattern: LazyPattern,
+}
+
+/// The pattern of a machine's contact problems, found where it is first needed. It follows from the
+/// rest of the machine.
+#[derive(Clone, Debug, Default)]
+struct LazyPattern(OnceLock<Arc<Pattern>>);
+
+impl PartialEq for LazyPattern {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl Deref for Machine {
@@ -148,10 +158,9 @@ impl Machine {
             holds_the_world: model.holds_the_world(),
             spares: Vec::new(),
             has_pairs: model.trees()[0].self_contact,
-            pattern: Arc::default(),
+            pattern: LazyPattern::default(),
         };
         machine.spares = machine.find_free_slots(machine.has_pairs);
-        machine.pattern = machine.find_pattern();
         Ok(machine)
     }
 
@@ -165,6 +174,11 @@ impl Machine {
     #[must_use]
     pub fn yields(&self) -> bool {
         self.wheels.iter().any(|wheel| wheel.compliance.is_some())
+    }
+
+    /// Pattern of its contact problems.
+    pub(super) fn pattern(&self) -> &Arc<Pattern> {
+        self.pattern.0.get_or_init(|| self.find_pattern())
     }
 
     /// Whether a model differs from this machine only in its inertias, springs, dampers, rotors and

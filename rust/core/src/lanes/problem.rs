@@ -18,11 +18,8 @@ pub const MAX_DRY: usize = 10;
 /// Most unknowns.
 pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 
-/// Blocks of the lower triangle of `W` without dry joints, and with them.
+/// Blocks of the lower triangle of `W` without dry joints.
 pub const DENSE_BLOCKS: usize = block(MAX_DENSE, 0);
-
-/// See above.
-pub const MAX_BLOCKS: usize = block(MAX_DENSE + MAX_DRY, 0);
 
 /// Index of block (i, j), `j <= i`, in [`ContactProblem::W`].
 #[inline(always)]
@@ -45,8 +42,9 @@ pub struct ContactProblem {
     /// Factors of the operator; without a pattern there are none.
     pub factored: Factored,
     /// Lower triangle of the symmetric Delassus operator by 3 x 3 blocks, each row-major, 1/kg:
-    /// block (i, j), `j <= i`, is at [`block`]. Diagonal blocks are read whole.
-    pub W: [[f64; 9]; MAX_BLOCKS],
+    /// block (i, j), `j <= i`, is at [`block`]. Diagonal blocks are read whole. At least
+    /// [`DENSE_BLOCKS`]; [`Self::make_room`] for more.
+    pub W: Vec<[f64; 9]>,
     /// Free velocity, m/s.
     pub q: [f64; MAX_UNKNOWNS],
     /// Friction coefficients.
@@ -149,6 +147,7 @@ impl Clone for ContactProblem {
         self.factored.copy_from(&other.factored);
         if !other.is_factored() {
             let used = block(other.n_contacts, 0);
+            self.make_room();
             self.W[..used].copy_from_slice(&other.W[..used]);
         }
         (self.q, self.mu) = (other.q, other.mu);
@@ -166,7 +165,7 @@ impl Default for ContactProblem {
             n_contacts: 0,
             n_dry: 0,
             factored: Factored::default(),
-            W: [[0.0; 9]; MAX_BLOCKS],
+            W: vec![[0.0; 9]; DENSE_BLOCKS],
             q: [0.0; MAX_UNKNOWNS],
             mu: [0.0; MAX_CONTACTS],
             p: [0.0; MAX_UNKNOWNS],
@@ -181,6 +180,15 @@ impl Default for ContactProblem {
 }
 
 impl ContactProblem {
+    /// Makes room for W of all contacts and dry joints.
+    #[inline(always)]
+    pub fn make_room(&mut self) {
+        let n = block(self.n_contacts.min(MAX_DENSE + MAX_DRY), 0);
+        if n > self.W.len() {
+            self.W.resize(n, [0.0; 9]);
+        }
+    }
+
     /// Whether it has the factors of its operator.
     #[inline(always)]
     #[must_use]

@@ -109,7 +109,7 @@ impl<T: Lane> Rows<T> {
             stride,
             Z: vec![[zero; 3]; n_slots * stride],
             W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
-            pattern: Arc::clone(&machine.pattern),
+            pattern: Arc::clone(machine.pattern()),
             diagonal: vec![[zero; 9]; n_slots],
             softness: vec![zero; n_slots],
             normal: vec![zero; n_slots],
@@ -421,6 +421,7 @@ impl<T: Lane> Rows<T> {
                 for (lane, problem) in problems.iter_mut().enumerate() {
                     problem.n_contacts = contacts.list(lane).n;
                     problem.n_dry = contacts.slots_of_friction().len();
+                    problem.make_room();
                     problem.has_start = false;
                     if factored >> lane & 1 == 1 {
                         problem.factored.adopt(&self.pattern);

@@ -411,7 +411,7 @@ pub(super) mod tests {
             wheel.width = Some(0.1);
         }
         let model = Model::from_description(description).unwrap();
-        Machine::of(&model).unwrap().pattern
+        Arc::clone(Machine::of(&model).unwrap().pattern())
     }
 
     /// A problem of the first slots of the rover with both forms of its operator.

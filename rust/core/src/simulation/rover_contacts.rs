@@ -102,13 +102,13 @@ impl RoverSimulation {
     pub fn body_force(&self) -> f64 {
         let is_body =
             |part: Part| matches!(part, Part::Box(_) | Part::Sphere(_) | Part::Collider(_));
-        let on_bodies = self.active.iter().map(|active| {
+        let on_bodies = self.active.iter().filter_map(|active| {
             let other = active
                 .contact
                 .other
                 .is_some_and(|other| is_body(other.part));
             let n = u8::from(is_body(active.contact.part)) + u8::from(other);
-            f64::from(n) * active.impulse[0]
+            (n > 0).then(|| f64::from(n) * active.impulse[0])
         });
         on_bodies.sum::<f64>() / self.options.time_step
     }
