@@ -52,7 +52,7 @@ pub struct Slot<T: Lane> {
     pub point: Vec3<T>,
     /// Normal, from the ground to the wheel.
     pub n: Vec3<T>,
-    /// Rolling direction, or the axis of [rollers](crate::contact::rollers).
+    /// Rolling direction, or the axis of rollers (`crate::contact::rollers`).
     pub t: Vec3<T>,
     /// `t × n`, or zero.
     pub b: Vec3<T>,

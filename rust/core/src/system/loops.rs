@@ -22,7 +22,7 @@
 //! closed on a tree.
 //!
 //! Written over the scalar: a rover of the general step, those of a block (`crate::lanes`), or dual
-//! numbers of one rover with a direction a lane ([`super::tangent`]). A row that some lanes leave
+//! numbers of one rover with a direction a lane (`super::tangent`). A row that some lanes leave
 //! out is zero there, so that no lane depends on its neighbours.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
