@@ -24,6 +24,7 @@ from rover_gym.policy.arc_driver import ARCS, N_ARCS, arc_of
 from rover_gym.policy.arc_network import shapes
 from rover_gym.policy.evaluation import drive_all
 from rover_gym.policy.network_files import FOLDER
+from rover_gym.policy.scan_policy import ScanMemory
 
 SHIPPED = FOLDER / "anywhere"
 
@@ -163,9 +164,20 @@ def test_arcs_through_the_fence_cost_more_than_any_detour() -> None:
     row[layout["goal"].start] -= 3.6 / layout.scale[layout["goal"].start]
     costs = planner._through_fence(row, start)
     assert costs is not None
-    ahead = planner.arcs.poses(0.6 * planner.reach, 1)[:, 0, 0]
+    ahead = planner.arcs.poses(0.9 * planner.reach, 1)[:, 0, 0]
     np.testing.assert_array_equal(costs > 0.0, ahead > 0.4)
     assert costs.max() > 40.0
+    # Backing off stops at the fence, here at a rover's nose.
+    row[layout["q"].start + 2] = -3.99
+    row[layout["goal"].start] -= 0.39 / layout.scale[layout["goal"].start]
+    memory = ScanMemory.of(None, 1)
+    memory.retreat[0], memory.away[0] = 1.0, 1.0
+    arc, _ = planner.choose(row, [0.0, 0.0], memory, 0)
+    assert planner.arcs.direction[arc] == -1.0
+    row[layout["q"].start + 2] = 0.0
+    row[layout["goal"].start] += 3.99 / layout.scale[layout["goal"].start]
+    arc, _ = planner.choose(row, [0.0, 0.0], memory, 0)
+    assert planner.arcs.direction[arc] == 1.0
 
 
 def test_the_shipped_network_loads_and_decides_in_time() -> None:

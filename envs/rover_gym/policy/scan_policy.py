@@ -175,8 +175,9 @@ TRAP_AHEAD = 0.3
 #: Time without movement after which the rover pushes, s.
 PUSH_AFTER = 0.3
 
-#: Height of a fence at the field's edge, in wheel radii, and the cost of an arc that leads through it, in reaches.
-FENCE, THROUGH_FENCE = 8.0, 50.0
+#: Height of a fence at the field's edge, in wheel radii, the cost of an arc that leads through it, in reaches, and the
+#: length to which an arc is followed for that, over its own: a fast rover stops behind its end.
+FENCE, THROUGH_FENCE, FOLLOWED = 8.0, 50.0, 1.5
 
 #: Fraction of the time to high-centring after which the rover backs off.
 HIGH = 0.05
@@ -316,7 +317,7 @@ class ScanPolicy:
             costs=PathCosts() if costs is None else costs,
         )
         self._ahead = (PathCosts() if costs is None else costs).length * self.reach
-        self._ends = first.poses(self._ahead, 1)[:, 0, :2]
+        self._ends = first.poses(FOLLOWED * self._ahead, 1)[:, 0, :2]
         self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self.reach)
         self._cells = 0 if map is None else map.cells
         self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
@@ -435,13 +436,17 @@ class ScanPolicy:
             heights[beyond[0]] = FENCE * self.radius
         boldness = self._boldness(memory.fruitless[i])
         extra, fast = self._outlook(row, slope, heights, boldness)
-        costs = [cost for cost in (extra, further, self._through_fence(row, memory.start[i])) if cost is not None]
+        fence = self._through_fence(row, memory.start[i])
+        costs = [cost for cost in (extra, further, fence) if cost is not None]
+        retreat = float(memory.away[i]) if memory.retreat[i] > 0.0 else 0.0
+        if fence is not None and (fence[self.arcs.direction == retreat] > 0.0).all():
+            retreat = 0.0  # backing off would leave the field
         task = SearchTask(
             goal=(float(goal[0]) - self._x_c, float(goal[1])),
             command=memory.command[i].copy(),
             boldness=self._caution * boldness,
             traps=np.column_stack((ahead * cosine - right * sine, ahead * sine + right * cosine, turned)),
-            retreat=float(memory.away[i]) if memory.retreat[i] > 0.0 else 0.0,
+            retreat=retreat,
             extra=sum(costs[1:], costs[0]) if costs else None,
             ways=self._ways(row, slope, memory, i),
         )
@@ -476,7 +481,7 @@ class ScanPolicy:
         return beyond
 
     def _through_fence(self, row: Array, start: Array) -> Array | None:
-        """`(n_arcs,)` further costs, m, of the first arcs that end beyond the field's edge; None if none does."""
+        """`(n_arcs,)` further costs, m, of the first arcs that lead beyond the field's edge; None if none does."""
         beyond = self._beyond(row[None], start[None], self._ends)
         if beyond is None or not beyond.any():
             return None
