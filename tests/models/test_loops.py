@@ -143,7 +143,7 @@ def in_pinocchio(description):
 
 @pytest.mark.parametrize("what", ["a connection", "a slider to the world", "a weld"])
 def test_a_linkage_accelerates_as_pinocchios_constrained_dynamics_says(tmp_path, what):
-    pytest.importorskip("pinocchio")
+    pytest.importorskip("pinocchio", reason="not installed (make chart installs it)")
     model = RoverModel.from_mjcf(write(tmp_path, linkage(what), "linkage.xml"), wheels=[])
     tree, constraint, index = in_pinocchio(model.to_dict())
     (loop,) = model.to_dict()["loops"]
