@@ -35,3 +35,9 @@ def evaluate() -> Script:
 def passable() -> Script:
     """`passable.py`."""
     return script("passable", "passable")
+
+
+@pytest.fixture(scope="session")
+def ablations() -> Script:
+    """`ablations.py`."""
+    return script("ablations", "ablations")
