@@ -24,7 +24,7 @@ use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Instructions, Single};
 use crate::system::TreeSystem;
 use crate::system::loops::check_closed;
-use crate::system::tangent::{Direction, HeldTree, OF_WHEEL, Tangent, TangentScene};
+use crate::system::tangent::{Direction, HeldSand, HeldTree, OF_WHEEL, Tangent, TangentScene};
 
 /// Cosine of the pitch below which the coordinates count as singular.
 const SINGULAR: f64 = 1e-6;
@@ -57,6 +57,8 @@ pub struct Differentiator {
     angles: Vec<usize>,
     /// Report of the last step.
     pub(super) report: StepReport,
+    /// The sand of the last step that was differentiated: its matrix serves the next one.
+    pub(super) sand: Option<Arc<HeldSand>>,
 }
 
 /// Passes over a step with this machine's widest lanes.
@@ -124,6 +126,7 @@ impl Differentiator {
             passes: Passes::new(instructions, of.model()),
             angles: coordinates::angular_blocks(of.model()).collect(),
             report: StepReport::default(),
+            sand: None,
         })
     }
 
@@ -326,6 +329,7 @@ impl Differentiator {
         let mut system = sim.scene.system(&sim.command, &sim.memory, &mut sim.parts);
         let held = system.hold(&sim.options, start, &sim.scratch, &numbers);
         let held = held.ok_or(LinearisationError::NotHeld)?;
+        self.sand.clone_from(&held.sand);
         let scene = TangentScene {
             model: &sim.scene.model,
             command: &sim.command.actuators,
@@ -444,6 +448,7 @@ impl Differentiator {
             ..Trajectory::default()
         };
         let mut state = state.to_vec();
+        self.sand = None;
         for step in 0..n {
             let command = &commands[step * nu..][..nu];
             let taken =

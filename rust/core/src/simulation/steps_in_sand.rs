@@ -5,6 +5,8 @@
 //! at its end. The first are those of the simulation's own step. What wheels do to the ruts is left
 //! out.
 
+use std::sync::Arc;
+
 use nalgebra::Vector6;
 
 use super::differentiator::Differentiator;
@@ -72,7 +74,7 @@ impl Differentiator {
         let command = self.sim.command.clone();
         let mut forces = self.guess_forces()?;
         let (mut best, mut change) = (forces.clone(), Vec::new());
-        let (mut least, mut share, mut gain) = (f64::INFINITY, 1.0, None);
+        let (mut least, mut share) = (f64::INFINITY, 1.0);
         for _ in 0..MOST {
             let mut found = self.sim.warm_start.clone();
             found.persistent.clear();
@@ -91,13 +93,16 @@ impl Differentiator {
                 return Ok(end);
             }
             if error < least {
-                if gain.is_none() || error > POOR * least {
+                let is_poor = least.is_finite() && error > POOR * least;
+                if is_poor || self.sand.is_none() {
                     let step = system.hold_step(&sim.options, &sim.scratch);
-                    let step = step.ok_or(LinearisationError::NotHeld)?;
-                    gain = system.hold_sand(&sim.options, &step, &[]);
+                    let held = step.and_then(|step| system.hold_sand(&sim.options, &step, &[]));
+                    self.sand = held.map(Arc::new);
                 }
-                let held = gain.as_ref().ok_or(LinearisationError::NotHeld)?;
-                let corrections = held.corrections(&errors);
+                let corrections = self
+                    .sand
+                    .as_ref()
+                    .and_then(|sand| sand.corrections(&errors));
                 let corrections = corrections.ok_or(LinearisationError::NotHeld)?;
                 let touching = errors.iter().map(|error| error.is_touching);
                 change = corrections.into_iter().zip(touching).collect();
@@ -116,7 +121,8 @@ impl Differentiator {
     /// The forces of the sand in the step of a simulation.
     fn guess_forces(&mut self) -> Result<Forces, LinearisationError> {
         let sim = &mut self.sim;
-        drop(sim.scene.system(&sim.command, &sim.memory, &mut sim.parts));
+        let (model, ground) = (&sim.scene.model, sim.scene.terrain.soft());
+        (sim.parts.tree).begin_sand(model, ground, sim.memory.sand.as_ref());
         sim.parts.tree.give_sand(None);
         sim.general_step(&Variant::Linearised, &mut NoProbe)?;
         let modes = sim.parts.tree.modes_of_sand();

@@ -424,6 +424,9 @@ impl MechanicalSystem for TreeSystem<'_> {
         q: &Configuration,
         v: &[f64],
     ) -> Option<MechanicalEnergy> {
+        if self.parts.has_given_sand() {
+            return None;
+        }
         let TreeScratch {
             q: lane,
             energy: scratch,

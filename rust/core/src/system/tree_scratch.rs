@@ -123,6 +123,11 @@ impl TreeScratch {
         }
     }
 
+    /// Whether the forces of the sand are given.
+    pub(super) fn has_given_sand(&self) -> bool {
+        self.sand.as_ref().is_some_and(|sand| sand.is_given())
+    }
+
     /// Writes the sand at the end of a step.
     pub(crate) fn end_sand(
         &mut self,

@@ -12,12 +12,13 @@
 //! its pose and its memory at the end of the step: points move with the arc in the sand and with the
 //! memory, so no closed form of a point's stress has them all.
 
-use nalgebra::{DMatrix, DVector, Dyn, LU, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Dyn, LU, Matrix6, Vector3, Vector6};
 use std::sync::Arc;
 
 use crate::contact::Contact;
 use crate::integrator::held_step::HeldStep;
 use crate::integrator::{MechanicalSystem, StepOptions};
+use crate::sand::memory::rate;
 use crate::sand::{Derivatives, Memory, Soil, Twist, WheelPose};
 use crate::system::sand::SandContact;
 use crate::system::sand_patch::{LaneGround, Patch, SandStep};
@@ -31,6 +32,9 @@ const NUMBER: f64 = 1e-6;
 /// Change of a number of a soil, relative to it or, if it is zero, to its size.
 const RELATIVE: f64 = 1e-6;
 
+/// Speed relative to the sand, m/s, below which a wheel is at rest.
+pub(super) const REST: f64 = 1e-10;
+
 /// Numbers of the memory and the energy of the sand at a wheel.
 pub(crate) const OF_WHEEL: usize = SIX + 1;
 
@@ -38,7 +42,7 @@ pub(crate) const OF_WHEEL: usize = SIX + 1;
 #[derive(Clone, Debug)]
 pub(crate) struct HeldSand {
     pub(super) wheels: Vec<HeldWheel>,
-    /// Velocity (nv) at which the forces are taken: that before the energy audit.
+    /// Velocity (nv) at which the forces are taken: that at the end of the step.
     pub(super) v_end: Vec<f64>,
     /// Length over which the sand forgets, m.
     pub(super) length: f64,
@@ -365,7 +369,10 @@ impl<'a> Probe<'a> {
         let lag = self.step.theta * h;
         let begin = Memory::of(&Vector6::from(self.patch.begin.memory));
         let drum = self.patch.wheel.shape.drum();
-        let recalled = begin.after(&Twist::of(&self.twist), drum, (h, length));
+        let mut recalled = begin.after(&Twist::of(&self.twist), drum, (h, length));
+        if rate(&self.twist.into(), drum) <= REST {
+            recalled.slope = Matrix6::from_diagonal_element(recalled.fresh);
+        }
         // The axle turns by `lag ω × axle` and is then made a unit vector.
         let before = self.patch.pose.get(0).axle;
         let long =

@@ -1,5 +1,7 @@
 //! What a step of a tree held, and how its contacts change with the poses.
 
+use std::sync::Arc;
+
 use super::held_sand::HeldSand;
 use crate::contact::contact_slope::ContactSlope;
 use crate::contact::{Contact, Opposite, Part};
@@ -19,7 +21,7 @@ pub(crate) struct HeldTree {
     pub(super) contacts: Vec<HeldContact>,
     pub(super) factor: Factor<f64>,
     /// On soft ground.
-    pub(super) sand: Option<HeldSand>,
+    pub(crate) sand: Option<Arc<HeldSand>>,
 }
 
 /// What a contact is besides its place.
@@ -82,7 +84,7 @@ impl TreeSystem<'_> {
             contacts: contacts.collect(),
             factor: self.parts.factor.clone(),
             step,
-            sand,
+            sand: sand.map(Arc::new),
         })
     }
 

@@ -41,6 +41,6 @@ mod sand;
 mod scratch;
 
 pub(crate) use direction::Direction;
-pub(crate) use held_sand::{OF_WHEEL, SandError};
+pub(crate) use held_sand::{HeldSand, OF_WHEEL, SandError};
 pub(crate) use held_tree::{HeldTree, TangentScene};
 pub(crate) use scratch::Tangent;

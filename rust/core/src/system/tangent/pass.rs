@@ -408,7 +408,6 @@ impl<T: Lane> Tangent<T> {
         );
         let places = &self.start.joints;
         let mut work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]);
-        work += self.work_of_sand();
         let (h, theta) = step;
         for (force, (v, end)) in self.applied.iter().zip(self.v.iter().zip(&self.v_end)) {
             work += h * *force * (theta * *end + (h.like(1.0) - theta) * *v);

@@ -1,6 +1,6 @@
 //! Wheels in sand in a pass: their forces, and what the sand remembers of them.
 
-use super::held_sand::{HeldSand, HeldWheel, OF_WHEEL};
+use super::held_sand::{HeldSand, HeldWheel, OF_WHEEL, REST};
 use super::held_tree::TangentScene;
 use super::pass::along;
 use super::scratch::Tangent;
@@ -22,10 +22,9 @@ pub(super) struct VaryingWheel<T: Lane> {
     /// Derivative of its wrench by what varies of the soil.
     pub by_soil: Six<T>,
     wrench: Six<Dual<T>>,
-    /// Memory and energy at the end, and what the sand gave, J.
+    /// Memory and energy at the end.
     end: Six<Dual<T>>,
     left: Dual<T>,
-    given: Dual<T>,
 }
 
 /// The wheels of a machine in sand.
@@ -55,7 +54,6 @@ impl<T: Lane> VaryingSand<T> {
             wrench: [zero; SIX],
             end: [zero; SIX],
             left: zero,
-            given: zero,
         });
         Self {
             wheels: wheels.collect(),
@@ -90,9 +88,8 @@ impl<T: Lane> VaryingWheel<T> {
     fn recalled(&self, twist: &Six<Dual<T>>, (h, length): (Dual<T>, Dual<T>)) -> Six<Dual<T>> {
         let drum = self.wheel.shape.drum();
         let way = rate(twist, drum);
-        let zero = way.like(0.0);
-        // At rest the way has a corner.
-        let way = Dual::select(zero.lt(way), way, zero);
+        // At rest the way has a corner, and its mean slope is none.
+        let way = Dual::select(way.like(REST).lt(way), way, Dual::constant(way.value));
         after_way(&self.memory, twist, way, (h, length)).0
     }
 
@@ -166,7 +163,7 @@ impl<T: Lane> Tangent<T> {
         true
     }
 
-    /// What the sand remembers at the end of the step, and what it gave.
+    /// What the sand remembers at the end of the step.
     #[inline(always)]
     pub(super) fn recall_sand(&mut self, scene: &TangentScene<'_>) {
         let (Some(sand), Some(held)) = (&mut self.sand, &scene.held.sand) else {
@@ -181,26 +178,17 @@ impl<T: Lane> Tangent<T> {
             let twist = own.map.twist(&self.v_end);
             let end = own.recalled(&twist, (h, length));
             own.end = end.map(|x| x * zero.like(held.kept));
-            (own.left, own.given) = (zero, zero);
+            own.left = zero;
             if held.is_touching {
                 let before = own.map.twist(&self.v).map(|x| x * (zero.like(1.0) - theta));
                 let mean = six::plus(&before, theta, &twist);
                 let wanted = h * six::dot(&own.wrench, &mean);
-                own.given = wanted.min(own.stored);
+                let given = wanted.min(own.stored);
                 let force = six::linear(&own.wrench).norm();
                 let force = Dual::select(zero.lt(force), force, zero);
-                own.left = (own.stored - own.given).min(length * force);
+                own.left = (own.stored - given).min(length * force);
             }
         }
-    }
-
-    /// What the sand gave to the motion, J.
-    pub(super) fn work_of_sand(&self) -> Dual<T> {
-        let mut sum = Dual::splat(self.token, 0.0);
-        for wheel in self.sand.iter().flat_map(|sand| &sand.wheels) {
-            sum += wheel.given;
-        }
-        sum
     }
 
     /// Number of entries of the state of the sand.
