@@ -24,8 +24,14 @@ const LOOSE: f64 = 1e-10;
 /// Part of the error that a step of Newton's method may leave before its matrix is computed anew.
 const POOR: f64 = 0.1;
 
+/// Error from which on the matrix is computed anew in every step of Newton's method.
+const NEAR: f64 = 1e-3;
+
+/// Least part of a step of Newton's method that is tried before the whole step is taken anyway.
+const LEAST_SHARE: f64 = 0.02;
+
 /// Most repetitions of a step.
-const MOST: usize = 40;
+const MOST: usize = 100;
 
 /// Iterate of Newton's method: the forces on the wheels, none on those that do not touch the sand.
 type Forces = Vec<Option<Vector6<f64>>>;
@@ -74,7 +80,7 @@ impl Differentiator {
         let command = self.sim.command.clone();
         let mut forces = self.guess_forces()?;
         let (mut best, mut change) = (forces.clone(), Vec::new());
-        let (mut least, mut share) = (f64::INFINITY, 1.0);
+        let (mut least, mut share, mut is_own) = (f64::INFINITY, 1.0, false);
         for _ in 0..MOST {
             let mut found = self.sim.warm_start.clone();
             found.persistent.clear();
@@ -94,10 +100,13 @@ impl Differentiator {
             }
             if error < least {
                 let is_poor = least.is_finite() && error > POOR * least;
-                if is_poor || self.sand.is_none() {
+                if is_poor || error > NEAR || self.sand.is_none() {
                     let step = system.hold_step(&sim.options, &sim.scratch);
                     let held = step.and_then(|step| system.hold_sand(&sim.options, &step, &[]));
                     self.sand = held.map(Arc::new);
+                    is_own = true;
+                } else {
+                    is_own = false;
                 }
                 let corrections = self
                     .sand
@@ -108,8 +117,17 @@ impl Differentiator {
                 change = corrections.into_iter().zip(touching).collect();
                 best.clone_from(&forces);
                 (least, share) = (error, 1.0);
-            } else {
+            } else if is_own && share > LEAST_SHARE {
                 share *= 0.5;
+            } else if is_own {
+                // At a corner of a force the way on may lead through larger errors.
+                (least, share) = (f64::INFINITY, 1.0);
+            } else {
+                // The matrix of another point leads away: its own is computed.
+                self.sand = None;
+                forces.clone_from(&best);
+                least = f64::INFINITY;
+                continue;
             }
             for ((own, best), (change, touching)) in forces.iter_mut().zip(&best).zip(&change) {
                 *own = touching.then(|| best.unwrap_or_default() + *change * share);

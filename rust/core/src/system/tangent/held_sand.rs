@@ -30,7 +30,7 @@ const PLACE: f64 = 3e-7;
 const NUMBER: f64 = 1e-6;
 
 /// Change of a number of a soil, relative to it or, if it is zero, to its size.
-const RELATIVE: f64 = 1e-6;
+const RELATIVE: f64 = 3e-5;
 
 /// Speed relative to the sand, m/s, below which a wheel is at rest.
 pub(super) const REST: f64 = 1e-10;
