@@ -2,9 +2,10 @@
 //!
 //! The state is x = (q, v) in public coordinates, the command u = (wheel torques, steering
 //! set-points). On soft ground the state has seven more entries a wheel: what the sand remembers of
-//! it and the energy that it may give back. A step is that of [`RoverSimulation::set_state`] followed by one step: it does not
-//! depend on steps before it. `crate::system::tangent` differentiates it, eight directions at a
-//! time where the machine has such registers; the bits are the same with four and with one.
+//! it and the energy that it may give back. A step is that of [`RoverSimulation::set_state`]
+//! followed by one step: it does not depend on steps before it. `crate::system::tangent`
+//! differentiates it, eight directions at a time where the machine has such registers; the bits are
+//! the same with four and with one.
 
 use std::ops::Range;
 use std::sync::Arc;

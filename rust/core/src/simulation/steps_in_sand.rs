@@ -1,9 +1,9 @@
 //! Steps in sand whose forces are those at their end to rounding, for derivatives.
 //!
 //! A step of a simulation accepts forces that differ by some percent from those at its end
-//! ([`crate::system`]). Here it is repeated with given forces, which Newton's method brings to those
-//! at its end. The first are those of the simulation's own step. What wheels do to the ruts is left
-//! out.
+//! ([`crate::system`]). Here it is repeated with given forces, which Newton's method brings to
+//! those at its end. The first are those of the simulation's own step. What wheels do to the ruts
+//! is left out.
 
 use std::sync::Arc;
 
@@ -81,6 +81,7 @@ impl Differentiator {
         let mut forces = self.guess_forces()?;
         let (mut best, mut change) = (forces.clone(), Vec::new());
         let (mut least, mut share, mut is_own) = (f64::INFINITY, 1.0, false);
+        let mut last = f64::INFINITY;
         for _ in 0..MOST {
             let mut found = self.sim.warm_start.clone();
             found.persistent.clear();
@@ -95,6 +96,7 @@ impl Differentiator {
             let mut system = sim.scene.system(&sim.command, &sim.memory, &mut sim.parts);
             let errors = system.sand_errors();
             let error = largest(&errors, &forces);
+            last = error;
             if error <= TIGHT || (error <= LOOSE && error >= POOR * least) {
                 return Ok(end);
             }
@@ -133,7 +135,7 @@ impl Differentiator {
                 *own = touching.then(|| best.unwrap_or_default() + *change * share);
             }
         }
-        Err(LinearisationError::SandNotSolved { error: least })
+        Err(LinearisationError::SandNotSolved { error: last })
     }
 
     /// The forces of the sand in the step of a simulation.

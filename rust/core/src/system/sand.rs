@@ -19,8 +19,8 @@
 //! only up to what is stored, and the energy audit removes the rest from the motion. Sand that has
 //! nothing left to give gives way: its memory, and with it its force, becomes smaller.
 //!
-//! For derivatives a step takes [given](SandContact::give) forces, which are repeated until they are
-//! those at its end (`super::tangent`). M̂ is then that of firm ground.
+//! For derivatives a step takes [given](SandContact::give) forces, which are repeated until they
+//! are those at its end (`super::tangent`). M̂ is then that of firm ground.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use std::sync::Arc;

@@ -224,8 +224,8 @@ impl<T: Lane> Patch<T> {
         }
     }
 
-    /// Pose and memory at the end of a step with a twist in a lane, and the multiple of the identity
-    /// in the derivative of the memory by the twist, s/m.
+    /// Pose and memory at the end of a step with a twist in a lane, and the multiple of the
+    /// identity in the derivative of the memory by the twist, s/m.
     pub(super) fn ended(
         &self,
         step: &SandStep<T>,

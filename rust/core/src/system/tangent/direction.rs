@@ -1,8 +1,8 @@
 //! What varies in a lane.
 
 use super::held_tree::TangentScene;
-use super::sand::VaryingSand;
 use super::scratch::Tangent;
+use super::varying_sand::VaryingSand;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Dual, Lane};
 use crate::system::sand_wheel::PlacedWheel;

@@ -9,8 +9,8 @@
 //!
 //! with the memories m of the wheels and the numbers θ of the soil. R contains the loops and the
 //! contacts in their modes. Derivatives of f are central differences of the force of one wheel, in
-//! its pose and its memory at the end of the step: points move with the arc in the sand and with the
-//! memory, so no closed form of a point's stress has them all.
+//! its pose and its memory at the end of the step: points move with the arc in the sand and with
+//! the memory, so no closed form of a point's stress has them all.
 
 use nalgebra::{DMatrix, DVector, Dyn, LU, Matrix6, Vector3, Vector6};
 use std::sync::Arc;
@@ -80,7 +80,8 @@ pub(crate) struct SandError {
 }
 
 impl TreeScratch {
-    /// Gives the next steps the forces of the sand, see [`SandContact::give`]. Wheels leave no ruts.
+    /// Gives the next steps the forces of the sand, see [`SandContact::give`]. Wheels leave no
+    /// ruts.
     pub(crate) fn give_sand(&mut self, wrenches: Option<&[Option<Vector6<f64>>]>) {
         if let Some(sand) = &mut self.sand {
             sand.ruts_stay = true;
@@ -185,8 +186,8 @@ impl TreeSystem<'_> {
         sand.map_or([0.0; SIX], |sand| sand.patches[wheel].map.twist(v))
     }
 
-    /// Change of the velocity (nv) by a unit of one component of the force on a wheel over the step:
-    /// with held impulses of the contacts, and with contacts that keep their modes.
+    /// Change of the velocity (nv) by a unit of one component of the force on a wheel over the
+    /// step: with held impulses of the contacts, and with contacts that keep their modes.
     fn push_wheel(
         &self,
         options: &StepOptions,

@@ -28,7 +28,8 @@
 //! ```
 //!
 //! - `direction`: what varies; `held_tree`, `held_sand`: what a step held; `contacts`: their places
-//!   and velocities; `closed_loops`; `sand`; `scratch`, `pass`: one pass, a direction a lane.
+//!   and velocities; `closed_loops`; `varying_sand`, `sand`: wheels in sand; `scratch`, `pass`:
+//!   one pass, a direction a lane.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod closed_loops;
@@ -39,6 +40,7 @@ mod held_tree;
 mod pass;
 mod sand;
 mod scratch;
+mod varying_sand;
 
 pub(crate) use direction::Direction;
 pub(crate) use held_sand::{HeldSand, OF_WHEEL, SandError};

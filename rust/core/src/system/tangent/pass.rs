@@ -2,8 +2,8 @@
 
 use super::direction::Direction;
 use super::held_tree::TangentScene;
-use super::sand::VaryingSand;
 use super::scratch::{Correction, Tangent};
+use super::varying_sand::VaryingSand;
 use crate::integrator::held_step::SAME;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::multibody::Configuration;
@@ -16,8 +16,8 @@ const ROUNDING: f64 = 1e-13;
 
 impl<T: Lane> Tangent<T> {
     /// Calls `take` with the number of each direction and its derivatives of the configuration's
-    /// motion and of the velocity at the end (nv each), and of the state of the sand (7 n). False if the step is not the one that the
-    /// held equations describe; `end` then is of no use.
+    /// motion and of the velocity at the end (nv each), and of the state of the sand (7 n). False
+    /// if the step is not the one that the held equations describe; `end` then is of no use.
     pub(crate) fn differentiate(
         &mut self,
         scene: &TangentScene<'_>,

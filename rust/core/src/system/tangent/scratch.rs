@@ -1,6 +1,6 @@
 //! Scratch of passes over a step.
 
-use super::sand::VaryingSand;
+use super::varying_sand::VaryingSand;
 use crate::contact::rows::Place;
 use crate::multibody::bias::BiasScratch;
 use crate::multibody::{
