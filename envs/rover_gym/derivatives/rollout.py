@@ -105,8 +105,8 @@ def rollout(
 
     Args:
         simulation: Model, ground with its ruts, options, held joints and further torques.
-        state: State at the start, (nx,), or a batch of them, (n, nx). On soft ground (q, v) alone serves too: the sand is
-            then as it is in the simulation.
+        state: State at the start, (nx,), or a batch of them, (n, nx). On soft ground (q, v) alone serves too: the
+            sand is then as it is in the simulation.
         commands: Wheel torques (N m) and steering set-points (rad) of each step, (steps, nu) or (n, steps, nu).
         parameters: Names of parameters, as in `Simulation.linearise`.
         threads: Number of threads for a batch; one a core by default.
