@@ -1246,10 +1246,10 @@ class PathSearch:
 class Linearisation:
     """Derivatives of a time step, returned by `Simulation.linearise`.
 
-    `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
-    x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
-    steering set-points). On soft ground seven numbers a wheel follow in x: the displacement of its
-    centre (3) and its rotation (3) that the sand remembers, in units of its memory (1 and 1/m, world
+    `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is x = (q,
+    v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques, steering
+    set-points). On soft ground seven numbers a wheel follow in x: the displacement of its centre
+    (3) and its rotation (3) that the sand remembers, in units of its memory (1 and 1/m, world
     axes), and the energy that the sand may give back, J. All arrays are new.
     """
 
