@@ -1246,14 +1246,16 @@ class PathSearch:
 class Linearisation:
     """Derivatives of a time step, returned by `Simulation.linearise`.
 
-    `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
-    x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
-    steering set-points). All arrays are new.
+    `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is x = (q,
+    v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques, steering
+    set-points). On soft ground seven numbers a wheel follow in x: the displacement of its centre
+    (3) and its rotation (3) that the sand remembers, in units of its memory (1 and 1/m, world
+    axes), and the energy that the sand may give back, J. All arrays are new.
     """
 
     @property
     def a(self) -> _Array:
-        """Derivative of the next state by the state, (nx, nx) with nx = 2 nv."""
+        """Derivative of the next state by the state, (nx, nx) with nx = 2 nv, or 2 nv + 7 n_wheels."""
     @property
     def b(self) -> _Array:
         """Derivative of the next state by the command, (nx, nu) with nu = 2 n_wheels.
@@ -1297,8 +1299,8 @@ class Linearisation:
         """Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
 
         None without `check`. A column is valid if two perturbed steps, one in each direction, have
-        the same closed contacts in the same modes, the same projection and energy correction, and
-        agree with the column within 1%.
+        the same closed contacts in the same modes, the same projection and energy correction, the
+        same wheels in sand, and agree with the column within 1%.
         """
     @property
     def errors(self) -> _Array | None:
@@ -1823,7 +1825,8 @@ class Simulation(AnySimulation):
             parameters: Names of parameters for C: "friction", the common coefficient; "mass" and
                 "mass:<body>", a factor of mass and inertia of all bodies or of one;
                 "damping:<joint>", N m s/rad or N s/m; "contact_stiffness" and "contact_damping",
-                factors of those of wheels that yield. None by default.
+                factors of those of wheels that yield; on soft ground "soil:<number>", a number of
+                its soil in its own unit. None by default.
 
         Returns:
             The derivatives, the contact modes and their margins.
@@ -1849,7 +1852,8 @@ class Simulation(AnySimulation):
         saturate at their limits. `rover_gym.derivatives` has products with these derivatives.
 
         Args:
-            states: State (q, v) at the start of each trajectory, (n, nx) with nx = 2 nv.
+            states: State at the start of each trajectory, (n, nx), as in `Linearisation`. On soft
+                ground (n, 2 nv) serves too: the sand is then as it is in this simulation.
             commands: Wheel torques (N m) and steering set-points (rad) of each step,
                 (n, steps, nu) with nu = 2 n_wheels.
             parameters: Names of parameters, as in `linearise`; none by default.

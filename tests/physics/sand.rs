@@ -4,6 +4,7 @@
 
 pub(crate) mod sand_scenes;
 
+mod derivatives;
 mod driving;
 mod forces;
 mod resting;

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.derivatives.rollout import rollout
+from rover_gym.derivatives.rollout import rollout, state_size
 from rover_gym.extras import require
 from rover_gym.mechanics import Simulation
 
@@ -18,8 +18,8 @@ def jax_rollout(simulation: Simulation, threads: int | None = None) -> Any:
 
     Returns:
         A function of a state, (nx,) or (n, nx), and commands, (steps, nu) or (n, steps, nu), to the states,
-        (steps + 1, nx) or (n, steps + 1, nx), of the state's type. It computes in double precision on the processor,
-        within `jit` too. Second derivatives do not exist.
+        (steps + 1, nx) or (n, steps + 1, nx), of the state's type. On soft ground the state may be (q, v), as in
+        `rollout`. It computes in double precision on the processor, within `jit` too. Second derivatives do not exist.
 
     Raises:
         MissingExtraError: JAX is not installed.
@@ -33,17 +33,17 @@ def jax_rollout(simulation: Simulation, threads: int | None = None) -> Any:
         return tuple(array.astype(dtype) for array in (found.states, found.a, found.b))
 
     def call(state: Any, commands: Any) -> Any:
-        batch, (nx,), (steps, nu) = state.shape[:-1], state.shape[-1:], commands.shape[-2:]
+        batch, nx, (steps, nu) = state.shape[:-1], state_size(simulation), commands.shape[-2:]
         shapes = ((steps + 1, nx), (steps, nx, nx), (steps, nx, nu))
         out = tuple(jax.ShapeDtypeStruct((*batch, *shape), state.dtype) for shape in shapes)
         return jax.pure_callback(on_host, out, state, commands, vmap_method="sequential")
 
     def forward(state: Any, commands: Any) -> Any:
         states, a, b = call(state, commands)
-        return states, (a, b)
+        return states, (a, b, state)
 
     def backward(derivatives: Any, costate: Any) -> Any:
-        a, b = derivatives
+        a, b, start = derivatives
 
         def back(later: Any, step: Any) -> Any:
             a_k, b_k, direct = step
@@ -52,7 +52,7 @@ def jax_rollout(simulation: Simulation, threads: int | None = None) -> Any:
 
         steps = (numbers.moveaxis(a, -3, 0), numbers.moveaxis(b, -3, 0), numbers.moveaxis(costate[..., :-1, :], -2, 0))
         state, commands = jax.lax.scan(back, costate[..., -1, :], steps, reverse=True)
-        return state, numbers.moveaxis(commands, 0, -2)
+        return state[..., : start.shape[-1]], numbers.moveaxis(commands, 0, -2)
 
     function = jax.custom_vjp(lambda state, commands: call(state, commands)[0])
     function.defvjp(forward, backward)

@@ -30,7 +30,7 @@ class Rollout:
     """
 
     states: NDArray[np.float64]
-    """States (q, v), (..., steps + 1, nx)."""
+    """States (q, v), on soft ground with the sand behind, (..., steps + 1, nx)."""
     a: NDArray[np.float64]
     """Derivatives of the next state by the state, (..., steps, nx, nx)."""
     b: NDArray[np.float64]
@@ -100,11 +100,13 @@ def rollout(
     """Drives copies of a simulation and differentiates every step.
 
     Each step is the one after `Simulation.set_state`, without memory of earlier impulses. Torques saturate at their
-    limits. The simulation does not change.
+    limits. The simulation does not change. On soft ground the state has seven more numbers a wheel, see
+    `Linearisation`, and the ruts stay as they are in the simulation.
 
     Args:
-        simulation: Model, ground, options, held joints and further torques.
-        state: State (q, v) at the start, (nx,), or a batch of them, (n, nx).
+        simulation: Model, ground with its ruts, options, held joints and further torques.
+        state: State at the start, (nx,), or a batch of them, (n, nx). On soft ground (q, v) alone serves too: the
+            sand is then as it is in the simulation.
         commands: Wheel torques (N m) and steering set-points (rad) of each step, (steps, nu) or (n, steps, nu).
         parameters: Names of parameters, as in `Simulation.linearise`.
         threads: Number of threads for a batch; one a core by default.
@@ -128,6 +130,12 @@ def rollout(
     found = simulation.differentiate(start, driven, names, threads)
     one = 0 if is_one else slice(None)
     return Rollout(found.states[one], found.a[one], found.b[one], found.c[one], names)
+
+
+def state_size(simulation: Simulation) -> int:
+    """The number nx of entries of the state."""
+    model = simulation.model
+    return 2 * model.nv + (0 if simulation.sand() is None else 7 * len(model.wheel_names))
 
 
 def _times(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:

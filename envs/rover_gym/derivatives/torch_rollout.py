@@ -16,8 +16,9 @@ def torch_rollout(simulation: Simulation, threads: int | None = None) -> Any:
 
     Returns:
         A function of a state, (nx,) or (n, nx), and commands, (steps, nu) or (n, steps, nu), both tensors, to the
-        states, (steps + 1, nx) or (n, steps + 1, nx). It computes in double precision on the processor, and returns
-        the type and the device of the state. Second derivatives do not exist.
+        states, (steps + 1, nx) or (n, steps + 1, nx). On soft ground the state may be (q, v), as in `rollout`. It
+        computes in double precision on the processor, and returns the type and the device of the state. Second
+        derivatives do not exist.
 
     Raises:
         MissingExtraError: PyTorch is not installed.
@@ -31,6 +32,7 @@ def torch_rollout(simulation: Simulation, threads: int | None = None) -> Any:
                 return tensor.detach().cpu().double().numpy()
 
             ctx.rollout = rollout(simulation, array(state), array(commands), threads=threads)
+            ctx.size = state.shape[-1]
             ctx.like = state.dtype, state.device, commands.dtype, commands.device
             return torch.from_numpy(ctx.rollout.states).to(state)
 
@@ -39,7 +41,7 @@ def torch_rollout(simulation: Simulation, threads: int | None = None) -> Any:
         def backward(ctx: Any, costate: Any) -> Any:
             gradients = ctx.rollout.vjp(costate.cpu().double().numpy())
             dtype, device, commands_dtype, commands_device = ctx.like
-            by_state = torch.from_numpy(gradients.state).to(device, dtype)
+            by_state = torch.from_numpy(gradients.state[..., : ctx.size]).to(device, dtype)
             return by_state, torch.from_numpy(gradients.commands).to(commands_device, commands_dtype)
 
     return RolloutFunction.apply

@@ -1,7 +1,8 @@
 //! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore] [batch]` prints microseconds
 //! a step of a rover alone and of each of 8 in a batch on one thread. With a scene it steps that
 //! alone, one rover or the batch, for counting instructions:
-//! `valgrind --tool=callgrind --toggle-collect='*counted*'`.
+//! `valgrind --tool=callgrind --toggle-collect='*counted*'`. The scenes `derivatives` and
+//! `derivatives-on-firm-ground` take steps of a drive with their derivatives.
 //!
 //! The rover is `open-rover` on wheels 0.08 m wide with grousers, in dry sand, at 5 ms: parked,
 //! driven by a constant torque, or by torques and steering that change every ten steps.
@@ -12,11 +13,13 @@
 #[allow(missing_docs, dead_code)]
 mod sand_scenes;
 
+use std::sync::Arc;
 use std::time::Instant;
 
+use rover_core::geometry::Plane;
 use rover_core::integrator::StepReport;
 use rover_core::multibody::Model;
-use rover_core::simulation::{Batch, RoverSimulation};
+use rover_core::simulation::{Batch, Differentiator, RoverSimulation};
 use sand_scenes::{dry_sand, placed, wide};
 
 /// Steps between two commands, and before the first.
@@ -96,6 +99,28 @@ fn counted_batch(batch: &mut Batch, scene: &str, steps: usize) {
     }
 }
 
+#[inline(never)]
+fn counted_derivatives(sim: &RoverSimulation, steps: usize) {
+    let mut differentiator = Differentiator::new(sim).unwrap();
+    let state = differentiator.state_of(sim);
+    let commands = [[1.0; 6], [0.0; 6]].concat().repeat(steps);
+    (differentiator.trajectory(&state, (steps, &commands), &[], &mut || true)).unwrap();
+}
+
+/// The same rover on its way, in sand or on firm ground.
+fn on_its_way(is_firm: bool) -> RoverSimulation {
+    let mut sim = placed(&wide("open-rover", 0.08, 1.0), dry_sand(), 0.0, 0.005);
+    if is_firm {
+        let (model, ground) = (Arc::clone(sim.model()), Arc::new(Plane::ground()));
+        let (q, v) = (sim.q().clone(), sim.v().to_vec());
+        sim = RoverSimulation::new(model, ground, sim.options().clone()).unwrap();
+        sim.set_state(q, v);
+    }
+    counted(&mut sim, "rest", STEPS_AT_REST);
+    counted(&mut sim, "drive", STEPS_AT_REST);
+    sim
+}
+
 /// Microseconds a step and rover of a batch.
 fn in_batch(scene: &str, steps: usize) -> f64 {
     let mut batch = batch();
@@ -108,7 +133,9 @@ fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let steps = arguments.get(1).and_then(|n| n.parse().ok()).unwrap_or(500);
     if let Some(scene) = arguments.get(2) {
-        if arguments.len() > 3 {
+        if scene.starts_with("derivatives") {
+            counted_derivatives(&on_its_way(scene != "derivatives"), steps);
+        } else if arguments.len() > 3 {
             counted_batch(&mut batch(), scene, steps);
         } else {
             counted(&mut start(), scene, steps);

@@ -5,7 +5,8 @@ use rover_core::contact::Part;
 use rover_core::integrator::ContactMode;
 use rover_core::multibody::Model;
 use rover_core::simulation::{
-    Linearisation as Core, LinearisationError, StepParameter, Trajectory, TrajectoryError,
+    Linearisation as Core, LinearisationError, RoverSimulation, StepParameter, Trajectory,
+    TrajectoryError,
 };
 
 use crate::arguments::texts;
@@ -14,12 +15,14 @@ use crate::errors::{BorderError, Kind, Result, Value, entry};
 
 /// Derivatives of a time step, returned by `Simulation.linearise`.
 ///
-/// `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is
-/// x = (q, v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques,
-/// steering set-points). All arrays are new.
+/// `x_next = next_state + a @ (x - state) + b @ (u - command)` to first order. The state is x = (q,
+/// v) as `Simulation.q` and `Simulation.v` return them, the command is u = (wheel torques, steering
+/// set-points). On soft ground seven numbers a wheel follow in x: the displacement of its centre
+/// (3) and its rotation (3) that the sand remembers, in units of its memory (1 and 1/m, world
+/// axes), and the energy that the sand may give back, J. All arrays are new.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct Linearisation {
-    /// Derivative of the next state by the state, (nx, nx) with nx = 2 nv.
+    /// Derivative of the next state by the state, (nx, nx) with nx = 2 nv, or 2 nv + 7 n_wheels.
     a: Array,
     /// Derivative of the next state by the command, (nx, nu) with nu = 2 n_wheels.
     ///
@@ -50,8 +53,8 @@ pub struct Linearisation {
     /// Whether each column of (a, b) is valid within the tested perturbation, (nx + nu,).
     ///
     /// None without `check`. A column is valid if two perturbed steps, one in each direction, have
-    /// the same closed contacts in the same modes, the same projection and energy correction, and
-    /// agree with the column within 1%.
+    /// the same closed contacts in the same modes, the same projection and energy correction, the
+    /// same wheels in sand, and agree with the column within 1%.
     holds: Option<Array<bool>>,
     /// Difference of each column of (a, b) from that of its two perturbed steps, (nx + nu,).
     ///
@@ -117,6 +120,9 @@ impl From<LinearisationError> for BorderError {
             LinearisationError::State(e) => e.into(),
             LinearisationError::Command(e) => e.into(),
             LinearisationError::Step(e) => e.into(),
+            LinearisationError::SandNotSolved { error } => {
+                Kind::Step.refusal(message, Value::Number(error))
+            }
             LinearisationError::NotHeld => Kind::Step.refusal(message, Value::Nothing),
         }
     }
@@ -124,17 +130,19 @@ impl From<LinearisationError> for BorderError {
 
 /// Parameters by their names.
 pub fn named_parameters(
-    model: &Model,
+    sim: &RoverSimulation,
     names: Option<&Bound<'_, PyAny>>,
 ) -> Result<Vec<StepParameter>> {
     let Some(names) = names else {
         return Ok(Vec::new());
     };
     let names = texts(names, Kind::Option, "parameters")?;
+    let soil = sim.terrain().soft().map(|layer| &**layer.soil);
+    let model = sim.model();
     let find = |(i, name): (usize, &String)| {
-        StepParameter::named(model, name).ok_or_else(|| {
+        StepParameter::named(model, soil, name).ok_or_else(|| {
             let field = entry("parameters", Some(&i));
-            let known = StepParameter::names(model).join(", ");
+            let known = StepParameter::names(model, soil).join(", ");
             let message = format!("{field}: no parameter is called {name:?}; there are {known}");
             Kind::Option.error(field, message, Value::Text(name.clone()))
         })

@@ -92,37 +92,9 @@ pub fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
 /// Numbers of a soil by their names.
 pub fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> PyResult<Bound<'py, PyDict>> {
     let numbers = PyDict::new(py);
-    let set = |name: &str, value: f64| numbers.set_item(name, value);
-    match &soil.law {
-        Law::Resistive(sand) => {
-            set("density", sand.density)?;
-            set("internal_friction", sand.internal_friction)?;
-            set("stiffness_factor", sand.stiffness_factor)?;
-            for (name, surface) in [
-                ("tread", sand.tread),
-                ("wall", sand.wall),
-                ("grouser", sand.grousers),
-            ] {
-                set(&format!("{name}_friction"), surface.friction)?;
-                set(&format!("{name}_follow"), surface.follow)?;
-            }
-            set("dilatancy", sand.flow.dilatancy)?;
-            set("grip", sand.flow.grip)?;
-            set("grip_width", sand.flow.width)?;
-            set("fluidity", sand.flow.fluidity)?;
-            set("mobilisation", sand.flow.mobilisation)?;
-        }
-        Law::Bekker(soil) => {
-            set("cohesive_modulus", soil.cohesive_modulus)?;
-            set("frictional_modulus", soil.frictional_modulus)?;
-            set("exponent", soil.exponent)?;
-            set("cohesion", soil.cohesion)?;
-            set("internal_friction", soil.internal_friction)?;
-            set("shear_modulus", soil.shear_modulus)?;
-        }
+    for (name, value) in soil.clone().numbers_mut() {
+        numbers.set_item(name, *value)?;
     }
-    set("memory", soil.memory)?;
-    set("reload", soil.reload)?;
     Ok(numbers)
 }
 

@@ -10,7 +10,7 @@ use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{
     ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation as CoreSimulation,
-    TrajectoryBatch,
+    TrajectoryBatch, state_size, with_sand,
 };
 use rover_core::solver::SolverOptions;
 use rover_core::system::loops::check_closed;
@@ -737,7 +737,8 @@ impl Simulation {
     ///     parameters: Names of parameters for C: "friction", the common coefficient; "mass" and
     ///         "mass:<body>", a factor of mass and inertia of all bodies or of one;
     ///         "damping:<joint>", N m s/rad or N s/m; "contact_stiffness" and "contact_damping",
-    ///         factors of those of wheels that yield. None by default.
+    ///         factors of those of wheels that yield; on soft ground "soil:<number>", a number of
+    ///         its soil in its own unit. None by default.
     ///
     /// Returns:
     ///     The derivatives, the contact modes and their margins.
@@ -761,9 +762,9 @@ impl Simulation {
     ) -> Result<Linearisation> {
         let check = check.flag(false, Kind::Option, "check")?;
         let perturbation = perturbation.number(1e-6, Kind::Option, "perturbation")?;
-        let parameters = named_parameters(&self.model, parameters)?;
         let held = self.open()?;
         let inner = &*held;
+        let parameters = named_parameters(inner, parameters)?;
         let perturbation = check.then_some(perturbation);
         let found = py.detach(|| inner.linearise(&parameters, perturbation));
         let found = found?;
@@ -777,7 +778,8 @@ impl Simulation {
     /// saturate at their limits. `rover_gym.derivatives` has products with these derivatives.
     ///
     /// Args:
-    ///     states: State (q, v) at the start of each trajectory, (n, nx) with nx = 2 nv.
+    ///     states: State at the start of each trajectory, (n, nx), as in `Linearisation`. On soft
+    ///         ground (n, 2 nv) serves too: the sand is then as it is in this simulation.
     ///     commands: Wheel torques (N m) and steering set-points (rad) of each step,
     ///         (n, steps, nu) with nu = 2 n_wheels.
     ///     parameters: Names of parameters, as in `linearise`; none by default.
@@ -805,23 +807,27 @@ impl Simulation {
         parameters: Option<&Bound<'_, PyAny>>,
         threads: Option<&Bound<'_, PyAny>>,
     ) -> Result<StepDerivatives> {
-        let (nx, nu) = (2 * self.model.nv(), 2 * self.model.wheels().len());
-        let (states, shape) = shaped(states, Kind::State, ("states", "(n, nx)"), |s| {
-            s.len() == 2 && s[1] == nx
+        let held = self.open()?;
+        let inner = &*held;
+        let (nx, nu) = (state_size(inner), 2 * self.model.wheels().len());
+        let (mut states, shape) = shaped(states, Kind::State, ("states", "(n, nx)"), |s| {
+            s.len() == 2 && (s[1] == nx || s[1] == 2 * self.model.nv())
         })?;
         let n = shape[0];
+        if shape[1] < nx {
+            states = with_sand(inner, &states);
+        }
         let (commands, shape) = shaped(
             commands,
             Kind::Command,
             ("commands", "(n, steps, nu)"),
             |s| s.len() == 3 && s[0] == n && s[2] == nu,
         )?;
-        let parameters = named_parameters(&self.model, parameters)?;
         let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let threads = threads.transpose()?.unwrap_or_else(cores);
-        let (held, mut watch) = (self.open()?, Watch::new());
-        let inner = &*held;
+        let parameters = named_parameters(inner, parameters)?;
+        let mut watch = Watch::new();
         let batch = TrajectoryBatch {
             states: &states,
             commands: &commands,

@@ -172,6 +172,10 @@ pub trait MechanicalSystem {
         impulse: &mut [f64],
     );
 
+    /// Adds to the impulse of [`Self::load`] (nv) what does not act on the mean velocity. By
+    /// default nothing.
+    fn add_given(&self, _options: &StepOptions, _impulse: &mut [f64]) {}
+
     /// Whether the gyroscopic terms are too stiff to be explicit in this step. By default never.
     fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64]) -> bool {
         false

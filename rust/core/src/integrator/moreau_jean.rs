@@ -288,6 +288,9 @@ pub(super) fn load_explicitly<S: MechanicalSystem>(
     ws.v_mean.copy_from_slice(start.v);
     for is_last in [false, true] {
         system.load(options, start, &ws.v_mean, &mut ws.impulse);
+        if is_last {
+            system.add_given(options, &mut ws.impulse);
+        }
         ws.half_solve(|impulse| system.half_solve(impulse));
         if !is_last {
             system.close_velocity(options, start.v, start.v, &mut ws.y);

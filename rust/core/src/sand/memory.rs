@@ -155,10 +155,22 @@ pub fn after_step<T: Lane>(
     memory: &[T; 6],
     twist: &[T; 6],
     radius: f64,
+    times: (T, T),
+) -> ([T; 6], T) {
+    after_way(memory, twist, rate(twist, radius), times)
+}
+
+/// The same at a speed of the wheel relative to the sand, m/s.
+#[inline(always)]
+#[must_use]
+pub fn after_way<T: Lane>(
+    memory: &[T; 6],
+    twist: &[T; 6],
+    rate: T,
     (h, length): (T, T),
 ) -> ([T; 6], T) {
     let one = h.like(1.0);
-    let (share, rate) = (h / length, rate(twist, radius));
+    let share = h / length;
     let kept = one / (one + h * rate / length);
     let mut end = *memory;
     for (own, x) in end.iter_mut().zip(twist) {
@@ -167,9 +179,10 @@ pub fn after_step<T: Lane>(
     (end, share * kept)
 }
 
-/// Speed of a wheel relative to the sand, m/s.
+/// Speed of a wheel of a radius (m) relative to the sand, m/s.
 #[inline(always)]
-fn rate<T: Lane>(twist: &[T; 6], radius: f64) -> T {
+#[must_use]
+pub fn rate<T: Lane>(twist: &[T; 6], radius: f64) -> T {
     let [a, b, c, d, e, f] = *twist;
     let rim = (d * d + e * e + f * f) * a.like(radius * radius);
     (a * a + b * b + c * c + rim).sqrt()

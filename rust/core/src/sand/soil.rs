@@ -90,6 +90,40 @@ impl Soil {
         }
     }
 
+    /// Its numbers with their names, to be read or changed.
+    #[must_use]
+    pub fn numbers_mut(&mut self) -> Vec<(&'static str, &mut f64)> {
+        let mut all: Vec<(&'static str, &mut f64)> = match &mut self.law {
+            Law::Resistive(sand) => vec![
+                ("density", &mut sand.density),
+                ("internal_friction", &mut sand.internal_friction),
+                ("stiffness_factor", &mut sand.stiffness_factor),
+                ("tread_friction", &mut sand.tread.friction),
+                ("tread_follow", &mut sand.tread.follow),
+                ("wall_friction", &mut sand.wall.friction),
+                ("wall_follow", &mut sand.wall.follow),
+                ("grouser_friction", &mut sand.grousers.friction),
+                ("grouser_follow", &mut sand.grousers.follow),
+                ("dilatancy", &mut sand.flow.dilatancy),
+                ("grip", &mut sand.flow.grip),
+                ("grip_width", &mut sand.flow.width),
+                ("fluidity", &mut sand.flow.fluidity),
+                ("mobilisation", &mut sand.flow.mobilisation),
+            ],
+            Law::Bekker(soil) => vec![
+                ("cohesive_modulus", &mut soil.cohesive_modulus),
+                ("frictional_modulus", &mut soil.frictional_modulus),
+                ("exponent", &mut soil.exponent),
+                ("cohesion", &mut soil.cohesion),
+                ("internal_friction", &mut soil.internal_friction),
+                ("shear_modulus", &mut soil.shear_modulus),
+            ],
+        };
+        all.push(("memory", &mut self.memory));
+        all.push(("reload", &mut self.reload));
+        all
+    }
+
     /// Checks every number.
     ///
     /// # Errors

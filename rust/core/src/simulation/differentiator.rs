@@ -1,9 +1,11 @@
 //! Steps of a rover with their derivatives, one after another or along a trajectory.
 //!
 //! The state is x = (q, v) in public coordinates, the command u = (wheel torques, steering
-//! set-points). A step is that of [`RoverSimulation::set_state`] followed by one step: it does not
-//! depend on steps before it. `crate::system::tangent` differentiates it, eight directions at a
-//! time where the machine has such registers; the bits are the same with four and with one.
+//! set-points). On soft ground the state has seven more entries a wheel: what the sand remembers of
+//! it and the energy that it may give back. A step is that of [`RoverSimulation::set_state`]
+//! followed by one step: it does not depend on steps before it. `crate::system::tangent`
+//! differentiates it, eight directions at a time where the machine has such registers; the bits are
+//! the same with four and with one.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -23,7 +25,7 @@ use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Instructions, Single};
 use crate::system::TreeSystem;
 use crate::system::loops::check_closed;
-use crate::system::tangent::{Direction, HeldTree, Tangent, TangentScene};
+use crate::system::tangent::{Direction, HeldSand, HeldTree, OF_WHEEL, Tangent, TangentScene};
 
 /// Cosine of the pitch below which the coordinates count as singular.
 const SINGULAR: f64 = 1e-6;
@@ -31,9 +33,13 @@ const SINGULAR: f64 = 1e-6;
 /// Relative difference up to which a step counts as the one that was taken.
 const SAME: f64 = 1e-7;
 
-/// Contacts that transmit impulses with their modes, whether the position was projected, and
-/// whether the energy audit slowed the motion.
-pub(super) type Modes = (Vec<(SceneKey<RoverScene>, ContactMode)>, [bool; 2]);
+/// Contacts that transmit impulses with their modes, whether the position was projected, whether
+/// the energy audit slowed the motion, and whether each wheel touches sand and has emptied it.
+pub(super) type Modes = (
+    Vec<(SceneKey<RoverScene>, ContactMode)>,
+    [bool; 2],
+    Vec<[bool; 2]>,
+);
 
 /// A step with its derivatives.
 pub(super) struct Columns {
@@ -45,13 +51,15 @@ pub(super) struct Columns {
 
 /// A copy of a simulation that takes steps from states and commands, with their derivatives.
 pub struct Differentiator {
-    sim: RoverSimulation,
+    pub(super) sim: RoverSimulation,
     command: RoverCommand,
     passes: Passes,
     /// First indices of angles among the coordinates.
     angles: Vec<usize>,
     /// Report of the last step.
-    report: StepReport,
+    pub(super) report: StepReport,
+    /// The sand of the last step that was differentiated: its matrix serves the next one.
+    pub(super) sand: Option<Arc<HeldSand>>,
 }
 
 /// Passes over a step with this machine's widest lanes.
@@ -119,6 +127,7 @@ impl Differentiator {
             passes: Passes::new(instructions, of.model()),
             angles: coordinates::angular_blocks(of.model()).collect(),
             report: StepReport::default(),
+            sand: None,
         })
     }
 
@@ -132,11 +141,14 @@ impl Differentiator {
         self.sim.model().nv()
     }
 
-    /// The state (2 nv) of a simulation.
+    /// The state (nx) of a simulation.
     #[must_use]
     pub fn state_of(&self, sim: &RoverSimulation) -> Vec<f64> {
         let q = coordinates::to_public(sim.model(), sim.q());
-        [q, sim.v().to_vec()].concat()
+        let mut state = [q, sim.v().to_vec()].concat();
+        let wheels = sim.sand().into_iter().flat_map(|sand| &sand.wheels);
+        state.extend(wheels.flat_map(Self::sand_entries));
+        state
     }
 
     /// Sets the command (2 n_wheels), within the limits of the wheels' torques.
@@ -152,12 +164,15 @@ impl Differentiator {
         Ok(())
     }
 
-    /// Sets a state (2 nv), with its loops closed, and the command.
-    fn set(&mut self, state: &[f64]) -> Result<(), LinearisationError> {
+    /// Sets a state (nx), with its loops closed, and the command.
+    pub(super) fn set(&mut self, state: &[f64]) -> Result<(), LinearisationError> {
         let nv = self.nv();
         let configuration = coordinates::from_public(self.sim.model(), &state[..nv])?;
-        let v = coordinates::checked_velocity(self.sim.model(), &state[nv..])?;
+        let v = coordinates::checked_velocity(self.sim.model(), &state[nv..2 * nv])?;
+        let sand = self.sim.memory.sand.take();
         self.sim.set_state(configuration, v);
+        self.sim.memory.sand = sand;
+        self.set_sand(&state[2 * nv..]);
         self.sim.command = self.command.clone();
         Ok(())
     }
@@ -167,6 +182,9 @@ impl Differentiator {
     /// The contact problem may have several solutions. The fast step finds that of a simulation,
     /// and the general step, which leaves its matrices, begins with it.
     fn step(&mut self, state: &[f64]) -> Result<Vec<f64>, LinearisationError> {
+        if self.sim.memory.sand.is_some() {
+            return self.step_in_sand(state);
+        }
         let command = self.sim.command.clone();
         let sim = &mut self.sim;
         if !sim.model().has_compliance() && sim.quick_step(&mut NoProbe).is_some() {
@@ -190,7 +208,8 @@ impl Differentiator {
             .map(|(contact, mode)| (contact.key(), mode))
             .collect();
         let projects = is_projected::<TreeSystem<'_>>(&self.sim.options, &self.sim.scratch);
-        (modes, [projects, self.report.energy_removed > 0.0])
+        let in_sand = self.sim.parts.tree.modes_of_sand();
+        (modes, [projects, self.report.energy_removed > 0.0], in_sand)
     }
 
     /// The state after a real step with one entry of state and command changed, and its modes.
@@ -256,10 +275,15 @@ impl Differentiator {
     }
 
     /// What varies in each column that is not zero.
-    fn directions(&self, state: &[f64], parameters: &[StepParameter]) -> Vec<(usize, Direction)> {
-        let (nv, n) = (self.nv(), self.n_wheels());
+    fn directions(
+        &self,
+        state: &[f64],
+        parameters: &[StepParameter],
+        numbers: &[usize],
+    ) -> Vec<(usize, Direction)> {
+        let (nv, n, nx) = (self.nv(), self.n_wheels(), state.len());
         let model: &Arc<Model> = self.sim.model();
-        let mut all = Vec::with_capacity(2 * (nv + n) + parameters.len());
+        let mut all = Vec::with_capacity(nx + 2 * n + parameters.len());
         all.extend((0..nv).map(|k| (k, Direction::Configuration([(k, 1.0), (k, 0.0), (k, 0.0)]))));
         for &k in &self.angles {
             let axes = coordinates::axes_of_angles([state[k], state[k + 1], state[k + 2]]);
@@ -269,14 +293,17 @@ impl Differentiator {
             }
         }
         all.extend((0..nv).map(|k| (nv + k, Direction::Velocity(k))));
-        let commands = (0..2 * n).filter_map(|i| Some((2 * nv + i, command_direction(model, i)?)));
+        let of_sand = (0..nx - 2 * nv).map(|k| Direction::Sand(k / OF_WHEEL, k % OF_WHEEL));
+        all.extend((2 * nv..nx).zip(of_sand));
+        let commands = (0..2 * n).filter_map(|i| Some((nx + i, command_direction(model, i)?)));
         all.extend(commands);
-        let parameters = parameters.iter().enumerate();
-        all.extend(parameters.map(|(i, parameter)| (2 * (nv + n) + i, parameter.direction())));
+        let soil = self.sim.terrain().soft().map(|layer| &**layer.soil);
+        let directions = parameters.iter().map(|own| own.direction(soil, numbers));
+        all.extend((nx + 2 * n..).zip(directions));
         all
     }
 
-    /// Takes the step from a state (2 nv) and differentiates it.
+    /// Takes the step from a state (nx) and differentiates it.
     pub(super) fn differentiate(
         &mut self,
         state: &[f64],
@@ -287,22 +314,29 @@ impl Differentiator {
         let (begin, v) = (self.sim.q().clone(), self.sim.v().to_vec());
         let next_state = self.step(state)?;
         self.check_angles(&next_state)?;
-        let directions = self.directions(state, parameters);
-        let nv = self.nv();
+        let numbers: Vec<usize> = (parameters.iter())
+            .filter_map(|parameter| match parameter {
+                StepParameter::Soil(number) => Some(*number),
+                _ => None,
+            })
+            .collect();
+        let directions = self.directions(state, parameters, &numbers);
+        let (nv, nx) = (self.nv(), state.len());
         let sim = &mut self.sim;
         let start = Start {
             configuration: &begin,
             v: &v,
         };
         let mut system = sim.scene.system(&sim.command, &sim.memory, &mut sim.parts);
-        let held = system.hold(&sim.options, start, &sim.scratch);
+        let held = system.hold(&sim.options, start, &sim.scratch, &numbers);
         let held = held.ok_or(LinearisationError::NotHeld)?;
+        self.sand.clone_from(&held.sand);
         let scene = TangentScene {
             model: &sim.scene.model,
             command: &sim.command.actuators,
             options: &sim.options,
             start,
-            v_end: &next_state[nv..],
+            v_end: &next_state[nv..2 * nv],
             held: &held,
         };
         let to_rates: Vec<_> = (self.angles.iter())
@@ -312,8 +346,8 @@ impl Differentiator {
                 (k, axes.try_inverse().unwrap_or_default())
             })
             .collect();
-        let n_columns = 2 * (nv + sim.scene.model.wheels().len()) + parameters.len();
-        let mut all = DMatrix::zeros(2 * nv, n_columns);
+        let n_columns = nx + 2 * sim.scene.model.wheels().len() + parameters.len();
+        let mut all = DMatrix::zeros(nx, n_columns);
         let mut end = begin.clone();
         let kinds: Vec<Direction> = directions.iter().map(|(_, direction)| *direction).collect();
         let holds = (self.passes).differentiate(&scene, &kinds, &mut end, |i, motion, dv| {
@@ -340,6 +374,23 @@ impl Differentiator {
     }
 }
 
+/// Number of entries of the state: nx.
+#[must_use]
+pub fn state_size(of: &RoverSimulation) -> usize {
+    2 * of.model().nv() + of.sand().map_or(0, |sand| OF_WHEEL * sand.wheels.len())
+}
+
+/// States (n, nx) of these coordinates and velocities (n, 2 nv), with the sand as it is in a
+/// simulation.
+#[must_use]
+pub fn with_sand(of: &RoverSimulation, states: &[f64]) -> Vec<f64> {
+    let wheels = of.sand().into_iter().flat_map(|sand| &sand.wheels);
+    let own: Vec<f64> = wheels.flat_map(Differentiator::sand_entries).collect();
+    let rows = states.chunks_exact(2 * of.model().nv());
+    rows.flat_map(|row| row.iter().chain(&own).copied())
+        .collect()
+}
+
 /// What an entry of the command varies, if anything.
 fn command_direction(model: &Model, entry: usize) -> Option<Direction> {
     let wheels = model.wheels();
@@ -352,13 +403,13 @@ fn command_direction(model: &Model, entry: usize) -> Option<Direction> {
 /// Steps of a trajectory with their derivatives. Matrices are row-major, one step after another.
 #[derive(Clone, Debug, Default)]
 pub struct Trajectory {
-    /// States (n + 1, 2 nv).
+    /// States (n + 1, nx).
     pub states: Vec<f64>,
-    /// Derivatives of the next state by the state (n, 2 nv, 2 nv).
+    /// Derivatives of the next state by the state (n, nx, nx).
     pub a: Vec<f64>,
-    /// By the command (n, 2 nv, 2 n_wheels); zero for torques beyond their limit.
+    /// By the command (n, nx, 2 n_wheels); zero for torques beyond their limit.
     pub b: Vec<f64>,
-    /// By the parameters (n, 2 nv, number of parameters).
+    /// By the parameters (n, nx, number of parameters).
     pub c: Vec<f64>,
 }
 
@@ -372,7 +423,7 @@ pub struct TrajectoryError {
 }
 
 impl Differentiator {
-    /// Takes `n` steps, one for each command (n, 2 n_wheels), from a state (2 nv), with the
+    /// Takes `n` steps, one for each command (n, 2 n_wheels), from a state (nx), with the
     /// derivatives of each.
     ///
     /// # Errors
@@ -387,10 +438,10 @@ impl Differentiator {
         parameters: &[StepParameter],
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Trajectory, TrajectoryError> {
-        let (nx, nu) = (2 * self.nv(), 2 * self.n_wheels());
+        let (nx, nu) = (state.len(), 2 * self.n_wheels());
         let refused = |error| TrajectoryError { step: 0, error };
         let model = self.sim.model();
-        (coordinates::from_public(model, &state[..nx / 2]))
+        (coordinates::from_public(model, &state[..model.nv()]))
             .and_then(|q| check_closed(model, &q))
             .map_err(|error| refused(error.into()))?;
         let mut out = Trajectory {
@@ -398,6 +449,7 @@ impl Differentiator {
             ..Trajectory::default()
         };
         let mut state = state.to_vec();
+        self.sand = None;
         for step in 0..n {
             let command = &commands[step * nu..][..nu];
             let taken =
@@ -424,7 +476,7 @@ impl Differentiator {
     }
 }
 
-/// Trajectories of a batch: states (n, 2 nv) and the commands of each (n, steps, 2 n_wheels).
+/// Trajectories of a batch: states (n, nx) and the commands of each (n, steps, 2 n_wheels).
 #[derive(Clone, Copy, Debug)]
 pub struct TrajectoryBatch<'a> {
     /// A row each.
@@ -452,7 +504,7 @@ impl TrajectoryBatch<'_> {
         threads: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Vec<Trajectory>, (usize, TrajectoryError)> {
-        let nx = 2 * of.model().nv();
+        let nx = state_size(of);
         let n = self.states.len() / nx;
         assert_eq!(self.states.len(), n * nx, "one row a trajectory");
         let length = 2 * self.steps * of.model().wheels().len();

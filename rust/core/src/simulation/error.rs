@@ -163,11 +163,19 @@ pub enum LinearisationError {
     /// A step failed.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// The forces of the sand were not found to rounding.
+    #[error(
+        "the forces of the sand at the end of the step were found to {error:.1e} of their size \
+         only, so that the step has no exact derivative; take a shorter time step"
+    )]
+    SandNotSolved {
+        /// What is left, relative to the largest force.
+        error: f64,
+    },
     /// The step is not one solution of the step's equations.
     #[error(
-        "the step was taken in parts, was not solved to its tolerance, was limited, turns so fast \
-         that gyroscopic terms are implicit, or is in soft ground: it has no derivative with fixed \
-         contact modes"
+        "the step was taken in parts, was not solved to its tolerance, was limited, or turns so \
+         fast that gyroscopic terms are implicit: it has no derivative with fixed contact modes"
     )]
     NotHeld,
 }

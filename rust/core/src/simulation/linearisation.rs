@@ -1,5 +1,6 @@
 //! Linearisation of a rover's step: `x⁺ ≈ f(x, u, θ) + A dx + B du + C dθ` with x = (q, v), q the
-//! public coordinates, u = (wheel torques, steering set-points) and θ some [`StepParameter`]s.
+//! public coordinates, u = (wheel torques, steering set-points) and θ some [`StepParameter`]s. On
+//! soft ground x has the state of the sand behind.
 //!
 //! The step is the one that follows [`RoverSimulation::set_state`], without memory of earlier
 //! impulses. The derivatives are those of [`super::differentiator`]. A check on demand takes two
@@ -17,17 +18,17 @@ use crate::integrator::ContactMode;
 /// The derivatives of a step, and how far they hold.
 #[derive(Clone, Debug)]
 pub struct Linearisation {
-    /// A (2 nv, 2 nv).
+    /// A (nx, nx).
     pub a: DMatrix<f64>,
-    /// B (2 nv, 2 n_wheels).
+    /// B (nx, 2 n_wheels).
     pub b: DMatrix<f64>,
-    /// C (2 nv, number of parameters).
+    /// C (nx, number of parameters).
     pub c: DMatrix<f64>,
-    /// The state (2 nv) about which it holds.
+    /// The state (nx) about which it holds.
     pub state: Vec<f64>,
     /// The command (2 n_wheels) about which it holds.
     pub command: Vec<f64>,
-    /// The state (2 nv) after the step.
+    /// The state (nx) after the step.
     pub next_state: Vec<f64>,
     /// What touches in each contact (n_c).
     pub parts: Vec<Part>,

@@ -5,7 +5,8 @@
 //! - [`state`], [`active_contact`]: its state, its contacts; [`any_snapshot`]: what files keep;
 //! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
 //!   [controls](rover_controls), its [contacts](rover_contacts), its [fast steps](fallback), its
-//!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step;
+//!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step by a [`differentiator`],
+//!   with `steps_in_sand` whose forces are exact;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;
@@ -64,12 +65,15 @@ pub mod scene;
 pub mod state;
 pub mod step_parameter;
 pub mod stepping;
+mod steps_in_sand;
 pub mod turns;
 
 pub use active_contact::{ActiveContact, Components, LocatedContact};
 pub use any_snapshot::AnySnapshot;
 pub use batch::Batch;
-pub use differentiator::{Differentiator, Trajectory, TrajectoryBatch, TrajectoryError};
+pub use differentiator::{
+    Differentiator, Trajectory, TrajectoryBatch, TrajectoryError, state_size, with_sand,
+};
 pub use error::{BatchError, CommandError, LinearisationError, SnapshotError};
 pub use grains::{
     BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,

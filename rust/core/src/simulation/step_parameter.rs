@@ -1,6 +1,7 @@
 //! What a step depends on besides state and command, and can be differentiated by.
 
 use crate::multibody::Model;
+use crate::sand::Soil;
 use crate::system::tangent::Direction;
 
 /// A parameter of a step.
@@ -18,12 +19,15 @@ pub enum StepParameter {
     ContactStiffness,
     /// Their damping, as a factor.
     ContactDamping,
+    /// A number of the soil, by its index among [`Soil::numbers_mut`], in its own unit.
+    Soil(usize),
 }
 
 impl StepParameter {
-    /// The parameter of a name; `None` if it is not among [`Self::names`].
+    /// The parameter of a name; `None` if it is not among [`Self::names`]. `soil`: that of the
+    /// ground.
     #[must_use]
-    pub fn named(model: &Model, name: &str) -> Option<Self> {
+    pub fn named(model: &Model, soil: Option<&Soil>, name: &str) -> Option<Self> {
         let body = |name: &str| model.bodies().iter().position(|body| body.name == name);
         match name.split_once(':') {
             None => match name {
@@ -39,24 +43,39 @@ impl StepParameter {
                 let joint = model.joints().iter().position(|joint| joint.body == body);
                 joint.map(Self::Damping)
             }
+            Some(("soil", name)) => {
+                let numbers = numbers_of(soil);
+                (numbers.iter().position(|own| *own == name)).map(Self::Soil)
+            }
             Some(_) => None,
         }
     }
 
-    /// Names of all parameters of a model.
+    /// Names of all parameters of a model on a ground.
     #[must_use]
-    pub fn names(model: &Model) -> Vec<String> {
+    pub fn names(model: &Model, soil: Option<&Soil>) -> Vec<String> {
         let bodies = model.bodies();
         let common = ["friction", "mass", "contact_stiffness", "contact_damping"];
         let masses = bodies.iter().map(|body| format!("mass:{}", body.name));
         let joints = model.joints().iter();
         let dampings = joints.map(|joint| format!("damping:{}", bodies[joint.body].name));
         let common = common.into_iter().map(str::to_owned);
-        common.chain(masses).chain(dampings).collect()
+        let numbers = numbers_of(soil).into_iter();
+        let of_soil = numbers.map(|name| format!("soil:{name}"));
+        common
+            .chain(masses)
+            .chain(dampings)
+            .chain(of_soil)
+            .collect()
     }
 
-    pub(super) fn direction(self) -> Direction {
+    /// The direction of a parameter; `numbers`: those of the soil that steps are held with.
+    pub(super) fn direction(self, soil: Option<&Soil>, numbers: &[usize]) -> Direction {
         match self {
+            Self::Soil(number) => Direction::Soil {
+                index: numbers.iter().position(|own| *own == number).unwrap_or(0),
+                is_memory: numbers_of(soil).get(number) == Some(&"memory"),
+            },
             Self::Friction => Direction::Friction,
             Self::Mass(body) => Direction::Mass(body),
             Self::AllMasses => Direction::AllMasses,
@@ -65,4 +84,13 @@ impl StepParameter {
             Self::ContactDamping => Direction::ContactDamping,
         }
     }
+}
+
+/// Names of the numbers of a soil.
+fn numbers_of(soil: Option<&Soil>) -> Vec<&'static str> {
+    let Some(mut soil) = soil.cloned() else {
+        return Vec::new();
+    };
+    let numbers = soil.numbers_mut();
+    numbers.into_iter().map(|(name, _)| name).collect()
 }

@@ -18,11 +18,14 @@
 //! The sand gives back no more energy than it has taken: [`SandContact::work`] counts what it gives
 //! only up to what is stored, and the energy audit removes the rest from the motion. Sand that has
 //! nothing left to give gives way: its memory, and with it its force, becomes smaller.
+//!
+//! For derivatives a step takes [given](SandContact::give) forces, which are repeated until they
+//! are those at its end (`super::tangent`). M̂ is then that of firm ground.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use super::sand_patch::{Layers, Patch, SandScene, SandStep, depth, each};
 use super::sand_wheel::{LaneWheel, PlacedWheel};
@@ -56,16 +59,20 @@ pub(crate) const MOST_REVISIONS_IN_SAND: usize = 24;
 #[derive(Clone, Debug)]
 pub(crate) struct SandContact<T: Lane> {
     token: T::Token,
-    patches: Vec<Patch<T>>,
-    /// Velocity at which the forces are taken (nv).
-    guess: Vec<T>,
+    pub(super) patches: Vec<Patch<T>>,
+    /// Velocity at which the forces are taken (nv); that of the last trial if they are given.
+    pub(super) guess: Vec<T>,
     /// Soil of each lane; none on firm ground.
     soils: [Option<Arc<Soil>>; MAX_LANES],
     /// Length over which it forgets, m.
     memory: T,
     /// Lanes on soft ground.
     lanes: T::Mask,
-    step: SandStep<T>,
+    pub(super) step: SandStep<T>,
+    /// Whether the forces are [given](Self::give).
+    is_given: bool,
+    /// Whether wheels leave no ruts.
+    pub(super) ruts_stay: bool,
 }
 
 impl<T: Lane> SandContact<T> {
@@ -91,6 +98,22 @@ impl<T: Lane> SandContact<T> {
                 gravity: Vec3::new(zero, zero, zero),
                 length: one,
             },
+            is_given: false,
+            ruts_stay: false,
+        }
+    }
+
+    /// Part of its memory that sand under a wheel keeps.
+    pub(super) fn part_kept(is_empty: bool) -> f64 {
+        if is_empty { GIVES_WAY } else { 1.0 }
+    }
+
+    /// Gives the next steps of a lane the forces and moments of their wheels, none where a wheel
+    /// does not touch the sand; with `None`, steps find them again.
+    pub(super) fn give(&mut self, lane: usize, wrenches: Option<&[Option<Vector6<f64>>]>) {
+        self.is_given = wrenches.is_some();
+        for (patch, wrench) in self.patches.iter_mut().zip(wrenches.into_iter().flatten()) {
+            patch.force.give(lane, wrench.as_ref());
         }
     }
 
@@ -160,6 +183,10 @@ impl<T: Lane> SandContact<T> {
             length: self.memory + gravity.norm() * resolved,
         };
         for patch in &mut self.patches {
+            if self.is_given {
+                patch.place_given(scene, lanes);
+                continue;
+            }
             let lanes = patch.is_stale & lanes;
             if lanes.any() {
                 patch.is_stale = patch.is_stale & !lanes;
@@ -179,7 +206,7 @@ impl<T: Lane> SandContact<T> {
     pub(crate) fn add_to_mass(&mut self, mechanism: &Mechanism, mass: &mut MassMatrix<T>) {
         let h = self.step.h;
         for patch in &mut self.patches {
-            if (patch.force.is_touching & self.lanes).any() {
+            if !self.is_given && (patch.force.is_touching & self.lanes).any() {
                 let (map, tangent) = (&mut patch.map, &patch.force.tangent);
                 T::vectorize(
                     self.token,
@@ -188,6 +215,11 @@ impl<T: Lane> SandContact<T> {
                 );
             }
         }
+    }
+
+    /// Whether the forces are given.
+    pub(super) fn is_given(&self) -> bool {
+        self.is_given
     }
 
     /// Adds the impulse over a step of h that ends with the velocity `v`.
@@ -211,6 +243,9 @@ impl<T: Lane> SandContact<T> {
         v_end: &[T],
     ) -> T::Mask {
         let mut is_new = T::mask(self.token, 0);
+        if self.is_given {
+            return is_new;
+        }
         for patch in &mut self.patches {
             let lanes = lanes & self.lanes;
             is_new = is_new | patch.revise(&self.step, scene, lanes, factor, v_end);
@@ -221,6 +256,9 @@ impl<T: Lane> SandContact<T> {
     /// Work of the sand on the machines over a step between two velocities, J.
     pub(crate) fn work(&mut self, layers: &Layers<'_>, v: &[T], v_end: &[T]) -> T {
         let mut total = T::splat(self.token, 0.0);
+        if self.is_given {
+            self.guess.copy_from_slice(v_end);
+        }
         for patch in &mut self.patches {
             let (step, lanes) = (&self.step, self.lanes);
             let twist = T::vectorize(
@@ -253,6 +291,9 @@ impl<T: Lane> SandContact<T> {
 
     /// Notes in the ruts of some lanes where wheels are that have moved.
     pub(crate) fn note(&mut self, layers: &Layers<'_>, lanes: T::Mask, ruts: &mut [RutMap]) {
+        if self.ruts_stay {
+            return;
+        }
         for (w, patch) in self.patches.iter_mut().enumerate() {
             for lane in each(lanes & self.lanes) {
                 if let Some(layer) = &layers[lane] {
@@ -265,7 +306,7 @@ impl<T: Lane> SandContact<T> {
 
 impl<T: Lane> Patch<T> {
     /// Depth of the lowest point at the end of a trial, m.
-    fn sinkage(&self, layers: &Layers<'_>, lanes: T::Mask) -> T {
+    pub(super) fn sinkage(&self, layers: &Layers<'_>, lanes: T::Mask) -> T {
         let radius = self.wheel.shape.radius;
         let mut sinkage = self.begin.sinkage;
         for lane in each(lanes) {

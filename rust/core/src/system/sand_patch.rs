@@ -96,12 +96,9 @@ pub(super) struct SandStep<T> {
 #[derive(Clone, Debug)]
 pub(super) struct Patch<T: Lane> {
     pub(super) wheel: PlacedWheel,
-    tree: usize,
     /// Where its points lie, by lane.
     pub(super) rules: [Option<Arc<Rules>>; MAX_LANES],
     pub(super) map: TwistMap<T>,
-    /// Motions of the joints that move it.
-    motions: Vec<usize>,
     pub(super) pose: LanePose<T>,
     /// The pose at the end of the last trial.
     pub(super) end: LanePose<T>,
@@ -127,14 +124,11 @@ impl<T: Lane> Patch<T> {
             TwistMap::new(token, mechanism, wheel.body),
             T::mask(token, 0),
         );
-        let movers = mechanism.movers(wheel.body);
         Self {
-            tree: mechanism.tree_of_body(wheel.body),
             wheel,
             rules: std::array::from_fn(|_| None),
             rows: vec![[T::splat(token, 0.0); SIX]; map.path.len()],
             map,
-            motions: movers.iter().map(|mover| mover.motion).collect(),
             pose: LanePose::new(token),
             end: LanePose::new(token),
             force: TangentForce::new(token),
@@ -155,16 +149,16 @@ impl<T: Lane> Patch<T> {
     /// Puts the wheel where the step evaluates its forces.
     #[inline(always)]
     fn place(&mut self, poses: &Poses<T>) {
-        let pose = &poses.bodies[self.wheel.body];
-        let arm = pose.r + pose.R.times_shared(self.wheel.centre);
-        self.map.arm = arm;
-        self.pose = LanePose {
-            centre: poses.origin_of(self.tree) + arm,
-            axle: pose.R.times_shared(self.wheel.axle),
-        };
-        for (column, &motion) in self.map.columns.iter_mut().zip(&self.motions) {
-            let motion = &poses.motions[motion];
-            *column = six::join(motion.velocity_at(arm), motion.axis);
+        self.pose = self.map.place(&self.wheel, poses);
+    }
+
+    /// Puts the wheel there in a step with given forces.
+    pub(super) fn place_given(&mut self, scene: &SandScene<'_, T>, lanes: T::Mask) {
+        self.place(scene.poses);
+        for lane in each(lanes) {
+            if let Some(ground) = scene.ground(lane) {
+                self.read_ruts(lane, &ground);
+            }
         }
     }
 
@@ -213,24 +207,13 @@ impl<T: Lane> Patch<T> {
         ground: &LaneGround<'_>,
         at: &Vector6<f64>,
     ) -> Evaluated {
-        let lag = step.theta * step.h;
-        let pose = self.pose.get(lane);
-        let pose = LanePose::<f64> {
-            centre: pose.centre.into(),
-            axle: pose.axle.into(),
-        };
-        let twist: Six<f64> = (*at).into();
-        let end = pose.moved(&twist, lag).get(0);
-        let memory = six::get(&self.begin.memory, lane).into();
-        let times = (step.h, step.length.get(lane));
-        let (memory, fresh) = after_step::<f64>(&memory, &twist, self.shape().drum(), times);
+        let (end, memory, fresh) = self.ended(step, lane, at);
         // A memory that fades as a whole hardly changes the force.
         let want = Derivatives::Slopes {
             by_memory: fresh,
-            by_pose: lag,
+            by_pose: step.theta * step.h,
         };
         let gravity = Vector3::from(step.gravity.get(lane));
-        let memory = Memory::of(&memory.into());
         let found = self.react(lane, (ground, &gravity), &end, &memory, want);
         let found = found.filter(|found| found.is_touching);
         Evaluated {
@@ -239,6 +222,27 @@ impl<T: Lane> Patch<T> {
             force: found.map_or_else(Vector6::zeros, |found| found.wrench),
             slope: found.map_or_else(Matrix6::zeros, |found| found.slope),
         }
+    }
+
+    /// Pose and memory at the end of a step with a twist in a lane, and the multiple of the
+    /// identity in the derivative of the memory by the twist, s/m.
+    pub(super) fn ended(
+        &self,
+        step: &SandStep<T>,
+        lane: usize,
+        twist: &Vector6<f64>,
+    ) -> (WheelPose, Memory, f64) {
+        let pose = self.pose.get(lane);
+        let pose = LanePose::<f64> {
+            centre: pose.centre.into(),
+            axle: pose.axle.into(),
+        };
+        let twist: Six<f64> = (*twist).into();
+        let end = pose.moved(&twist, step.theta * step.h).get(0);
+        let memory = six::get(&self.begin.memory, lane).into();
+        let times = (step.h, step.length.get(lane));
+        let (memory, fresh) = after_step::<f64>(&memory, &twist, self.shape().drum(), times);
+        (end, Memory::of(&memory.into()), fresh)
     }
 
     /// Compares the linearised force at a solution with the force there, in some lanes. Where they
@@ -400,7 +404,8 @@ impl<T: Lane> Patch<T> {
         self.rutted = self.rutted & !(1 << lane) | u32::from(is_rutted) << lane;
     }
 
-    fn react(
+    /// The reaction of the sand under a lane; none where there is no ground.
+    pub(super) fn react(
         &self,
         lane: usize,
         (place, gravity): (&LaneGround<'_>, &Vector3<f64>),

@@ -9,8 +9,9 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::sand_wheel::{LanePose, PlacedWheel};
 use super::six::{self, SIX, Six, Square, dot, minus, plus, scaled, times};
-use crate::multibody::{MassMatrix, Mechanism};
+use crate::multibody::{MassMatrix, Mechanism, Poses};
 use crate::scalar::{Lane, LaneMask, Vec3};
 
 /// Twist, m/s, below which two points are the same: a secant between them would be noise.
@@ -104,6 +105,15 @@ impl<T: Lane> TangentForce<T> {
             .chain(&mut self.tangent)
         {
             six::set(column, lane, &Vector6::zeros());
+        }
+    }
+
+    /// A force that does not depend on the twist; none where the sand is not touched.
+    pub(super) fn give(&mut self, lane: usize, wrench: Option<&Vector6<f64>>) {
+        self.clear(lane);
+        if let Some(wrench) = wrench {
+            six::set(&mut self.force, lane, wrench);
+            self.is_touching = self.is_touching | T::mask(self.at[0].token(), 1 << lane);
         }
     }
 
@@ -231,6 +241,9 @@ fn dissipative<T: Lane>(slope: &Square<T>, arm: f64) -> Square<T> {
 pub(super) struct TwistMap<T: Lane> {
     /// The velocities.
     pub(super) path: Vec<usize>,
+    /// The tree of the wheel, and the motions of the joints that move it.
+    tree: usize,
+    motions: Vec<usize>,
     /// Number of those of the base: 6 or 0.
     lead: usize,
     /// From the origin of the tree to the wheel's centre, m.
@@ -247,14 +260,33 @@ impl<T: Lane> TwistMap<T> {
     pub(super) fn new(token: T::Token, mechanism: &Mechanism, body: usize) -> Self {
         let zero = T::splat(token, 0.0);
         let path = mechanism.path(body).to_vec();
-        let lead = path.len() - mechanism.movers(body).len();
+        let movers = mechanism.movers(body);
+        let lead = path.len() - movers.len();
         Self {
             lead,
+            tree: mechanism.tree_of_body(body),
+            motions: movers.iter().map(|mover| mover.motion).collect(),
             arm: Vec3::new(zero, zero, zero),
             columns: vec![[zero; SIX]; path.len() - lead],
             stiff: vec![[zero; SIX]; path.len()],
             on_base: vec![[zero; SIX]; path.len()],
             path,
+        }
+    }
+
+    /// Takes over the poses of the bodies, and returns that of the wheel.
+    #[inline(always)]
+    pub(super) fn place(&mut self, wheel: &PlacedWheel, poses: &Poses<T>) -> LanePose<T> {
+        let pose = &poses.bodies[wheel.body];
+        let arm = pose.r + pose.R.times_shared(wheel.centre);
+        self.arm = arm;
+        for (column, &motion) in self.columns.iter_mut().zip(&self.motions) {
+            let motion = &poses.motions[motion];
+            *column = six::join(motion.velocity_at(arm), motion.axis);
+        }
+        LanePose {
+            centre: poses.origin_of(self.tree) + arm,
+            axle: pose.R.times_shared(wheel.axle),
         }
     }
 

@@ -75,7 +75,9 @@ impl TreeSystem<'_> {
 
 impl TreeSystem<'_> {
     /// The sand with its ground and poses, and the factor of M̂.
-    fn sand(&mut self) -> Option<(&mut SandContact<f64>, SandScene<'_, f64>, &Factor<f64>)> {
+    pub(super) fn sand(
+        &mut self,
+    ) -> Option<(&mut SandContact<f64>, SandScene<'_, f64>, &Factor<f64>)> {
         (self.parts).sand(self.model, self.terrain.soft(), self.ruts)
     }
 
@@ -119,7 +121,7 @@ impl TreeSystem<'_> {
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let velocities = [start.v, v_end];
         (self.parts.drives).add_impulse(mechanism, step(options), places, velocities, y);
-        self.parts.add_sand(options.time_step, v_end, y);
+        self.parts.add_sand(options.time_step, v_end, y, false);
         for (y, force) in y.iter_mut().zip(&self.parts.applied) {
             *y += options.time_step * force;
         }
@@ -333,6 +335,11 @@ impl MechanicalSystem for TreeSystem<'_> {
         self.load_with_bias(options, start, Some(v_mean), y);
     }
 
+    fn add_given(&self, options: &StepOptions, impulse: &mut [f64]) {
+        // Given forces are the same at any velocity.
+        (self.parts).add_sand(options.time_step, &self.parts.force, impulse, true);
+    }
+
     #[inline]
     fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
         Turning::of(0.0, self.model.mechanism(), v).is_gyroscopic(options.time_step)
@@ -417,6 +424,9 @@ impl MechanicalSystem for TreeSystem<'_> {
         q: &Configuration,
         v: &[f64],
     ) -> Option<MechanicalEnergy> {
+        if self.parts.has_given_sand() {
+            return None;
+        }
         let TreeScratch {
             q: lane,
             energy: scratch,

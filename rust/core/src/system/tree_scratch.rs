@@ -111,11 +111,21 @@ impl TreeScratch {
         sand.load(0, Some((ground, state)));
     }
 
-    /// Adds the impulse of the sand over a step of h that ends with the velocity `v`.
-    pub(super) fn add_sand(&self, h: f64, v: &[f64], y: &mut [f64]) {
-        if let Some(sand) = &self.sand {
+    /// Adds the impulse of the sand over a step of h that ends with the velocity `v`; `is_given`:
+    /// only if its forces are given, or only if not.
+    pub(super) fn add_sand(&self, h: f64, v: &[f64], y: &mut [f64], is_given: bool) {
+        if let Some(sand) = self
+            .sand
+            .as_ref()
+            .filter(|sand| sand.is_given() == is_given)
+        {
             sand.add_impulse(h, v, y);
         }
+    }
+
+    /// Whether the forces of the sand are given.
+    pub(super) fn has_given_sand(&self) -> bool {
+        self.sand.as_ref().is_some_and(|sand| sand.is_given())
     }
 
     /// Writes the sand at the end of a step.

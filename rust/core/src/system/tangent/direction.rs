@@ -2,8 +2,10 @@
 
 use super::held_tree::TangentScene;
 use super::scratch::Tangent;
+use super::varying_sand::VaryingSand;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Dual, Lane};
+use crate::system::sand_wheel::PlacedWheel;
 
 /// A direction in which a step is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +30,11 @@ pub(crate) enum Direction {
     Stiffness,
     /// Their damping, relative.
     ContactDamping,
+    /// An entry of the state of the sand at a wheel: of its memory, or its energy.
+    Sand(usize, usize),
+    /// A number of the soil, of those that the step was held with; `is_memory`: the length over
+    /// which the sand forgets.
+    Soil { index: usize, is_memory: bool },
 }
 
 impl Direction {
@@ -59,6 +66,9 @@ impl<T: Lane> Tangent<T> {
         }
         self.drives.clone_from(&self.own_drives);
         (self.d_mu, self.d_stiffness, self.d_damping) = (zero, zero, zero);
+        if let (Some(sand), Some(held)) = (&mut self.sand, &scene.held.sand) {
+            sand.reset(held);
+        }
         for (lane, direction) in directions.iter().enumerate() {
             let one = unit::<T>(token, lane, 1.0);
             let varying = Dual::new(zero, one);
@@ -96,11 +106,35 @@ impl<T: Lane> Tangent<T> {
                 Direction::Damping(joint) => self.drives.add_damping(joint, varying),
                 Direction::Stiffness => self.d_stiffness += one,
                 Direction::ContactDamping => self.d_damping += one,
+                Direction::Sand(wheel, entry) => {
+                    if let Some(sand) = &mut self.sand {
+                        let wheel = &mut sand.wheels[wheel];
+                        let own = wheel.memory.get_mut(entry).unwrap_or(&mut wheel.stored);
+                        own.slope += one;
+                    }
+                }
+                Direction::Soil { index, is_memory } => {
+                    self.vary_soil(scene, (index, is_memory), one);
+                }
             }
             self.varies_inertias |= direction.is_of_inertias();
         }
         (self.start).set_moved(mechanism, &self.base, &self.moved, 1.0);
         self.close_start(scene);
+    }
+
+    fn vary_soil(&mut self, scene: &TangentScene<'_>, (index, is_memory): (usize, bool), one: T) {
+        let (Some(sand), Some(held)) = (&mut self.sand, &scene.held.sand) else {
+            return;
+        };
+        for (wheel, held) in sand.wheels.iter_mut().zip(&held.wheels) {
+            for (own, x) in wheel.by_soil.iter_mut().zip(held.by_soil[index]) {
+                *own += one * one.like(x);
+            }
+        }
+        if is_memory {
+            sand.length.slope += one;
+        }
     }
 
     /// The inertias of the machine in all lanes.
@@ -118,10 +152,15 @@ impl<T: Lane> Tangent<T> {
             }
         };
         of(&mut self.base);
+        let token = self.token;
         for lane in 0..T::LANES {
             (self.own_drives).set_lane(lane, scene.model.joints(), scene.command);
         }
         self.own_drives.finish_loading();
+        if scene.held.sand.is_some() && self.sand.is_none() {
+            let wheels = scene.model.wheels().iter().map(PlacedWheel::of);
+            self.sand = Some(VaryingSand::new(token, scene.model.mechanism(), wheels));
+        }
         self.reset_inertias(scene);
         self.varies_inertias = false;
     }

@@ -1,5 +1,8 @@
 //! What a step of a tree held, and how its contacts change with the poses.
 
+use std::sync::Arc;
+
+use super::held_sand::HeldSand;
 use crate::contact::contact_slope::ContactSlope;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
@@ -17,6 +20,8 @@ pub(crate) struct HeldTree {
     /// One a contact.
     pub(super) contacts: Vec<HeldContact>,
     pub(super) factor: Factor<f64>,
+    /// On soft ground.
+    pub(crate) sand: Option<Arc<HeldSand>>,
 }
 
 /// What a contact is besides its place.
@@ -43,20 +48,22 @@ pub(crate) struct TangentScene<'a> {
 
 impl TreeSystem<'_> {
     /// What the step from `start` held that was just taken with the scratch `ws`, without memory.
-    /// None if it has no derivative: it was not solved, or not projected by the law.
+    /// None if it has no derivative: it was not solved, or not projected by the law. `numbers`:
+    /// indices of numbers of the soil.
     pub(crate) fn hold(
         &mut self,
         options: &StepOptions,
         start: Start<'_, Configuration>,
         ws: &ScratchOf<Self>,
+        numbers: &[usize],
     ) -> Option<HeldTree> {
         let (model, terrain): (&Model, &dyn Terrain) = (self.model, self.terrain);
-        let is_common = |contact: &Contact| {
-            contact.key.opposite != Opposite::Stop
-                && (options.materials.is_empty()
-                    || (contact.between_materials(model, terrain, &options.materials)).is_none())
-        };
-        let step = HeldStep::of(&*self, options, ws, is_common)?;
+        let step = self.hold_step(options, ws)?;
+        let is_soft = terrain.soft().is_some();
+        let sand = self.hold_sand(options, &step, numbers);
+        if sand.is_none() && is_soft {
+            return None;
+        }
         let mut q = start.configuration.clone();
         self.advance(&mut q, start.v, options.time_step);
         self.place_end(&q);
@@ -77,6 +84,22 @@ impl TreeSystem<'_> {
             contacts: contacts.collect(),
             factor: self.parts.factor.clone(),
             step,
+            sand: sand.map(Arc::new),
         })
+    }
+
+    /// The contacts of that step.
+    pub(crate) fn hold_step(
+        &self,
+        options: &StepOptions,
+        ws: &ScratchOf<Self>,
+    ) -> Option<HeldStep<Contact>> {
+        let is_common = |contact: &Contact| {
+            let pairs = &options.materials;
+            contact.key.opposite != Opposite::Stop
+                && (pairs.is_empty()
+                    || (contact.between_materials(self.model, self.terrain, pairs)).is_none())
+        };
+        HeldStep::of(self, options, ws, is_common)
     }
 }

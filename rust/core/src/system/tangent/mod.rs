@@ -20,17 +20,29 @@
 //! Closed loops are differentiated by the sources that close them, with a factor of M̂ for each
 //! direction: the start as `set_state` closes it, the mean velocity, and the end.
 //!
-//! - `direction`: what varies; `held_tree`: what a step held; `contacts`: their places and
-//!   velocities; `closed_loops`; `scratch`, `pass`: one pass, a direction a lane.
+//! The force of sand on a wheel depends on the velocity at the end of the step. With dF at a held
+//! velocity `v⁺` the sources above give dv⁺, and the change that follows from it is added:
+//!
+//! ```text
+//! F = f(J v⁺, m)        dF = df + z,   z = D J (dv⁺ + R z)       held_sand
+//! ```
+//!
+//! - `direction`: what varies; `held_tree`, `held_sand`: what a step held; `contacts`: their places
+//!   and velocities; `closed_loops`; `varying_sand`, `sand`: wheels in sand; `scratch`, `pass`:
+//!   one pass, a direction a lane.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod closed_loops;
 mod contacts;
 mod direction;
+mod held_sand;
 mod held_tree;
 mod pass;
+mod sand;
 mod scratch;
+mod varying_sand;
 
 pub(crate) use direction::Direction;
+pub(crate) use held_sand::{HeldSand, OF_WHEEL, SandError};
 pub(crate) use held_tree::{HeldTree, TangentScene};
 pub(crate) use scratch::Tangent;

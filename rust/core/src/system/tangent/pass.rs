@@ -3,6 +3,7 @@
 use super::direction::Direction;
 use super::held_tree::TangentScene;
 use super::scratch::{Correction, Tangent};
+use super::varying_sand::VaryingSand;
 use crate::integrator::held_step::SAME;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::multibody::Configuration;
@@ -15,8 +16,8 @@ const ROUNDING: f64 = 1e-13;
 
 impl<T: Lane> Tangent<T> {
     /// Calls `take` with the number of each direction and its derivatives of the configuration's
-    /// motion and of the velocity at the end (nv each). False if the step is not the one that the
-    /// held equations describe; `end` then is of no use.
+    /// motion and of the velocity at the end (nv each), and of the state of the sand (7 n). False
+    /// if the step is not the one that the held equations describe; `end` then is of no use.
     pub(crate) fn differentiate(
         &mut self,
         scene: &TangentScene<'_>,
@@ -27,7 +28,7 @@ impl<T: Lane> Tangent<T> {
         let nv = scene.model.nv();
         self.load(scene);
         self.factor.spread(self.token, &scene.held.factor);
-        let mut columns = vec![vec![0.0; 2 * nv]; T::LANES];
+        let mut columns = vec![vec![0.0; 2 * nv + Self::n_of_sand(scene)]; T::LANES];
         let (mut motion, mut numbers) = (vec![T::splat(self.token, 0.0); nv], [0.0; 8]);
         for (group, directions) in directions.chunks(T::LANES).enumerate() {
             self.seed(scene, directions);
@@ -41,7 +42,9 @@ impl<T: Lane> Tangent<T> {
             }
             self.reached.slope(scene.model.mechanism(), &mut motion);
             let slopes = self.v_end.iter().map(|v| v.slope);
-            for (k, slope) in motion.iter().copied().chain(slopes).enumerate() {
+            let of_sand = self.sand.iter().flat_map(VaryingSand::ends);
+            let all = motion.iter().copied().chain(slopes).chain(of_sand);
+            for (k, slope) in all.enumerate() {
                 slope.store(&mut numbers[..T::LANES]);
                 for (column, x) in columns.iter_mut().zip(numbers) {
                     column[k] = x;
@@ -215,7 +218,20 @@ impl<T: Lane> Tangent<T> {
         for (i, p) in step.law.p.chunks_exact(3).enumerate() {
             self.push(scene, i, [p[0], p[1], p[2]]);
         }
+        self.push_sand(scene);
         self.solve(scene, true);
+        self.answer(scene);
+        if self.yield_sand(scene) {
+            self.answer(scene);
+        }
+        self.displace(scene);
+        self.recall_sand(scene);
+    }
+
+    /// The velocity at the end, from its change `y` at held impulses.
+    #[inline(always)]
+    fn answer(&mut self, scene: &TangentScene<'_>) {
+        let step = &scene.held.step;
         for ((end, v), change) in self.v_end.iter_mut().zip(&self.v).zip(&self.y) {
             *end = *v + *change;
         }
@@ -235,7 +251,6 @@ impl<T: Lane> Tangent<T> {
                 end.slope = along(row, &self.dp, end.slope);
             }
         }
-        self.displace(scene);
     }
 
     /// Derivative of a contact's shifted velocity at held impulses.
@@ -425,7 +440,7 @@ impl<T: Lane> Tangent<T> {
 
 /// `sum + row · x`.
 #[inline(always)]
-fn along<T: Lane>(row: &[f64], x: &[T], mut sum: T) -> T {
+pub(super) fn along<T: Lane>(row: &[f64], x: &[T], mut sum: T) -> T {
     for (a, x) in row.iter().zip(x) {
         sum += x.like(*a) * *x;
     }

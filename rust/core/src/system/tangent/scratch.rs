@@ -1,5 +1,6 @@
 //! Scratch of passes over a step.
 
+use super::varying_sand::VaryingSand;
 use crate::contact::rows::Place;
 use crate::multibody::bias::BiasScratch;
 use crate::multibody::{
@@ -66,6 +67,8 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) correction: Correction,
     /// Of a machine with closed loops.
     pub(super) loops: Option<VaryingLoops<T>>,
+    /// Of a machine on soft ground.
+    pub(super) sand: Option<VaryingSand<T>>,
 }
 
 /// Closed loops with their derivatives, and the factor of M̂ with its own.
@@ -120,6 +123,7 @@ impl<T: Lane> Tangent<T> {
                 loops,
                 factor: Factor::new(token, mechanism),
             }),
+            sand: None,
         }
     }
 }
