@@ -51,6 +51,7 @@
 
 pub mod admission;
 mod by_lane;
+mod clusters;
 mod contact_plane;
 pub mod contacts;
 mod dry_equations;

@@ -71,7 +71,8 @@ pub struct ContactProblem {
 pub struct Factored {
     /// The machine's.
     pub pattern: Option<Arc<Pattern>>,
-    /// Slots with a contact, in the order of the contacts.
+    /// Slots with a contact, in the order of the contacts. Where the pattern is whole, contacts have
+    /// the first ones.
     pub slots: u32,
     /// Z along the path of each contact: `Z[contact * stride + k]`, kg^(-1/2).
     pub Z: Vec<Triple<f64>>,
@@ -90,6 +91,12 @@ impl Factored {
     pub fn contact_at(&self, slot: usize) -> Option<usize> {
         let is_used = self.slots >> slot & 1 == 1;
         is_used.then(|| (self.slots & ((1 << slot) - 1)).count_ones() as usize)
+    }
+
+    /// Numbers of a contact's Z, and whether they are those of all velocities.
+    #[inline(always)]
+    pub(super) fn shape(&self) -> (usize, bool) {
+        (self.pattern.as_deref()).map_or((0, false), |own| (own.stride(), own.is_whole()))
     }
 
     /// Entry of W, 1/kg.
