@@ -107,6 +107,11 @@ impl Clusters {
         self.of_tree[tree]
     }
 
+    /// Number of trees of one.
+    pub(super) fn n_trees(&self, cluster: usize) -> usize {
+        self.of_tree.iter().filter(|own| **own == cluster).count()
+    }
+
     /// Number of velocities of one.
     pub(super) fn nv(&self, cluster: usize) -> usize {
         self.velocities[cluster].len()

@@ -28,7 +28,7 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
-use super::problem::{ContactProblem, MAX_CONTACTS};
+use super::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
 use crate::geometry::query::sweep::DEEP;
@@ -158,6 +158,9 @@ struct InCluster {
     /// Most contacts of a problem with the whole operator, dry joints among them.
     most_dense: usize,
     n_dry: usize,
+    /// Whether wheels are thin and rigid, and whether loops tie several trees.
+    has_rigid_discs: bool,
+    is_tied: bool,
     /// The cluster whose list has its contacts, in each lane.
     leader: [u8; MAX_LANES],
     /// Number of its velocities, and those of the clusters before it in that list.
@@ -333,10 +336,10 @@ impl<T: Lane> Contacts<T> {
         )
     }
 
-    /// Whether a slot is for contacts between bodies.
+    /// The cluster of a slot that is not for contacts between bodies.
     #[inline(always)]
-    pub(super) fn is_of_pairs(&self, slot: usize) -> bool {
-        self.cluster_of[slot].is_none()
+    pub(super) fn cluster_of(&self, slot: usize) -> Option<usize> {
+        self.cluster_of[slot]
     }
 
     /// Number of the clusters.
@@ -378,6 +381,24 @@ impl<T: Lane> Contacts<T> {
         let (leader, lane) = (problem / T::LANES, problem % T::LANES);
         let own = &self.clusters[cluster];
         (usize::from(own.leader[lane]) == leader).then(|| own.first_column[lane].into())
+    }
+
+    /// Whether a problem with factors is solved with the operator that they give: that of rigid
+    /// discs that push or tow each other.
+    #[inline(always)]
+    pub(super) fn is_multiplied(&self, problem: usize) -> bool {
+        let fits = self.lists[problem].n <= MAX_LARGE;
+        let is_of_discs = |own: usize| self.clusters[own].has_rigid_discs;
+        let has_lines = |own: usize| self.clusters[own].most_dense == 0;
+        match self.members(problem) {
+            None => {
+                fits && self.clusters[problem / T::LANES].is_tied && is_of_discs(problem / T::LANES)
+            }
+            Some(mut members) => {
+                let mut all = self.members(problem).into_iter().flatten();
+                fits && members.any(is_of_discs) && !all.any(has_lines)
+            }
+        }
     }
 
     /// Number of dry joints in a problem.
@@ -1225,6 +1246,8 @@ impl InCluster {
         Self {
             most_dense: machine.most_dense(cluster),
             n_dry: machine.n_dry(cluster),
+            has_rigid_discs: machine.has_rigid_discs(cluster),
+            is_tied: machine.clusters.n_trees(cluster) > 1,
             leader: [small(cluster); MAX_LANES],
             nv: u16::try_from(machine.clusters.nv(cluster)).unwrap_or(u16::MAX),
             first_column: [0; MAX_LANES],

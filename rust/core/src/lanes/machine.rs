@@ -199,6 +199,13 @@ impl Machine {
         self.rubbing.iter().filter(of).count()
     }
 
+    /// Whether wheels of a cluster are rigid, and none touches a plane at two points.
+    pub(super) fn has_rigid_discs(&self, cluster: usize) -> bool {
+        let is_rigid = |wheel: &WheelDisc| wheel.compliance.is_none();
+        let has_lines = |wheel: &WheelDisc| wheel.n_circles() > 1;
+        self.wheels_of(cluster).any(is_rigid) && !self.wheels_of(cluster).any(has_lines)
+    }
+
     fn wheels_of(&self, cluster: usize) -> impl Iterator<Item = &WheelDisc> {
         (self.wheels.iter()).filter(move |wheel| self.cluster_of(wheel.body) == cluster)
     }

@@ -14,9 +14,9 @@
 //!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
 //! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield; [`pattern`]: which
 //!   velocities a contact moves;
-//! - [`problem`]: a rover's friction-contact problem; [`queue`], `lane_solver`, `sweeps`: how the
+//! - `clusters`: which trees have a problem of their own; [`problem`]: a friction-contact problem; [`queue`], `lane_solver`, `sweeps`: how the
 //!   problems of many are solved, by [`crate::solver`]'s pivoting; `system`, `equations`,
-//!   `dry_equations`, `velocity_equations`, `tree_matrix`: its linear systems;
+//!   `dry_equations`, `large_equations`, `velocity_equations`, `tree_matrix`: its linear systems;
 //! - [`step`]: the step. The dynamics of the tree are those of [`crate::multibody`], its drives
 //!   those of [`crate::system`].
 //!
@@ -63,6 +63,7 @@ mod joint_slots;
 mod lane_detection;
 pub mod lane_rover;
 mod lane_solver;
+mod large_equations;
 pub mod machine;
 mod parts;
 pub mod pattern;

@@ -15,6 +15,9 @@ pub const MAX_DENSE: usize = 8;
 /// See above.
 pub const MAX_DRY: usize = 10;
 
+/// Most contacts of a problem with factors that is solved with the operator that they give.
+pub const MAX_LARGE: usize = 24;
+
 /// Most unknowns.
 pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 
@@ -80,6 +83,9 @@ pub struct Factored {
     pub diagonal: Vec<[f64; 9]>,
     /// Diagonal of D by contact, 1/kg.
     pub softness: Vec<f64>,
+    /// Whether it is solved with the operator itself: at most [`MAX_LARGE`] contacts, of a pattern
+    /// that has all entries.
+    pub is_multiplied: bool,
     /// What it has more along a normal that nothing moves, 1/kg: that of a joint's dry friction.
     pub normal: Vec<f64>,
 }
@@ -133,6 +139,7 @@ impl Factored {
     fn copy_from(&mut self, other: &Self) {
         self.pattern.clone_from(&other.pattern);
         self.slots = other.slots;
+        self.is_multiplied = other.is_multiplied;
         self.Z.clone_from(&other.Z);
         self.diagonal.clone_from(&other.diagonal);
         self.softness.clone_from(&other.softness);

@@ -11,7 +11,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, ProblemSource};
+use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, LargeSolver, ProblemSource};
 use super::pattern::Pattern;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::problem::Residual;
@@ -71,6 +71,7 @@ pub struct Queue<T: Lane> {
     few: Box<DenseSolver<T, FEW>>,
     many: Box<DenseSolver<T, MAX_DENSE>>,
     dry: Box<DrySolver<T>>,
+    large: Option<Box<LargeSolver<T>>>,
     /// Those of problems with factors, by pattern.
     factored: Vec<(Arc<Pattern>, Box<FactoredSolver<T>>)>,
     /// Problems that wait for a lane of each: [`Kind::index`].
@@ -84,6 +85,7 @@ enum Kind {
     Few,
     Many,
     Dry,
+    Large,
     /// That of a pattern, by its place.
     Factored(usize),
 }
@@ -107,7 +109,8 @@ impl Kind {
             Self::Few => 0,
             Self::Many => 1,
             Self::Dry => 2,
-            Self::Factored(place) => 3 + place,
+            Self::Large => 3,
+            Self::Factored(place) => 4 + place,
         }
     }
 }
@@ -167,6 +170,7 @@ impl<T: Lane> Queue<T> {
             few: Box::new(DenseSolver::new(token)),
             many: Box::new(DenseSolver::new(token)),
             dry: Box::new(DrySolver::new(token)),
+            large: None,
             factored: Vec::new(),
             waiting: vec![VecDeque::new(); Kind::Factored(0).index()],
             groups: Groups::default(),
@@ -178,6 +182,9 @@ impl<T: Lane> Queue<T> {
         self.few.clear();
         self.many.clear();
         self.dry.clear();
+        if let Some(large) = &mut self.large {
+            large.clear();
+        }
         self.waiting.iter_mut().for_each(VecDeque::clear);
         if self.factored.len() > MOST_PATTERNS {
             self.factored.clear();
@@ -215,6 +222,7 @@ impl<T: Lane> Queue<T> {
             problem.begin();
             if !problem.is_solved {
                 let kind = match &problem.factored.pattern {
+                    Some(_) if problem.factored.is_multiplied => Kind::Large,
                     Some(pattern) => self.kind_of(pattern),
                     None => Kind::of_dense(problem),
                 };
@@ -251,9 +259,11 @@ impl<T: Lane> Queue<T> {
         loop {
             let waiting = |kind: Kind| self.waiting[kind.index()].len();
             let factored = self.factored.iter().enumerate();
+            let n_large = self.large.as_ref().map_or(0, |large| large.n_active());
             let others = [
                 (Kind::Many, self.many.n_active()),
                 (Kind::Dry, self.dry.n_active()),
+                (Kind::Large, n_large),
             ];
             let others = (others.into_iter()).chain(
                 factored.map(|(place, (_, solver))| (Kind::Factored(place), solver.n_active())),
@@ -309,6 +319,16 @@ impl<T: Lane> Queue<T> {
                 #[inline(always)]
                 || (self.dry).run(token, problems, tolerances, &mut line),
             ),
+            Kind::Large => {
+                let large = self
+                    .large
+                    .get_or_insert_with(|| Box::new(LargeSolver::new(token)));
+                T::vectorize(
+                    token,
+                    #[inline(always)]
+                    || large.run(token, problems, tolerances, &mut line),
+                );
+            }
             Kind::Factored(place) => T::vectorize(
                 token,
                 #[inline(always)]

@@ -417,6 +417,9 @@ impl<T: Lane> Rows<T> {
     ) {
         let zero = T::splat(self.token, 0.0);
         out.fill(zero);
+        // Force and moment on a root; the slots of a tree follow each other, mostly.
+        let mut tree = 0;
+        let mut sums = [zero; BASE];
         let mut guests = 0;
         for &slot in contacts.used_by_shapes() {
             let own = contacts.slot(slot);
@@ -427,14 +430,21 @@ impl<T: Lane> Rows<T> {
             let [force, moment] = place_of(own).wrench(p[slot]);
             let Path { base, movers } = self.path(contacts.part(slot));
             let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-            for (out, x) in out[base.unwrap_or(0)..].iter_mut().zip(both) {
-                add(here, out, x);
+            let base = base.unwrap_or(0);
+            if base != tree {
+                out[tree..][..BASE].copy_from_slice(&sums);
+                sums.copy_from_slice(&out[base..][..BASE]);
+                tree = base;
+            }
+            for k in 0..BASE {
+                add(here, &mut sums[k], both[k]);
             }
             for mover in movers {
                 let power = end.motions[mover.motion].power(force, moment);
                 add(here, &mut out[mover.velocity], power);
             }
         }
+        out[tree..][..BASE].copy_from_slice(&sums);
         if (lanes & T::mask(self.token, guests)).any() {
             add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
@@ -475,6 +485,7 @@ impl<T: Lane> Rows<T> {
                     if problem.n_contacts > 0 && contacts.is_factored(index) {
                         problem.factored.adopt(self.pattern_of(contacts, index));
                         problem.factored.slots = 0;
+                        problem.factored.is_multiplied = contacts.is_multiplied(index);
                     } else {
                         problem.factored.pattern = None;
                     }
@@ -594,6 +605,10 @@ impl<T: Lane> Rows<T> {
                 }
             },
         );
+        if whole == 0 {
+            self.write_along_path(contacts, slot, rows, problems);
+            return;
+        }
         for (k, (velocity, z)) in path.velocities().zip(rows).enumerate() {
             let values = store_all(z);
             let [cluster, place] = self.velocities[velocity];
@@ -618,8 +633,39 @@ impl<T: Lane> Rows<T> {
                 },
             );
         }
-        if self.loops.is_some() && whole != 0 {
+        if self.loops.is_some() {
             self.project_factors(contacts, slot, T::mask(self.token, whole), problems);
+        }
+    }
+
+    /// Writes the rows of a slot to problems with the pattern of its cluster.
+    #[inline(always)]
+    fn write_along_path(
+        &self,
+        contacts: &Contacts<T>,
+        slot: usize,
+        rows: &[Triple<T>],
+        problems: &mut [ContactProblem],
+    ) {
+        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        let near = T::mask(self.token, contacts.near(slot));
+        let Some(cluster) = contacts.cluster_of(slot) else {
+            return;
+        };
+        let stride = self.patterns[cluster].stride();
+        for (k, z) in rows.iter().enumerate() {
+            let values = store_all(z);
+            each::<T>(
+                near,
+                #[inline(always)]
+                |lane| {
+                    let at = usize::from(places[lane]) * stride + k;
+                    let out = &mut problems[usize::from(homes[lane])].factored.Z[at];
+                    for i in 0..3 {
+                        out[i] = values[i][lane];
+                    }
+                },
+            );
         }
     }
 

@@ -128,7 +128,9 @@ impl<T: Lane> Rows<T> {
     }
 }
 
-/// Writes impulses by slot as the start of the problems with factors of a mask's lanes.
+/// Writes impulses by slot as the start of the problems with factors of a mask's lanes. Those of
+/// rigid discs start from the last step: parked wheels would press against each other with what
+/// the sweeps leave.
 #[inline(always)]
 pub(super) fn write_start<T: Lane>(
     contacts: &Contacts<T>,
@@ -142,6 +144,9 @@ pub(super) fn write_start<T: Lane>(
         let (homes, places) = (contacts.homes(slot), contacts.places(slot));
         for lane in (0..T::LANES).filter(|lane| near.get(*lane)) {
             let problem = &mut problems[usize::from(homes[lane])];
+            if problem.factored.is_multiplied {
+                continue;
+            }
             problem.has_start = true;
             let own = &mut problem.start[3 * usize::from(places[lane])..][..3];
             for k in 0..3 {

@@ -335,7 +335,7 @@ impl<T: Lane> Block<T> {
     fn on_ground(&self) -> T::Mask {
         let mut on_ground = T::mask(self.token, 0);
         for &slot in self.contacts.used_by_shapes() {
-            if !self.contacts.is_of_pairs(slot) {
+            if self.contacts.cluster_of(slot).is_some() {
                 on_ground = on_ground | self.contacts.slot(slot).active;
             }
         }
