@@ -38,7 +38,7 @@ const EFFORT: f64 = 0.2;
 
 /// Distance between rovers side by side, and between one and that which it pushes, m.
 const APART: f64 = 3.0;
-const PUSHED: f64 = 1.55;
+const PUSHED: f64 = 2.0;
 
 /// Cells of the rough map, m.
 const CELL: f64 = 0.25;

@@ -1213,7 +1213,7 @@ impl<T: Lane> Contacts<T> {
                 too_many |= 1 << lane;
                 continue;
             }
-            homes[lane] = u16::try_from(home).unwrap_or(0); // there are fewer clusters than slots
+            homes[lane] = home_of(home);
             places[lane] = small(list.n);
             list.slots[list.n] = small(slot);
             let mut key = shown;
@@ -1278,6 +1278,13 @@ impl Listed {
 #[allow(clippy::cast_possible_truncation)] // checked where machines are made
 fn small(index: usize) -> u8 {
     index as u8
+}
+
+/// A problem, of which there are at most as many as slots in all lanes.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation)] // checked where machines are made
+fn home_of(problem: usize) -> u16 {
+    problem as u16
 }
 
 /// Number of a primitive, kept in a lane.
