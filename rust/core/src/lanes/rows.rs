@@ -248,8 +248,14 @@ impl<T: Lane> Rows<T> {
             let (which, entry) = row.entry(v[0]);
             *u = path.write_joint(which, entry, v, rows);
         } else {
-            let place = place_of(contacts.slot(slot));
-            *u = path.write(|m| end.motions[m], &place, v, rows);
+            if self.bodies[part].is_some() {
+                let place = place_of(contacts.slot(slot));
+                *u = path.write(|m| end.motions[m], &place, v, rows);
+            } else {
+                let zero = [v[0].like(0.0); 3];
+                rows.fill(zero);
+                *u = zero;
+            }
             for (lane, contact) in contacts.by_lane.guests(slot) {
                 let one = OneLane {
                     machine,
@@ -426,6 +432,9 @@ impl<T: Lane> Rows<T> {
             let own_guests = contacts.by_lane.guests(slot);
             let of_guests = own_guests.fold(0, |all, (lane, _)| all | 1 << lane);
             guests |= of_guests;
+            if self.bodies[contacts.part(slot)].is_none() {
+                continue;
+            }
             let here = own.active & lanes & !T::mask(self.token, of_guests);
             let [force, moment] = place_of(own).wrench(p[slot]);
             let Path { base, movers } = self.path(contacts.part(slot));
