@@ -14,8 +14,9 @@
 //!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
 //! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield; [`pattern`]: which
 //!   velocities a contact moves;
-//! - `clusters`: which trees have a problem of their own; [`problem`]: a friction-contact problem; [`queue`], `lane_solver`, `sweeps`: how the
-//!   problems of many are solved, by [`crate::solver`]'s pivoting; `system`, `equations`,
+//! - `clusters`: which trees have a problem of their own; [`problem`]: a friction-contact problem;
+//!   [`queue`], `lane_solver`, `sweeps`: how the problems of many are solved, by
+//!   [`crate::solver`]'s pivoting; `system`, `equations`,
 //!   `dry_equations`, `large_equations`, `velocity_equations`, `tree_matrix`: its linear systems;
 //! - [`step`]: the step. The dynamics of the tree are those of [`crate::multibody`], its drives
 //!   those of [`crate::system`].

@@ -74,8 +74,8 @@ pub struct ContactProblem {
 pub struct Factored {
     /// The machine's.
     pub pattern: Option<Arc<Pattern>>,
-    /// Slots with a contact, in the order of the contacts. Where the pattern is whole, contacts have
-    /// the first ones.
+    /// Slots with a contact, in the order of the contacts. Where the pattern is whole, the contacts
+    /// have the first ones.
     pub slots: u32,
     /// Z along the path of each contact: `Z[contact * stride + k]`, kg^(-1/2).
     pub Z: Vec<Triple<f64>>,

@@ -115,7 +115,9 @@ impl<T: Lane> Rows<T> {
             n_rows += path_of(body).len();
             let cluster = body.map(|body| machine.cluster_of(body));
             numbers.push(cluster.map_or(0, |cluster| counts[cluster]));
-            cluster.into_iter().for_each(|own| counts[own] += 1);
+            if let Some(cluster) = cluster {
+                counts[cluster] += 1;
+            }
         }
         let (mut first_blocks, mut n_blocks) = (Vec::new(), 0);
         for n in &counts {
