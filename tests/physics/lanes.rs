@@ -11,6 +11,7 @@ use fearless_simd::{f64x4, f64x8};
 use rover_core::scalar::{Instructions, Lane, Single};
 
 mod contacts;
+mod joined;
 mod lane_batch;
 mod machines;
 mod on_sand;

@@ -668,14 +668,17 @@ fn impulses_are_remembered_by_contact() {
     assert_eq!(found[0].keys.len(), 6);
     let p: Vec<f64> = (0..18).map(number).collect();
     let mut memory = WarmStart::default();
-    block.contacts.remember(0, &p, &mut memory);
-    let mut recalled = [f64::NAN; 18];
-    assert!(block.contacts.recall(0, &memory, &mut recalled));
-    assert_eq!(recalled[..], p[..]);
+    let mut problems = vec![ContactProblem::default()];
+    problems[0].p[..18].copy_from_slice(&p);
+    block.contacts.remember(0, &problems, &mut memory);
+    problems[0].p.fill(f64::NAN);
+    assert!(block.contacts.recall(0, &memory, &mut problems));
+    assert_eq!(problems[0].p[..18], p[..]);
     // The third was not there, the first two were in another order.
     memory.impulses.remove(2);
     memory.impulses.swap(0, 1);
-    assert!(!block.contacts.recall(0, &memory, &mut recalled));
+    assert!(!block.contacts.recall(0, &memory, &mut problems));
+    let recalled = &problems[0].p[..18];
     assert_eq!(recalled[..6], p[..6]);
     assert_eq!(recalled[6..9], [0.0; 3]);
     assert_eq!(recalled[9..], p[9..]);

@@ -15,7 +15,7 @@ use super::Random;
 use super::machines::equipped;
 use crate::rover_kinds::{dry, mecanum, tracked, with_a_bar};
 
-fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
+pub fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
     let mut centres = Vec::new();
     let mut radii = Vec::new();
     for _ in 0..60 {
@@ -52,7 +52,7 @@ fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation 
     rover
 }
 
-fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
+pub fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
     let model = Arc::clone(rover.model());
     let wheels = model.wheels().iter();
     let torques: Vec<f64> = wheels.map(|_| torque * numbers.next()).collect();
@@ -141,14 +141,24 @@ fn linked() -> ModelDescription {
 /// Drives rovers of a model in a batch and alone.
 fn drive(instructions: Instructions, model: &Arc<Model>, n: usize, torque: f64, seed: u64) {
     let mut numbers = Random(seed);
-    let mut together: Vec<RoverSimulation> =
-        (0..n).map(|i| rover(i, model, &mut numbers)).collect();
+    let rovers = (0..n).map(|i| rover(i, model, &mut numbers)).collect();
+    drive_all(instructions, rovers, torque, &mut numbers);
+}
+
+/// Drives rovers of one model in a batch and alone.
+pub fn drive_all(
+    instructions: Instructions,
+    mut together: Vec<RoverSimulation>,
+    torque: f64,
+    numbers: &mut Random,
+) {
+    let n = together.len();
     let mut alone = together.clone();
     let mut batch = LaneBatch::new(instructions);
     for _ in 0..8 {
         for (a, b) in together.iter_mut().zip(&mut alone) {
             let mut same = Random(numbers.0);
-            command(a, torque, &mut numbers);
+            command(a, torque, numbers);
             command(b, torque, &mut same);
         }
         let mut errors: Vec<Option<StepError>> = vec![None; n];

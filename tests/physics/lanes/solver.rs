@@ -99,7 +99,7 @@ fn solve_all<T: Lane>(token: T::Token, problems: &mut Vec<ContactProblem>) {
     problems.resize_with(n.next_multiple_of(T::LANES), ContactProblem::default);
     let n_groups = problems.len() / T::LANES;
     let mut queue = Queue::<T>::new(token);
-    queue.begin(n_groups);
+    queue.begin(n_groups, T::LANES);
     for group in 0..n_groups {
         queue.enter(group, problems, |_| true);
     }
@@ -363,7 +363,7 @@ fn assert_queue_gives_the_same<T: Lane>(token: T::Token, rounds: &[Vec<ContactPr
     let n_groups = rounds[0].len() / T::LANES;
     let mut problems = rounds[0].clone();
     let mut queue = Queue::<T>::new(token);
-    queue.begin(n_groups);
+    queue.begin(n_groups, T::LANES);
     for group in 0..n_groups {
         queue.enter(group, &mut problems, |_| true);
     }

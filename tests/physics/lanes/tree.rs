@@ -497,7 +497,7 @@ fn a_machine_without_a_fast_step_is_refused_with_its_reason() {
             rover.solids[0].joint = Some(JointKind::Spherical);
             rover.solids[0].position = Some([0.0, 1.0, 0.0]);
         }),
-        Err(Unsupported::NotOneFreeTree)
+        Err(Unsupported::FixedRoot)
     );
     let with_stops = |rover: &mut ModelDescription| {
         let template = rover.solids[1].clone();

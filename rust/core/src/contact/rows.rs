@@ -77,11 +77,12 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// That of a body of a machine that is one tree on a free base.
+    /// The velocities.
     #[inline(always)]
-    pub(crate) fn from_trunk(movers: &'a [Mover]) -> Self {
-        let base = Some(0);
-        Self { base, movers }
+    pub(crate) fn velocities(&self) -> impl Iterator<Item = usize> + use<'a> {
+        let first = self.base.unwrap_or(0);
+        let joints = self.movers.iter().map(|mover| mover.velocity);
+        (first..first + self.lead()).chain(joints)
     }
 
     /// Number of velocities.

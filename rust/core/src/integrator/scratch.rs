@@ -225,11 +225,11 @@ impl<Q: Clone, C> Scratch<Q, C> {
 
     /// Makes a step that was taken elsewhere the last one: `list` hands its contacts with their
     /// impulses and local velocities to its argument. `q` and `mu`: free velocity and friction.
-    pub(crate) fn show<const D: usize>(
+    pub(crate) fn show<'a, const D: usize>(
         &mut self,
         list: impl FnOnce(&mut dyn FnMut(C, [f64; D], [f64; D])),
-        q: &[f64],
-        mu: &[f64],
+        q: impl Iterator<Item = &'a f64>,
+        mu: impl Iterator<Item = &'a f64>,
     ) {
         self.whole.clear();
         self.contacts.clear();
@@ -240,11 +240,10 @@ impl<Q: Clone, C> Scratch<Q, C> {
             self.p.extend_from_slice(&p);
             self.u.extend_from_slice(&u);
         });
-        let n = self.contacts.len();
         self.q_free.clear();
-        self.q_free.extend_from_slice(&q[..D * n]);
+        self.q_free.extend(q);
         self.mu.clear();
-        self.mu.extend_from_slice(&mu[..n]);
+        self.mu.extend(mu);
     }
 
     /// Whether the last step was taken in parts, with contacts.

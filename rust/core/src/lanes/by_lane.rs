@@ -26,8 +26,9 @@ impl<T: Lane> BodyMotion for OneLane<'_, T> {
     }
 
     #[inline]
-    fn origin(&self, _: usize) -> Vector3<f64> {
-        self.poses.origin.get(self.lane).into()
+    fn origin(&self, body: usize) -> Vector3<f64> {
+        let tree = self.machine.tree_of_body(body);
+        self.poses.origin_of(tree).get(self.lane).into()
     }
 
     #[inline]
@@ -167,10 +168,13 @@ impl<T: Lane> ByLane<T> {
         (self.found(slot).filter(|found| found.is_guest)).map(|found| (found.lane, &found.contact))
     }
 
-    /// Lanes with contacts between bodies.
+    /// Contacts between bodies, with their lanes: the body and the other one.
     #[inline(always)]
-    pub(super) fn with_pairs(&self) -> u32 {
-        (self.of_pairs.iter()).fold(0, |lanes, slot| lanes | self.given[*slot])
+    pub(super) fn pairs(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
+        self.found.iter().filter_map(|found| {
+            let other = found.contact.other?;
+            Some((found.lane, [found.contact.body, other.body]))
+        })
     }
 
     /// Forgets all of the last step.

@@ -12,6 +12,10 @@
 //! What is rare is found lane by lane (`lane_detection`): a wheel that nearly lies flat, passes a
 //! sphere within the step, touches more things than it has slots, or an edge of a surface, and a
 //! body near the ground or another one. A lane with more contacts than a problem has falls back.
+//!
+//! A rover has a list of contacts for each of its clusters (`clusters`), and the places in it are
+//! those in the cluster's problem. Where clusters touch, all their contacts are in the list of the
+//! first.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -24,7 +28,7 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
-use super::problem::{MAX_CONTACTS, MAX_DENSE, MAX_DRY};
+use super::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
 use crate::geometry::query::sweep::DEEP;
@@ -48,7 +52,7 @@ const NO_DIRECTION: f64 = 1e-12;
 pub struct Slot<T: Lane> {
     /// Where it is a contact. Elsewhere the other fields mean nothing.
     pub active: T::Mask,
-    /// Point of the wheel relative to the trunk's origin, m.
+    /// Point of the wheel relative to the origin of its tree, m.
     pub point: Vec3<T>,
     /// Normal, from the ground to the wheel.
     pub n: Vec3<T>,
@@ -88,7 +92,16 @@ pub(super) struct Stand<T: Lane> {
     pub lies: T::Mask,
 }
 
-/// The contacts of one rover in the order of detection.
+/// Heights of a tree's origin over the plane, m.
+#[derive(Clone, Copy, Debug)]
+struct Heights<T> {
+    /// At the midpoint; over the plane that wheels stand on; at the end.
+    middle: T,
+    for_wheels: T,
+    end: T,
+}
+
+/// The contacts of a rover's problem in the order of detection.
 #[derive(Clone, Copy, Debug)]
 pub struct Listed {
     /// Their number, at most [`MAX_CONTACTS`].
@@ -117,19 +130,48 @@ pub struct Contacts<T: Lane> {
     pub(super) slots: Vec<Slot<T>>,
     /// Part of each slot: a wheel, or, counted on from the wheels, a spare slot or a joint.
     pub(super) part_of: Vec<usize>,
-    /// Most contacts of a rover whose problem has the whole operator, dry joints among them.
-    most_dense: usize,
+    heights: Vec<Heights<T>>,
+    /// Cluster of each body, and of each slot that is not for contacts between bodies.
+    cluster_of_body: Vec<usize>,
+    cluster_of: Vec<Option<usize>>,
     pub(super) used: Vec<usize>,
     /// How many of them are not of joints.
     n_of_shapes: usize,
-    /// Lanes whose problem has factors, and slots in use by the others.
+    /// Of each cluster.
+    clusters: Vec<InCluster>,
+    /// Lanes with a problem that has factors.
     factored: u32,
-    dense: Vec<usize>,
-    lists: [Listed; MAX_LANES],
+    /// Of each problem, at `cluster * T::LANES + lane`.
+    lists: Vec<Listed>,
     /// Whether every slot in use is active in all lanes.
     is_full: bool,
-    /// Place of each slot among the contacts of each lane.
+    /// Of each slot in each lane, the problem that its contact is in, and its place there.
+    homes: Vec<[u16; MAX_LANES]>,
     places: Vec<[u8; MAX_LANES]>,
+    /// Lanes in which each slot's contact is in a problem with factors.
+    near: Vec<u32>,
+}
+
+/// What is known of a cluster's contacts.
+#[derive(Clone, Debug)]
+struct InCluster {
+    /// Most contacts of a problem with the whole operator, dry joints among them.
+    most_dense: usize,
+    n_dry: usize,
+    /// Whether wheels are thin and rigid, and whether loops tie several trees.
+    has_rigid_discs: bool,
+    is_tied: bool,
+    /// The cluster whose list has its contacts, in each lane.
+    leader: [u8; MAX_LANES],
+    /// Number of its velocities, and those of the clusters before it in that list.
+    nv: u16,
+    first_column: [u16; MAX_LANES],
+    /// Lanes with contacts between its bodies, or with another cluster's.
+    touches: u32,
+    /// Lanes whose list has a problem with factors.
+    factored: u32,
+    /// Its slots in use by the other lanes.
+    dense: Vec<usize>,
 }
 
 /// What a detection looks at.
@@ -154,9 +196,6 @@ pub struct Sight<'a, T: Lane> {
 
 impl<T: Lane> Contacts<T> {
     /// Room for a machine.
-    ///
-    /// # Panics
-    /// If it has more than 256 slots.
     #[must_use]
     pub fn new(token: T::Token, machine: &Machine) -> Self {
         let parts = Parts::of(machine);
@@ -170,7 +209,10 @@ impl<T: Lane> Contacts<T> {
         let n_shapes = n_wheels + machine.spares.len();
         part_of.extend(n_shapes..n_shapes + machine.joints_with_slots().count());
         let n_slots = part_of.len();
-        assert!(n_slots <= 256, "invariant: slots are numbered by 8 bits");
+        let cluster_of_body: Vec<usize> = (0..machine.n_bodies())
+            .map(|body| machine.cluster_of(body))
+            .collect();
+        let bodies = machine.slot_bodies().into_iter();
         let zero = T::splat(token, 0.0);
         let nowhere = Vec3::new(zero, zero, zero);
         let slot = Slot {
@@ -207,18 +249,29 @@ impl<T: Lane> Contacts<T> {
             slots: vec![slot; n_slots],
             by_lane: ByLane::new(machine, first_spare),
             part_of,
-            most_dense: if machine.has_lines() || machine.rubbing.len() > MAX_DRY {
-                0
-            } else {
-                MAX_DENSE + machine.rubbing.len()
-            },
+            heights: vec![
+                Heights {
+                    middle: zero,
+                    for_wheels: zero,
+                    end: zero,
+                };
+                machine.trees.len()
+            ],
+            cluster_of: bodies
+                .map(|body| body.map(|body| cluster_of_body[body]))
+                .collect(),
+            cluster_of_body,
             used: Vec::with_capacity(n_slots),
             n_of_shapes: 0,
+            clusters: (0..machine.n_problems())
+                .map(|cluster| InCluster::new(machine, cluster))
+                .collect(),
             factored: 0,
-            dense: Vec::with_capacity(n_slots),
-            lists: [Listed::NONE; MAX_LANES],
+            lists: vec![Listed::NONE; machine.n_problems() * T::LANES],
             is_full: false,
+            homes: vec![[0; MAX_LANES]; n_slots],
             places: vec![[0; MAX_LANES]; n_slots],
+            near: vec![0; n_slots],
         }
     }
 
@@ -247,20 +300,115 @@ impl<T: Lane> Contacts<T> {
         &self.used[self.n_of_shapes..]
     }
 
-    /// Those in use in a lane whose problem has the whole operator.
+    /// Those of a cluster in use in a lane whose problem has the whole operator.
     #[inline(always)]
-    pub(super) fn used_densely(&self) -> &[usize] {
-        if self.factored == 0 {
+    pub(super) fn used_densely(&self, cluster: usize) -> &[usize] {
+        if self.factored == 0 && self.clusters.len() == 1 {
             &self.used
         } else {
-            &self.dense
+            &self.clusters[cluster].dense
         }
     }
 
-    /// Lanes whose problem has the factors of its operator.
+    /// Lanes with a problem that has the factors of its operator.
     #[inline(always)]
     pub(super) fn factored(&self) -> u32 {
         self.factored
+    }
+
+    /// Lanes in which a slot's contact is in such a problem.
+    #[inline(always)]
+    pub(super) fn near(&self, slot: usize) -> u32 {
+        if self.factored == 0 {
+            0
+        } else {
+            self.near[slot]
+        }
+    }
+
+    /// Slots that have one.
+    #[inline(always)]
+    pub(super) fn used_nearby(&self) -> impl Iterator<Item = usize> {
+        let used = self.used.iter().copied();
+        used.filter(
+            #[inline(always)]
+            |slot| self.near[*slot] != 0,
+        )
+    }
+
+    /// The cluster of a slot that is not for contacts between bodies.
+    #[inline(always)]
+    pub(super) fn cluster_of(&self, slot: usize) -> Option<usize> {
+        self.cluster_of[slot]
+    }
+
+    /// Number of the clusters.
+    #[inline(always)]
+    pub(super) fn n_clusters(&self) -> usize {
+        self.clusters.len()
+    }
+
+    /// Number of problems: one of each cluster, and in it one of each lane.
+    #[inline(always)]
+    #[must_use]
+    pub fn n_problems(&self) -> usize {
+        self.lists.len()
+    }
+
+    /// Whether a problem has the factors of its operator.
+    #[inline(always)]
+    pub(super) fn is_factored(&self, problem: usize) -> bool {
+        let (cluster, lane) = (problem / T::LANES, problem % T::LANES);
+        self.clusters[cluster].factored >> lane & 1 == 1
+    }
+
+    /// The clusters whose contacts are in a problem. `None` where no bodies touch each other: its
+    /// own.
+    #[inline(always)]
+    pub(super) fn members(&self, problem: usize) -> Option<impl Iterator<Item = usize> + '_> {
+        let (cluster, lane) = (problem / T::LANES, problem % T::LANES);
+        let touches = self.clusters[cluster].touches >> lane & 1 == 1;
+        touches.then(|| {
+            let all = self.clusters.iter().enumerate();
+            all.filter(move |(_, own)| usize::from(own.leader[lane]) == cluster)
+                .map(|(own, _)| own)
+        })
+    }
+
+    /// Where a cluster's velocities begin in a problem that has all velocities, if it has them.
+    #[inline(always)]
+    pub(super) fn first_column(&self, cluster: usize, problem: usize) -> Option<usize> {
+        let (leader, lane) = (problem / T::LANES, problem % T::LANES);
+        let own = &self.clusters[cluster];
+        (usize::from(own.leader[lane]) == leader).then(|| own.first_column[lane].into())
+    }
+
+    /// Whether a problem with factors is solved with the operator that they give: that of rigid
+    /// discs that push or tow each other.
+    #[inline(always)]
+    pub(super) fn is_multiplied(&self, problem: usize) -> bool {
+        let fits = self.lists[problem].n <= MAX_LARGE;
+        let is_of_discs = |own: usize| self.clusters[own].has_rigid_discs;
+        let has_lines = |own: usize| self.clusters[own].most_dense == 0;
+        match self.members(problem) {
+            None => {
+                fits && self.clusters[problem / T::LANES].is_tied && is_of_discs(problem / T::LANES)
+            }
+            Some(mut members) => {
+                let mut all = self.members(problem).into_iter().flatten();
+                fits && members.any(is_of_discs) && !all.any(has_lines)
+            }
+        }
+    }
+
+    /// Number of dry joints in a problem.
+    #[inline(always)]
+    pub(super) fn n_dry(&self, problem: usize) -> usize {
+        let n = |cluster: usize| self.clusters[cluster].n_dry;
+        match self.members(problem) {
+            None => n(problem / T::LANES),
+            Some(members) => members.map(n).sum(),
+        }
     }
 
     /// A slot.
@@ -277,11 +425,17 @@ impl<T: Lane> Contacts<T> {
         self.part_of[slot]
     }
 
-    /// The contacts of a rover.
+    /// The contacts of a problem.
     #[inline(always)]
     #[must_use]
-    pub fn list(&self, lane: usize) -> &Listed {
-        &self.lists[lane]
+    pub fn list(&self, problem: usize) -> &Listed {
+        &self.lists[problem]
+    }
+
+    /// The problems of a lane.
+    #[inline(always)]
+    pub fn problems_of(&self, lane: usize) -> impl Iterator<Item = usize> + use<T> {
+        (lane..self.lists.len()).step_by(T::LANES)
     }
 
     /// Whether every slot in use is active in all lanes: a contact's place is then the same in all.
@@ -290,10 +444,10 @@ impl<T: Lane> Contacts<T> {
         self.is_full
     }
 
-    /// A contact of a rover by its place in the list, with its slot.
+    /// A contact of a problem by its place in the list, with its slot.
     #[must_use]
-    pub fn contact(&self, machine: &Machine, lane: usize, place: usize) -> (usize, Contact) {
-        let list = &self.lists[lane];
+    pub fn contact(&self, machine: &Machine, problem: usize, place: usize) -> (usize, Contact) {
+        let (list, lane) = (&self.lists[problem], problem % T::LANES);
         let slot = usize::from(list.slots[place]);
         if let Some(contact) = self.by_lane.contact(slot, lane) {
             return (slot, *contact);
@@ -325,41 +479,64 @@ impl<T: Lane> Contacts<T> {
         (slot, contact)
     }
 
-    /// Place of a slot among the contacts of each lane in which it is active.
+    /// The contacts of a rover with their slots, problem by problem.
+    pub(super) fn all_of<'a>(
+        &'a self,
+        machine: &'a Machine,
+        lane: usize,
+    ) -> impl Iterator<Item = (usize, Contact)> + 'a {
+        self.problems_of(lane).flat_map(move |problem| {
+            let places = 0..self.lists[problem].n;
+            places.map(move |place| self.contact(machine, problem, place))
+        })
+    }
+
+    /// The problem of each lane in which a slot is active.
+    #[inline(always)]
+    pub(super) fn homes(&self, slot: usize) -> &[u16; MAX_LANES] {
+        &self.homes[slot]
+    }
+
+    /// Place of a slot among the contacts of that problem.
     #[inline(always)]
     pub(super) fn places(&self, slot: usize) -> &[u8; MAX_LANES] {
         &self.places[slot]
     }
 
-    /// Fills `p` (3 n_c) with the impulses that a rover remembers of its contacts, N s, zero for
-    /// new ones. Returns whether the last step had exactly these contacts.
+    /// Fills the problems' `p` with the impulses that a rover remembers of its contacts, N s, zero
+    /// for new ones. Returns whether the last step had exactly these contacts.
     #[inline(always)]
-    pub fn recall(&self, lane: usize, memory: &WarmStart, p: &mut [f64]) -> bool {
-        let list = &self.lists[lane];
-        let mut is_same = memory.impulses.len() == list.n;
-        for (place, out) in p.chunks_exact_mut(3).enumerate().take(list.n) {
-            let wanted = list.keys[place];
-            let same = memory.impulses.get(place);
-            let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
-                *known
-            } else {
-                let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
-                is_same &= found.is_some();
-                found.map_or([0.0; 3], |(_, known)| *known)
-            };
-            out.copy_from_slice(&known);
+    pub fn recall(&self, lane: usize, memory: &WarmStart, problems: &mut [ContactProblem]) -> bool {
+        let (mut is_same, mut n) = (true, 0);
+        for index in self.problems_of(lane) {
+            let (list, problem) = (&self.lists[index], &mut problems[index]);
+            for (place, out) in problem.p.chunks_exact_mut(3).enumerate().take(list.n) {
+                let wanted = list.keys[place];
+                let same = memory.impulses.get(n + place);
+                let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
+                    *known
+                } else {
+                    let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
+                    is_same &= found.is_some();
+                    found.map_or([0.0; 3], |(_, known)| *known)
+                };
+                out.copy_from_slice(&known);
+            }
+            n += list.n;
         }
-        is_same
+        is_same && memory.impulses.len() == n
     }
 
-    /// Makes a rover remember the impulses of its contacts, `p` (3 n_c), N s.
+    /// Makes a rover remember the impulses of its contacts, the problems' `p`, N s.
     #[inline(always)]
-    pub fn remember(&self, lane: usize, p: &[f64], memory: &mut WarmStart) {
-        let list = &self.lists[lane];
+    pub fn remember(&self, lane: usize, problems: &[ContactProblem], memory: &mut WarmStart) {
         memory.impulses.clear();
-        for (place, p) in p.chunks_exact(3).enumerate().take(list.n) {
-            let known = (list.keys[place], [p[0], p[1], p[2]]);
-            memory.impulses.push(known);
+        for index in self.problems_of(lane) {
+            let (list, problem) = (&self.lists[index], &problems[index]);
+            for (place, p) in problem.p.chunks_exact(3).enumerate().take(list.n) {
+                let known = (list.keys[place], [p[0], p[1], p[2]]);
+                memory.impulses.push(known);
+            }
         }
     }
 
@@ -381,12 +558,19 @@ impl<T: Lane> Contacts<T> {
         let Sight { middle, end, v, .. } = *sight;
         self.parts.find_twists(middle, v, &mut self.twists);
         self.by_lane.clear();
-        let height = ground.height(middle.origin);
-        let for_wheels = ground.height_for_wheels(middle.origin);
+        for (tree, heights) in self.heights.iter_mut().enumerate() {
+            let (middle, end) = (middle.origin_of(tree), end.origin_of(tree));
+            *heights = Heights {
+                middle: ground.height(middle),
+                for_wheels: ground.height_for_wheels(middle),
+                end: ground.height(end),
+            };
+        }
         self.used.clear();
-        let height_at_end = ground.height(end.origin);
         for w in 0..self.parts.wheels.len() {
-            let (mut rest, reach) = self.look_at_wheel(w, for_wheels, ground, sight);
+            let tree = self.parts.wheels[w].tree;
+            let heights = self.heights[tree];
+            let (mut rest, reach) = self.look_at_wheel(w, heights.for_wheels, ground, sight);
             let slots = self.parts.wheels[w].slots.clone();
             if self.slots[slots.clone()].iter().any(|own| own.active.any()) {
                 let pose = &end.bodies[self.parts.wheels[w].body];
@@ -398,9 +582,9 @@ impl<T: Lane> Contacts<T> {
                     if self.slots[slot].active.any() {
                         let own = &self.slots[slot].plane;
                         let plane = if ground.has_surfaces() {
-                            (own.normal, own.height(end.origin))
+                            (own.normal, own.height(end.origin_of(tree)))
                         } else {
-                            (ground.normal, height_at_end)
+                            (ground.normal, heights.end)
                         };
                         self.used.push(slot);
                         let place = slot - slots.start;
@@ -421,22 +605,100 @@ impl<T: Lane> Contacts<T> {
             }
         }
         for b in 0..self.parts.boxes.len() {
+            let height = self.heights[self.parts.boxes[b].tree].middle;
             let (near, reach) = self.look_at_box(b, height, ground, sight);
             self.ask(self.parts.boxes[b].part, near, reach, sight);
         }
         let mut fallbacks = T::mask(self.token, 0);
-        if self.by_lane.is_asked() || sight.machine.has_pairs {
+        let meeting = if sight.machine.has_pairs {
+            self.find_meeting(sight)
+        } else {
+            0
+        };
+        if self.by_lane.is_asked() || meeting != 0 {
             for slot in &mut self.slots[self.first_spare..self.first_of_joints] {
                 slot.active = fallbacks;
             }
-            fallbacks = self.find_by_lane(ground, sight);
+            fallbacks = self.find_by_lane(ground, sight, meeting);
             let slots = self.slots[..self.first_of_joints].iter().enumerate();
             let used = slots.filter(|(_, own)| own.active.any());
             self.used.clear();
             self.used.extend(used.map(|(slot, _)| slot));
         }
         self.n_of_shapes = self.used.len();
+        if sight.machine.has_pairs {
+            self.find_leaders();
+        }
         fallbacks | self.list_contacts(ground)
+    }
+
+    /// Finds which clusters touch each other in which lanes.
+    #[inline(always)]
+    fn find_leaders(&mut self) {
+        for (cluster, own) in self.clusters.iter_mut().enumerate() {
+            own.leader = [small(cluster); MAX_LANES];
+            own.first_column = [0; MAX_LANES];
+            own.touches = 0;
+        }
+        let mut lanes = 0_u32;
+        for (lane, bodies) in self.by_lane.pairs() {
+            lanes |= 1 << lane;
+            let both = bodies.map(|body| {
+                let own = &mut self.clusters[self.cluster_of_body[body]];
+                own.touches |= 1 << lane;
+                own.leader[lane]
+            });
+            let first = both[0].min(both[1]);
+            for own in &mut self.clusters {
+                if both.contains(&own.leader[lane]) {
+                    own.leader[lane] = first;
+                }
+            }
+        }
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            for cluster in 0..self.clusters.len() {
+                let (before, rest) = self.clusters.split_at_mut(cluster);
+                let own = &mut rest[0];
+                let same = before.iter().rev();
+                let mut same = same.filter(|other| other.leader[lane] == own.leader[lane]);
+                own.first_column[lane] =
+                    (same.next()).map_or(0, |other| other.first_column[lane] + other.nv);
+            }
+        }
+    }
+
+    /// Lanes in which bodies may touch each other: trees whose bounding balls about their origins
+    /// meet, or a tree that can touch itself.
+    #[inline(always)]
+    fn find_meeting(&self, sight: &Sight<'_, T>) -> u32 {
+        let n = self.heights.len();
+        if sight.machine.touches_itself || sight.forecast.lead.abs() > 0.0 {
+            return sight.going;
+        }
+        let zero = T::splat(self.token, 0.0);
+        let size = |tree: usize| {
+            let mut size = zero;
+            for wheel in self.parts.wheels.iter().filter(|own| own.tree == tree) {
+                let centre = wheel.centre(&sight.middle.bodies[wheel.body]);
+                size = size.max(centre.norm() + zero.like(wheel.bound));
+            }
+            for solid in self.parts.boxes.iter().filter(|own| own.tree == tree) {
+                let centre = solid.centre(&sight.middle.bodies[solid.body]);
+                size = size.max(centre.norm() + zero.like(solid.bound));
+            }
+            size
+        };
+        let mut meeting = 0;
+        for a in 1..n {
+            let reach = size(a) + sight.forecast.hover;
+            for b in 0..a {
+                let way = sight.middle.origin_of(a) - sight.middle.origin_of(b);
+                meeting |= way.norm().le(reach + size(b)).bits();
+            }
+        }
+        meeting & sight.going
     }
 
     /// Asks for the contacts of a part in the lanes of a mask.
@@ -473,10 +735,14 @@ impl<T: Lane> Contacts<T> {
             return (near_plane, reach);
         }
         let at_end = &sight.end.bodies[solid.body];
-        let shift = sight.end.origin - sight.middle.origin + (solid.centre(at_end) - centre);
+        let (from, to) = (
+            sight.middle.origin_of(solid.tree),
+            sight.end.origin_of(solid.tree),
+        );
+        let shift = to - from + (solid.centre(at_end) - centre);
         let bound = T::splat(self.token, solid.bound);
         let motion = shift.norm() + turning(&at_end.R, &pose.R) * bound;
-        let world = sight.middle.origin + centre;
+        let world = from + centre;
         let near = ground.is_near_box(number, world, &R, solid.half_size, (reach, motion));
         (near_plane | near, reach)
     }
@@ -504,7 +770,7 @@ impl<T: Lane> Contacts<T> {
         let (first, n_circles) = (wheel.slots.start, wheel.n_circles());
         let mut plane = (ground.normal, height);
         if ground.has_surfaces() {
-            let origin = sight.middle.origin;
+            let origin = sight.middle.origin_of(wheel.tree);
             rest = ground.find_plane(w, origin + centre, wheel.bound, reach);
             let own = ground.under_wheel(w);
             plane = (own.normal, own.height(origin));
@@ -537,7 +803,7 @@ impl<T: Lane> Contacts<T> {
     }
 
     /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of the
-    /// normal n at the midpoint, the trunk's origin being at the given height (m) over it.
+    /// normal n at the midpoint, the origin of its tree being at the given height (m) over it.
     #[inline(always)]
     pub(super) fn stands(
         &self,
@@ -588,9 +854,9 @@ impl<T: Lane> Contacts<T> {
         reach: T,
     ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
-        let origin = sight.middle.origin;
+        let origin = sight.middle.origin_of(wheel.tree);
         let at_end = wheel.centre(&sight.end.bodies[wheel.body]);
-        let half_way = sight.end.origin - origin + at_end - centre;
+        let half_way = sight.end.origin_of(wheel.tree) - origin + at_end - centre;
         let motion = half_way.norm();
         let need = reach + motion;
         let mut fallbacks = ground.look_around_wheel(w, origin + centre, wheel.bound, need);
@@ -646,10 +912,11 @@ impl<T: Lane> Contacts<T> {
         let motion = half_way.norm();
         let wheel = &self.parts.wheels[w];
         let twist = self.twists[wheel.carrier];
+        let origin = sight.middle.origin_of(wheel.tree);
         let slots = wheel.slots.clone();
         let mut fallbacks = T::mask(self.token, 0);
         for sphere in ground.near_wheel(w) {
-            let offset = sphere.centre - sight.middle.origin - centre;
+            let offset = sphere.centre - origin - centre;
             let near = self.parts.wheels[w].nearest(s, offset);
             let gap = near.distance - sphere.radius;
             let is_deep = (gap - motion).lt(-(motion.like(DEEP) * sphere.radius));
@@ -723,7 +990,7 @@ impl<T: Lane> Contacts<T> {
                 centre: sphere.centre.get(lane).into(),
                 radius: sphere.radius.get(lane),
             };
-            let base = Vector3::from(sight.middle.origin.get(lane));
+            let base = Vector3::from(sight.middle.origin_of(wheel.tree).get(lane));
             let half_way = Vector3::from(half_way.get(lane));
             let touch = if wheel.is_wide() {
                 let roller = Roller {
@@ -743,7 +1010,7 @@ impl<T: Lane> Contacts<T> {
     }
 
     /// Evaluates a slot at the end of the step, where the wheel has the axle `s` and the centre
-    /// `centre`, and the trunk's origin the given height (m) over the plane of the given normal
+    /// `centre`, and the origin of its tree the given height (m) over the plane of the given normal
     /// under the wheel. Returns where a frame is not defined.
     #[inline(always)]
     fn relocate(
@@ -771,7 +1038,7 @@ impl<T: Lane> Contacts<T> {
         }
         if slot.on_sphere.any() {
             let sphere = &slot.sphere;
-            let offset = sphere.centre - end.origin - centre;
+            let offset = sphere.centre - end.origin_of(wheel.tree) - centre;
             let in_plane = offset - s * offset.dot(s);
             let length = in_plane.norm();
             let outward = in_plane * (radius.like(1.0) / length);
@@ -830,7 +1097,7 @@ impl<T: Lane> Contacts<T> {
         }
         if slot.on_sphere.any() {
             let here = slot.on_sphere;
-            let near = wheel.nearest(s, slot.sphere.centre - end.origin - centre);
+            let near = wheel.nearest(s, slot.sphere.centre - end.origin_of(wheel.tree) - centre);
             let across = near.n.cross(s);
             let length = across.norm();
             let rolls = length.gt(parallel);
@@ -854,7 +1121,7 @@ impl<T: Lane> Contacts<T> {
     /// Lists the contacts of every lane. Returns the lanes with too many.
     #[inline(always)]
     fn list_contacts(&mut self, ground: &Ground<T>) -> T::Mask {
-        for list in &mut self.lists[..T::LANES] {
+        for list in &mut self.lists {
             list.n = 0;
         }
         self.is_full = true;
@@ -866,20 +1133,40 @@ impl<T: Lane> Contacts<T> {
         too_many
     }
 
-    /// Chooses the lanes whose problems have the factors of their operator: those with many
-    /// contacts, and with contacts between bodies.
+    /// Chooses the problems that have the factors of their operator: those with many contacts, and
+    /// with contacts between bodies.
     #[inline(always)]
     pub(super) fn choose_forms(&mut self) {
-        let mut factored = self.by_lane.with_pairs();
-        for (lane, list) in self.lists[..T::LANES].iter().enumerate() {
-            factored |= u32::from(list.n > self.most_dense) << lane;
+        self.factored = 0;
+        for (own, lists) in self
+            .clusters
+            .iter_mut()
+            .zip(self.lists.chunks_exact(T::LANES))
+        {
+            own.factored = own.touches;
+            for (lane, list) in lists.iter().enumerate() {
+                own.factored |= u32::from(list.n > own.most_dense) << lane;
+            }
+            self.factored |= own.factored;
         }
-        self.factored = factored;
-        if factored != 0 {
-            let slots = &self.slots;
-            let is_dense = |slot: &&usize| slots[**slot].active.bits() & !factored != 0;
-            self.dense.clear();
-            self.dense.extend(self.used.iter().filter(is_dense));
+        if self.factored == 0 && self.clusters.len() == 1 {
+            return;
+        }
+        for own in &mut self.clusters {
+            own.dense.clear();
+        }
+        for &slot in &self.used {
+            let active = self.slots[slot].active.bits();
+            let Some(cluster) = self.cluster_of[slot] else {
+                self.near[slot] = active;
+                continue;
+            };
+            let own = &mut self.clusters[cluster];
+            let near = active & own.factored;
+            self.near[slot] = near;
+            if active != near {
+                own.dense.push(slot);
+            }
         }
     }
 
@@ -901,24 +1188,32 @@ impl<T: Lane> Contacts<T> {
         };
         let by_lane = &self.by_lane;
         let given = by_lane.given(slot);
+        let cluster = self.cluster_of[slot];
         let own = &mut self.slots[slot];
         let on_sphere = own.on_sphere.bits();
         let mut numbers = [0.0; MAX_LANES];
         if on_sphere != 0 {
             own.sphere.number.store(&mut numbers[..T::LANES]);
         }
-        let places = &mut self.places[slot];
+        let (homes, places) = (&mut self.homes[slot], &mut self.places[slot]);
         self.is_full &= own.active.all();
         let mut too_many = 0;
         let mut lanes = own.active.bits();
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            let list = &mut self.lists[lane];
+            let cluster = match cluster {
+                Some(cluster) => cluster,
+                None => (by_lane.contact(slot, lane))
+                    .map_or(0, |contact| self.cluster_of_body[contact.body]),
+            };
+            let home = usize::from(self.clusters[cluster].leader[lane]) * T::LANES + lane;
+            let list = &mut self.lists[home];
             if list.n == MAX_CONTACTS {
                 too_many |= 1 << lane;
                 continue;
             }
+            homes[lane] = home_of(home);
             places[lane] = small(list.n);
             list.slots[list.n] = small(slot);
             let mut key = shown;
@@ -946,6 +1241,23 @@ impl<T: Lane> Contacts<T> {
     }
 }
 
+impl InCluster {
+    fn new(machine: &Machine, cluster: usize) -> Self {
+        Self {
+            most_dense: machine.most_dense(cluster),
+            n_dry: machine.n_dry(cluster),
+            has_rigid_discs: machine.has_rigid_discs(cluster),
+            is_tied: machine.clusters.n_trees(cluster) > 1,
+            leader: [small(cluster); MAX_LANES],
+            nv: u16::try_from(machine.clusters.nv(cluster)).unwrap_or(u16::MAX),
+            first_column: [0; MAX_LANES],
+            touches: 0,
+            factored: 0,
+            dense: Vec::new(),
+        }
+    }
+}
+
 /// The key of no contact.
 const NO_KEY: ContactKey = ContactKey {
     part: 0,
@@ -966,6 +1278,13 @@ impl Listed {
 #[allow(clippy::cast_possible_truncation)] // checked where machines are made
 fn small(index: usize) -> u8 {
     index as u8
+}
+
+/// A problem, of which there are at most as many as slots in all lanes.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation)] // checked where machines are made
+fn home_of(problem: usize) -> u16 {
+    problem as u16
 }
 
 /// Number of a primitive, kept in a lane.

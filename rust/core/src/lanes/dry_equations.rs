@@ -144,7 +144,7 @@ impl<T: Lane> System<T, Few<PLACES>> for DrySystem<T> {
     fn velocities(&mut self, p: &[Triple<T>; PLACES], u: &mut [Triple<T>; PLACES]) {
         let ((q, q_joints), (p, p_joints)) = (split(&self.q), split(p));
         let (u, u_joints) = split_mut(u);
-        velocities(&self.W, q, p, u);
+        velocities(&self.W, MAX_DENSE, q, p, u);
         for j in 0..MAX_DRY {
             let (coupling, own) = (&self.coupling[j], p_joints[j]);
             let mut rate = q_joints[j][1] + product(coupling, p);
@@ -164,7 +164,7 @@ impl<T: Lane> System<T, Few<PLACES>> for DrySystem<T> {
     fn factorise(&mut self, alpha: T, modes: &[Mode<T>; PLACES]) -> bool {
         let (modes, of_joints) = split(modes);
         let (zero, one) = (self.zero, self.zero.like(1.0));
-        factorise(&self.W, alpha, modes, &mut self.factors);
+        factorise(&self.W, MAX_DENSE, alpha, modes, &mut self.factors);
         let mut stick = [zero.lt(zero); MAX_DRY];
         for j in 0..MAX_DRY {
             stick[j] = of_joints[j].stick;
@@ -179,7 +179,7 @@ impl<T: Lane> System<T, Few<PLACES>> for DrySystem<T> {
                     self.columns[j][c][k] = T::select(stick[j], column[k], zero);
                 }
             }
-            forward(&self.factors, &mut self.columns[j]);
+            forward(&self.factors, MAX_DENSE, &mut self.columns[j]);
             backward_row(&self.factors, &mut self.rows[j]);
         }
         self.factorise_joints(alpha, &stick);
@@ -211,7 +211,7 @@ impl<T: Lane> System<T, Few<PLACES>> for DrySystem<T> {
         for c in 0..MAX_DENSE {
             r[c] = modes[c].across(r[c]);
         }
-        forward(&self.factors, r);
+        forward(&self.factors, MAX_DENSE, r);
         for j in 0..MAX_DRY {
             let rest = x[j] - product(&self.rows[j], r);
             x[j] = T::select(of_joints[j].stick, rest, zero);
@@ -225,7 +225,7 @@ impl<T: Lane> System<T, Few<PLACES>> for DrySystem<T> {
             }
             r_joints[j][1] += x[j];
         }
-        backward(&self.factors, r);
+        backward(&self.factors, MAX_DENSE, r);
         for c in 0..MAX_DENSE {
             r[c] = modes[c].impulse(r[c]);
         }

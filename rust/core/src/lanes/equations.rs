@@ -23,7 +23,7 @@ pub(super) type Block<T> = [T; 9];
 
 /// Block (i, j) of a symmetric `W`.
 #[inline(always)]
-fn block_of<T: Lane>(W: &[Block<T>; DENSE_BLOCKS], i: usize, j: usize) -> Block<T> {
+fn block_of<T: Lane, const B: usize>(W: &[Block<T>; B], i: usize, j: usize) -> Block<T> {
     if j <= i {
         W[block(i, j)]
     } else {
@@ -32,16 +32,17 @@ fn block_of<T: Lane>(W: &[Block<T>; DENSE_BLOCKS], i: usize, j: usize) -> Block<
     }
 }
 
-/// `u = W p + q`.
+/// `u = W p + q` at the first n places.
 #[inline(always)]
-pub(super) fn velocities<T: Lane, const C: usize>(
-    W: &[Block<T>; DENSE_BLOCKS],
+pub(super) fn velocities<T: Lane, const C: usize, const B: usize>(
+    W: &[Block<T>; B],
+    n: usize,
     q: &[Triple<T>; C],
     p: &[Triple<T>; C],
     u: &mut [Triple<T>; C],
 ) {
     *u = *q;
-    for i in 0..C {
+    for i in 0..n {
         let [p0, p1, p2] = p[i];
         let mut own = u[i];
         for j in 0..i {
@@ -165,15 +166,16 @@ fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
     out
 }
 
-/// Factors the system of the modes.
+/// Factors the system of the modes at the first n places.
 #[inline(always)]
-pub(super) fn factorise<T: Lane, const C: usize>(
-    W: &[Block<T>; DENSE_BLOCKS],
+pub(super) fn factorise<T: Lane, const C: usize, const B: usize>(
+    W: &[Block<T>; B],
+    n: usize,
     alpha: T,
     modes: &[Mode<T>; C],
     factors: &mut Factors<T, C>,
 ) {
-    for k in 0..C {
+    for k in 0..n {
         let mut diagonal = assemble(W[block(k, k)], Some(alpha), &modes[k], &modes[k]);
         for m in 0..k {
             let (l, u) = (factors[k][m], factors[m][k]);
@@ -181,7 +183,7 @@ pub(super) fn factorise<T: Lane, const C: usize>(
         }
         let pivot = factor_diagonal(&diagonal);
         factors[k][k] = pivot;
-        for i in k + 1..C {
+        for i in k + 1..n {
             let mut x = assemble(block_of(W, i, k), None, &modes[i], &modes[k]);
             for m in 0..k {
                 let (l, u) = (factors[i][m], factors[m][k]);
@@ -198,10 +200,14 @@ pub(super) fn factorise<T: Lane, const C: usize>(
     }
 }
 
-/// `y ← L⁻¹ y`.
+/// `y ← L⁻¹ y` at the first n places.
 #[inline(always)]
-pub(super) fn forward<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C]) {
-    for k in 0..C {
+pub(super) fn forward<T: Lane, const C: usize>(
+    factors: &Factors<T, C>,
+    n: usize,
+    y: &mut [Triple<T>; C],
+) {
+    for k in 0..n {
         let mut own = y[k];
         for m in 0..k {
             subtract(&mut own, &factors[k][m], &y[m]);
@@ -213,12 +219,16 @@ pub(super) fn forward<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut 
     }
 }
 
-/// `y ← U⁻¹ y`.
+/// `y ← U⁻¹ y` at the first n places.
 #[inline(always)]
-pub(super) fn backward<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C]) {
-    for k in (0..C).rev() {
+pub(super) fn backward<T: Lane, const C: usize>(
+    factors: &Factors<T, C>,
+    n: usize,
+    y: &mut [Triple<T>; C],
+) {
+    for k in (0..n).rev() {
         let mut own = y[k];
-        for m in k + 1..C {
+        for m in k + 1..n {
             subtract(&mut own, &factors[k][m], &y[m]);
         }
         let f = &factors[k][k];
@@ -286,12 +296,12 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
 
     #[inline(always)]
     fn velocities(&mut self, p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
-        velocities(&self.W, &self.q, p, u);
+        velocities(&self.W, C, &self.q, p, u);
     }
 
     #[inline(always)]
     fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) -> bool {
-        factorise(&self.W, alpha, modes, &mut self.factors);
+        factorise(&self.W, C, alpha, modes, &mut self.factors);
         true
     }
 
@@ -300,8 +310,8 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
         for k in 0..C {
             r[k] = modes[k].across(r[k]);
         }
-        forward(&self.factors, r);
-        backward(&self.factors, r);
+        forward(&self.factors, C, r);
+        backward(&self.factors, C, r);
         for k in 0..C {
             r[k] = modes[k].impulse(r[k]);
         }

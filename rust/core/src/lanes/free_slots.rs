@@ -5,24 +5,30 @@
 //! further out on their tree, or one of these. A contact between two bodies moves velocities on two
 //! paths, so its slot has all of them.
 
-use std::sync::Arc;
-
 use super::machine::Machine;
-use super::pattern::Pattern;
 use super::problem::MAX_CONTACTS;
 
 /// Slots for a path with boxes or balls.
 const FOR_BODIES: usize = 4;
 
-/// Slots for contacts between bodies.
+/// Slots for contacts between bodies, for each tree, and most of a machine.
 const FOR_PAIRS: usize = 6;
+const MOST_FOR_PAIRS: usize = 24;
 
 impl Machine {
-    /// Bodies whose path the further slots have, as far as there is room; `None`: all velocities.
-    /// `has_pairs`: whether bodies can touch each other.
-    pub(super) fn find_free_slots(&self, has_pairs: bool) -> Vec<Option<usize>> {
-        let wheels = || self.wheels.iter().map(|wheel| wheel.body);
-        let bodies = || self.boxes.iter().map(|solid| solid.body);
+    /// Bodies whose path the further slots have, as far as their cluster has room; `None`: all
+    /// velocities.
+    pub(super) fn find_free_slots(&self) -> Vec<Option<usize>> {
+        let n_pairs = (FOR_PAIRS * self.trees.len()).min(MOST_FOR_PAIRS);
+        let for_pairs = std::iter::repeat_n(None, if self.has_pairs { n_pairs } else { 0 });
+        let for_bodies = (0..self.clusters.n()).flat_map(|own| self.find_slots_of_bodies(own));
+        for_pairs.chain(for_bodies.map(Some)).collect()
+    }
+
+    fn find_slots_of_bodies(&self, cluster: usize) -> Vec<usize> {
+        let is_own = |body: &usize| self.cluster_of(*body) == cluster;
+        let wheels = || (self.wheels.iter().map(|wheel| wheel.body)).filter(is_own);
+        let bodies = || (self.boxes.iter().map(|solid| solid.body)).filter(is_own);
         let is_on_wheel = |body: usize| wheels().any(|wheel| self.carries(body, wheel));
         let mut ends: Vec<usize> = Vec::new();
         for body in bodies().filter(|&body| !is_on_wheel(body)) {
@@ -32,16 +38,15 @@ impl Machine {
             }
         }
         ends.extend(wheels().next().filter(|_| bodies().any(is_on_wheel)));
-        let room = MAX_CONTACTS.saturating_sub(self.n_own_slots());
-        let for_bodies = ends.iter().flat_map(|&end| [Some(end); FOR_BODIES]);
-        let for_pairs = [None; FOR_PAIRS].into_iter().filter(|_| has_pairs);
-        for_pairs.chain(for_bodies).take(room).collect()
-    }
-
-    /// Number of slots of the wheels and joints.
-    fn n_own_slots(&self) -> usize {
-        let of_wheels = self.wheels.iter().map(|wheel| wheel.n_slots).sum::<usize>();
-        of_wheels + self.stops.len() + self.rubbing.len()
+        let of_wheels = self.wheels.iter().filter(|wheel| is_own(&wheel.body));
+        let n_of_wheels = of_wheels.map(|wheel| wheel.n_slots).sum::<usize>();
+        let of_joints = self
+            .joints_with_slots()
+            .map(|joint| self.joints[joint].body);
+        let n_of_joints = of_joints.filter(is_own).count();
+        let room = MAX_CONTACTS.saturating_sub(n_of_wheels + n_of_joints);
+        let slots = ends.iter().flat_map(|&end| [end; FOR_BODIES]);
+        slots.take(room).collect()
     }
 
     /// Joints with slots of their own: those with stops, then those with dry friction.
@@ -59,17 +64,6 @@ impl Machine {
             .chain(self.spares.iter().copied())
             .chain(joints)
             .collect()
-    }
-
-    /// Pattern of the problems of all slots. Where loops are closed, bodies touch each other, or a
-    /// coupled joint follows one with other carriers, it has all entries.
-    pub(super) fn find_pattern(&self) -> Arc<Pattern> {
-        let bodies = self.slot_bodies();
-        let paths = (bodies.iter()).map(|body| body.map(|body| self.path(body).to_vec()));
-        let own = paths.collect::<Option<Vec<_>>>();
-        let own = own.filter(|_| self.loops.is_empty());
-        let of_tree = own.and_then(|paths| Pattern::new(self.nv(), &paths));
-        Arc::new(of_tree.unwrap_or_else(|| Pattern::whole(self.nv(), bodies.len())))
     }
 
     /// Whether all that moves a body also moves another one.

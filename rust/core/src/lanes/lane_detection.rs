@@ -13,9 +13,15 @@ use crate::contact::{Activation, Contact, PairSearch, Part};
 use crate::scalar::{Lane, LaneMask};
 
 impl<T: Lane> Contacts<T> {
-    /// Finds what was asked for. Returns the lanes with unknown ground or too few slots.
+    /// Finds what was asked for, and contacts between bodies in the lanes `meeting`. Returns the
+    /// lanes with unknown ground or too few slots.
     #[cold]
-    pub(super) fn find_by_lane(&mut self, ground: &Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
+    pub(super) fn find_by_lane(
+        &mut self,
+        ground: &Ground<T>,
+        sight: &Sight<'_, T>,
+        meeting: u32,
+    ) -> T::Mask {
         let mut fallbacks = 0;
         for lane in 0..T::LANES {
             let (Some(model), Some(terrain)) = (&sight.models[lane], ground.terrain(lane)) else {
@@ -48,10 +54,10 @@ impl<T: Lane> Contacts<T> {
                 let unknown = detect_parts(parts, &machine, &**terrain, &activation, &mut contacts);
                 fallbacks |= u32::from(unknown.is_some()) << lane;
             }
-            if sight.machine.has_pairs && sight.going >> lane & 1 == 1 {
+            if meeting >> lane & 1 == 1 {
                 let v: Vec<f64> = sight.v.iter().map(|v| v.get(lane)).collect();
                 let places = |body: usize| sight.middle.bodies[body].r.get(lane).into();
-                let fastest = model.fastest_point(&model.trees()[0], places, &v);
+                let fastest = model.fastest_approach(places, &v);
                 let activation = activation(sight.forecast.lead.abs() * fastest);
                 let pairs = self
                     .by_lane

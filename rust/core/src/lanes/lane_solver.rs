@@ -5,7 +5,8 @@
 
 use super::dry_equations::{DrySystem, PLACES};
 use super::equations::DenseSystem;
-use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE};
+use super::large_equations::LargeSystem;
+use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_LARGE};
 use super::system::Loaded;
 use super::velocity_equations::VelocitySystem;
 use crate::problem::{ContactScales, Magnitudes};
@@ -37,6 +38,9 @@ pub(super) type DenseSolver<T, const C: usize> = LaneSolver<T, C, DenseSystem<T,
 
 /// Lanes for those with dry joints.
 pub(super) type DrySolver<T> = LaneSolver<T, PLACES, DrySystem<T>>;
+
+/// Lanes for those of many rigid discs.
+pub(super) type LargeSolver<T> = LaneSolver<T, MAX_LARGE, LargeSystem<T>>;
 
 /// Lanes for problems with a factored operator.
 pub(super) type FactoredSolver<T> = LaneSolver<T, MAX_CONTACTS, VelocitySystem<T, MAX_CONTACTS>>;

@@ -1,16 +1,17 @@
 //! The machine that all rovers of a block share: its mechanism, its wheels and its boxes.
 //!
-//! Body 0 is the trunk, on the free base. Bodies, velocities, motions and joints are numbered as in
-//! the model. Lengths are in m.
+//! It has a tree or several, each on a free base. Bodies, velocities, motions and joints are
+//! numbered as in the model. Lengths are in m.
 
 use std::ops::Deref;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
+use super::clusters::Clusters;
 use super::pattern::Pattern;
-use super::problem::MAX_CONTACTS;
+use super::problem::{MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::contact::Part;
 #[cfg(doc)]
 use crate::geometry::Roller;
@@ -24,16 +25,22 @@ use crate::system::sand_wheel::PlacedWheel;
 /// Most slots of a wheel beside those of its circles on a plane.
 const MOST_FURTHER: usize = 2;
 
+/// Most slots of a machine: they are numbered by 8 bits.
+const MAX_SLOTS: usize = 256;
+
 /// Why a machine has no fast step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Unsupported {
-    /// It has several trees, or its root is fixed.
-    #[error("the machine is not one tree on a free base")]
-    NotOneFreeTree,
+    /// A root is fixed, or hangs on a joint.
+    #[error("a root of the machine is not free")]
+    FixedRoot,
     /// A problem has no room for the contacts of its wheels with a plane, its stops and its joints
     /// with dry friction.
     #[error("wheels, stops and dry joints can have {0} contacts, more than {MAX_CONTACTS}")]
     TooManyContacts(usize),
+    /// The machines of a model together need too many slots for contacts.
+    #[error("the machines need {0} slots for contacts, more than {MAX_SLOTS}")]
+    TooManySlots(usize),
 }
 
 /// What a block of rovers has in common: a mechanism, and its wheels, boxes and stops.
@@ -55,20 +62,11 @@ pub struct Machine {
     pub(super) holds_the_world: bool,
     /// Slots between those of the wheels and the joints: [`Self::find_free_slots`].
     pub(super) spares: Vec<Option<usize>>,
-    /// Whether its bodies can touch each other.
+    /// Whether its bodies can touch each other, and whether those of one tree can.
     pub(super) has_pairs: bool,
-    pattern: LazyPattern,
-}
-
-/// The pattern of a machine's contact problems, found where it is first needed. It follows from the
-/// rest of the machine.
-#[derive(Clone, Debug, Default)]
-struct LazyPattern(OnceLock<Arc<Pattern>>);
-
-impl PartialEq for LazyPattern {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
+    pub(super) touches_itself: bool,
+    /// Which trees have contact problems of their own.
+    pub(super) clusters: Clusters,
 }
 
 impl Deref for Machine {
@@ -136,13 +134,13 @@ impl Machine {
     /// # Errors
     /// Why it has no fast step.
     pub fn of(model: &Model) -> Result<Self, Unsupported> {
-        check(model)?;
-        let mut wheels: Vec<WheelDisc> = model.wheels().iter().map(WheelDisc::of).collect();
-        let rubbing = model.rubbing_joints().to_vec();
-        give_slots(&mut wheels, model.limited_joints().len() + rubbing.len())?;
+        if !model.is_free() {
+            return Err(Unsupported::FixedRoot);
+        }
+        let touches_itself = model.trees().iter().any(|tree| tree.self_contact);
         let mut machine = Self {
             mechanism: model.mechanism().clone(),
-            wheels,
+            wheels: model.wheels().iter().map(WheelDisc::of).collect(),
             in_sand: (model.wheels().iter()).map(PlacedWheel::of).collect(),
             boxes: (Part::all(model).skip(model.wheels().len()))
                 .map(|part| BodyBox::of(model, part))
@@ -153,21 +151,83 @@ impl Machine {
                     Some(Stop { joint, limits })
                 })
                 .collect(),
-            rubbing,
+            rubbing: model.rubbing_joints().to_vec(),
             loops: model.loops().to_vec(),
             holds_the_world: model.holds_the_world(),
             spares: Vec::new(),
-            has_pairs: model.trees()[0].self_contact,
-            pattern: LazyPattern::default(),
+            has_pairs: model.trees().len() > 1 || touches_itself,
+            touches_itself,
+            clusters: Clusters::of(model.mechanism(), model.loops()),
         };
-        machine.spares = machine.find_free_slots(machine.has_pairs);
+        for cluster in 0..machine.clusters.n() {
+            machine.give_slots(cluster)?;
+        }
+        machine.spares = machine.find_free_slots();
+        let n = machine.slot_bodies().len();
+        if n > MAX_SLOTS {
+            return Err(Unsupported::TooManySlots(n));
+        }
         Ok(machine)
     }
 
-    /// Whether a wheel touches a plane at two points.
+    /// Number of contact problems of a rover.
     #[must_use]
-    pub fn has_lines(&self) -> bool {
-        self.wheels.iter().any(|wheel| wheel.n_circles() > 1)
+    pub fn n_problems(&self) -> usize {
+        self.clusters.n()
+    }
+
+    /// The cluster of a body.
+    pub(super) fn cluster_of(&self, body: usize) -> usize {
+        self.clusters.of_tree(self.tree_of_body(body))
+    }
+
+    /// Most contacts of a cluster's problem with the whole operator, dry joints among them: none if
+    /// a wheel touches a plane at two points.
+    pub(super) fn most_dense(&self, cluster: usize) -> usize {
+        let mut wheels = self.wheels_of(cluster);
+        let n_dry = self.n_dry(cluster);
+        if wheels.any(|wheel| wheel.n_circles() > 1) || n_dry > MAX_DRY {
+            0
+        } else {
+            MAX_DENSE + n_dry
+        }
+    }
+
+    /// Number of a cluster's joints with dry friction.
+    pub(super) fn n_dry(&self, cluster: usize) -> usize {
+        let of = |joint: &&usize| self.cluster_of(self.joints[**joint].body) == cluster;
+        self.rubbing.iter().filter(of).count()
+    }
+
+    /// Whether wheels of a cluster are rigid, and none touches a plane at two points.
+    pub(super) fn has_rigid_discs(&self, cluster: usize) -> bool {
+        let is_rigid = |wheel: &WheelDisc| wheel.compliance.is_none();
+        let has_lines = |wheel: &WheelDisc| wheel.n_circles() > 1;
+        self.wheels_of(cluster).any(is_rigid) && !self.wheels_of(cluster).any(has_lines)
+    }
+
+    fn wheels_of(&self, cluster: usize) -> impl Iterator<Item = &WheelDisc> {
+        (self.wheels.iter()).filter(move |wheel| self.cluster_of(wheel.body) == cluster)
+    }
+
+    /// Gives each wheel of a cluster slots for its circles on a plane, and as many further ones as
+    /// there is room for.
+    fn give_slots(&mut self, cluster: usize) -> Result<(), Unsupported> {
+        let is_own = |joint: &usize| self.cluster_of(self.joints[*joint].body) == cluster;
+        let n_of_joints = self.joints_with_slots().filter(is_own).count();
+        let n_wheels = self.wheels_of(cluster).count();
+        let n_circles = self.wheels_of(cluster).map(WheelDisc::n_circles);
+        let n_needed = n_of_joints + n_circles.sum::<usize>();
+        let Some(room) = MAX_CONTACTS.checked_sub(n_needed) else {
+            return Err(Unsupported::TooManyContacts(n_needed));
+        };
+        let further = (room / n_wheels.max(1)).min(MOST_FURTHER);
+        for w in 0..self.wheels.len() {
+            if self.cluster_of(self.wheels[w].body) == cluster {
+                self.wheels[w].n_slots = self.wheels[w].n_circles() + further;
+            }
+        }
+        Ok(())
     }
 
     /// Whether any wheel yields where it touches.
@@ -176,9 +236,13 @@ impl Machine {
         self.wheels.iter().any(|wheel| wheel.compliance.is_some())
     }
 
-    /// Pattern of its contact problems.
-    pub(super) fn pattern(&self) -> &Arc<Pattern> {
-        self.pattern.0.get_or_init(|| self.find_pattern())
+    /// Pattern of a cluster's contact problems.
+    pub(super) fn pattern(&self, cluster: usize) -> &Arc<Pattern> {
+        let bodies = self.slot_bodies();
+        let own = bodies.into_iter().flatten();
+        let own = own.filter(|body| self.cluster_of(*body) == cluster);
+        let paths: Vec<&[usize]> = own.map(|body| self.path(body)).collect();
+        self.clusters.pattern(cluster, &paths)
     }
 
     /// Whether a model differs from this machine only in its inertias, springs, dampers, rotors and
@@ -255,25 +319,4 @@ impl WheelDisc {
     pub fn n_circles(&self) -> usize {
         if self.half > 0.0 { 2 } else { 1 }
     }
-}
-
-fn check(model: &Model) -> Result<(), Unsupported> {
-    if !model.is_free_tree() {
-        return Err(Unsupported::NotOneFreeTree);
-    }
-    Ok(())
-}
-
-/// Gives each wheel slots for its circles on a plane, and as many further ones as there is room
-/// for. `n_of_joints`: number of slots of joints.
-fn give_slots(wheels: &mut [WheelDisc], n_of_joints: usize) -> Result<(), Unsupported> {
-    let n_needed = n_of_joints + wheels.iter().map(WheelDisc::n_circles).sum::<usize>();
-    let Some(room) = MAX_CONTACTS.checked_sub(n_needed) else {
-        return Err(Unsupported::TooManyContacts(n_needed));
-    };
-    let further = (room / wheels.len().max(1)).min(MOST_FURTHER);
-    for wheel in wheels {
-        wheel.n_slots = wheel.n_circles() + further;
-    }
-    Ok(())
 }

@@ -14,9 +14,10 @@
 //!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
 //! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield; [`pattern`]: which
 //!   velocities a contact moves;
-//! - [`problem`]: a rover's friction-contact problem; [`queue`], `lane_solver`, `sweeps`: how the
-//!   problems of many are solved, by [`crate::solver`]'s pivoting; `system`, `equations`,
-//!   `dry_equations`, `velocity_equations`, `tree_matrix`: its linear systems;
+//! - `clusters`: which trees have a problem of their own; [`problem`]: a friction-contact problem;
+//!   [`queue`], `lane_solver`, `sweeps`: how the problems of many are solved, by
+//!   [`crate::solver`]'s pivoting; `system`, `equations`,
+//!   `dry_equations`, `large_equations`, `velocity_equations`, `tree_matrix`: its linear systems;
 //! - [`step`]: the step. The dynamics of the tree are those of [`crate::multibody`], its drives
 //!   those of [`crate::system`].
 //!
@@ -51,6 +52,7 @@
 
 pub mod admission;
 mod by_lane;
+mod clusters;
 mod contact_plane;
 pub mod contacts;
 mod dry_equations;
@@ -62,6 +64,7 @@ mod joint_slots;
 mod lane_detection;
 pub mod lane_rover;
 mod lane_solver;
+mod large_equations;
 pub mod machine;
 mod parts;
 pub mod pattern;

@@ -11,7 +11,7 @@ use super::machine::Machine;
 use crate::contact::Part;
 use crate::multibody::JointAxis;
 use crate::multibody::joint::{Joint, JointModel, Revolute};
-use crate::multibody::mechanism::{Link, Mover};
+use crate::multibody::mechanism::{BASE, Link, Mover};
 use crate::multibody::poses::{Pose, Poses};
 use crate::scalar::{Lane, Mat3, Vec3};
 
@@ -20,7 +20,9 @@ use crate::scalar::{Lane, Mat3, Vec3};
 pub(super) struct Parts {
     pub wheels: Vec<Wheel>,
     pub boxes: Vec<Solid>,
-    /// The trunk, then bodies after what carries them.
+    /// First velocities of the trees' roots, whose twists come first.
+    roots: Vec<usize>,
+    /// The roots, then bodies after what carries them.
     carriers: Vec<Carrier>,
 }
 
@@ -28,6 +30,7 @@ pub(super) struct Parts {
 #[derive(Clone, Debug)]
 pub(super) struct Wheel {
     pub body: usize,
+    pub tree: usize,
     /// Its slots for contacts.
     pub slots: Range<usize>,
     centre: Option<[f64; 3]>,
@@ -65,6 +68,7 @@ enum Axle {
 pub(super) struct Solid {
     pub part: Part,
     pub body: usize,
+    pub tree: usize,
     centre: Option<[f64; 3]>,
     rotation: Option<[[f64; 3]; 3]>,
     pub half_size: [f64; 3],
@@ -84,7 +88,7 @@ struct Carrier {
     mover: Mover,
 }
 
-/// Velocity of a body: angular, and of its material point at the trunk's origin.
+/// Velocity of a body: angular, and of its material point at the origin of its tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Twist<T> {
     pub angular: Vec3<T>,
@@ -94,15 +98,16 @@ pub(super) struct Twist<T> {
 impl Parts {
     /// The parts of a machine.
     pub(super) fn of(machine: &Machine) -> Self {
-        let trunk = Mover {
-            velocity: 0,
-            motion: 0,
-        };
-        let mut carriers = vec![Carrier {
-            body: 0,
-            parent: 0,
-            mover: trunk, // not read
-        }];
+        let mut carriers: Vec<Carrier> = (machine.trees.iter())
+            .map(|tree| Carrier {
+                body: tree.bodies.start,
+                parent: 0,
+                mover: Mover {
+                    velocity: 0,
+                    motion: 0,
+                }, // not read
+            })
+            .collect();
         let some = |x: [f64; 3]| x.iter().any(|x| x.abs() > 0.0).then_some(x);
         let mut n_slots = 0;
         let wheels = (machine.wheels.iter())
@@ -115,6 +120,7 @@ impl Parts {
                 let mover = if spins { link.parent } else { wheel.body };
                 Wheel {
                     body: wheel.body,
+                    tree: machine.tree_of_body(wheel.body),
                     slots: first..n_slots,
                     centre: some(wheel.centre),
                     axle,
@@ -137,6 +143,7 @@ impl Parts {
                 Solid {
                     part: solid.part,
                     body: solid.body,
+                    tree: machine.tree_of_body(solid.body),
                     centre: some(solid.centre),
                     rotation: (!is_plain).then_some(solid.rotation),
                     half_size: solid.half_size,
@@ -148,6 +155,9 @@ impl Parts {
         Self {
             wheels,
             boxes,
+            roots: (machine.trees.iter())
+                .map(|tree| tree.velocities.start)
+                .collect(),
             carriers,
         }
     }
@@ -162,11 +172,14 @@ impl Parts {
     pub(super) fn find_twists<T: Lane>(&self, poses: &Poses<T>, v: &[T], twists: &mut [Twist<T>]) {
         let n = self.carriers.len();
         let twists = &mut twists[..n];
-        twists[0] = Twist {
-            linear: Vec3::new(v[0], v[1], v[2]),
-            angular: Vec3::new(v[3], v[4], v[5]),
-        };
-        for i in 1..n {
+        for (twist, &first) in twists.iter_mut().zip(&self.roots) {
+            let v = &v[first..][..BASE];
+            *twist = Twist {
+                linear: Vec3::new(v[0], v[1], v[2]),
+                angular: Vec3::new(v[3], v[4], v[5]),
+            };
+        }
+        for i in self.roots.len()..n {
             let Carrier { parent, mover, .. } = self.carriers[i];
             let (motion, rate) = (&poses.motions[mover.motion], v[mover.velocity]);
             let before = twists[parent];
@@ -215,7 +228,7 @@ impl Wheel {
         if self.half > 0.0 { 2 } else { 1 }
     }
 
-    /// Centre relative to the trunk's origin, m.
+    /// Centre relative to the origin of its tree, m.
     #[inline(always)]
     pub(super) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
         place(pose, self.centre.as_ref())
@@ -249,7 +262,7 @@ impl Wheel {
 }
 
 impl Solid {
-    /// Centre relative to the trunk's origin, m.
+    /// Centre relative to the origin of its tree, m.
     #[inline(always)]
     pub(super) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
         place(pose, self.centre.as_ref())
@@ -271,7 +284,7 @@ impl Solid {
     }
 }
 
-/// A point of a body, `None` for its origin, relative to the trunk's origin, m.
+/// A point of a body, `None` for its origin, relative to the origin of its tree, m.
 #[inline(always)]
 fn place<T: Lane>(pose: &Pose<T>, x: Option<&[f64; 3]>) -> Vec3<T> {
     match x {

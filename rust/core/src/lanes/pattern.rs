@@ -19,6 +19,8 @@ pub struct Pattern {
     stride: usize,
     /// Velocities that two slots share: `shared[a * n + b]`.
     shared: Vec<usize>,
+    /// Whether it has all entries.
+    is_whole: bool,
 }
 
 impl Pattern {
@@ -58,6 +60,7 @@ impl Pattern {
                 .flat_map(|a| paths.iter().map(move |b| shared(a, b)))
                 .collect(),
             paths: own_paths,
+            is_whole: false,
         })
     }
 
@@ -72,7 +75,15 @@ impl Pattern {
             paths: vec![joints; n],
             stride: nv,
             shared: vec![nv; n * n],
+            is_whole: true,
         }
+    }
+
+    /// Whether it has all entries, and every slot all velocities.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.is_whole
     }
 
     /// Number of joints' velocities.

@@ -15,6 +15,9 @@ pub const MAX_DENSE: usize = 8;
 /// See above.
 pub const MAX_DRY: usize = 10;
 
+/// Most contacts of a problem with factors that is solved with the operator that they give.
+pub const MAX_LARGE: usize = 24;
+
 /// Most unknowns.
 pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 
@@ -71,7 +74,8 @@ pub struct ContactProblem {
 pub struct Factored {
     /// The machine's.
     pub pattern: Option<Arc<Pattern>>,
-    /// Slots with a contact, in the order of the contacts.
+    /// Slots with a contact, in the order of the contacts. Where the pattern is whole, the contacts
+    /// have the first ones.
     pub slots: u32,
     /// Z along the path of each contact: `Z[contact * stride + k]`, kg^(-1/2).
     pub Z: Vec<Triple<f64>>,
@@ -79,6 +83,9 @@ pub struct Factored {
     pub diagonal: Vec<[f64; 9]>,
     /// Diagonal of D by contact, 1/kg.
     pub softness: Vec<f64>,
+    /// Whether it is solved with the operator itself: at most [`MAX_LARGE`] contacts, of a pattern
+    /// that has all entries.
+    pub is_multiplied: bool,
     /// What it has more along a normal that nothing moves, 1/kg: that of a joint's dry friction.
     pub normal: Vec<f64>,
 }
@@ -90,6 +97,12 @@ impl Factored {
     pub fn contact_at(&self, slot: usize) -> Option<usize> {
         let is_used = self.slots >> slot & 1 == 1;
         is_used.then(|| (self.slots & ((1 << slot) - 1)).count_ones() as usize)
+    }
+
+    /// Numbers of a contact's Z, and whether they are those of all velocities.
+    #[inline(always)]
+    pub(super) fn shape(&self) -> (usize, bool) {
+        (self.pattern.as_deref()).map_or((0, false), |own| (own.stride(), own.is_whole()))
     }
 
     /// Entry of W, 1/kg.
@@ -126,6 +139,7 @@ impl Factored {
     fn copy_from(&mut self, other: &Self) {
         self.pattern.clone_from(&other.pattern);
         self.slots = other.slots;
+        self.is_multiplied = other.is_multiplied;
         self.Z.clone_from(&other.Z);
         self.diagonal.clone_from(&other.diagonal);
         self.softness.clone_from(&other.softness);

@@ -9,8 +9,10 @@
 //! rocks, 4912 resist the first attempt and 67 all four.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
-use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, ProblemSource};
+use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, LargeSolver, ProblemSource};
+use super::pattern::Pattern;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::problem::Residual;
 use crate::scalar::Lane;
@@ -20,6 +22,9 @@ pub use super::lane_solver::MAX_ITERATIONS;
 
 /// Contacts up to which the smaller system serves, that of a rover with six wheels on the plane.
 const FEW: usize = 6;
+
+/// Patterns whose solvers are kept from one call to the next.
+const MOST_PATTERNS: usize = 8;
 
 /// Squares of the tolerances.
 #[inline(always)]
@@ -59,16 +64,18 @@ impl ContactProblem {
     }
 }
 
-/// Problems of several groups, which enter at any time. A group has as many places as a register
-/// has lanes: problem `k` is of group `k / T::LANES`.
+/// Problems of several groups of equal size, which enter at any time: problem `k` is of group
+/// `k / size`.
 pub struct Queue<T: Lane> {
     token: T::Token,
     few: Box<DenseSolver<T, FEW>>,
     many: Box<DenseSolver<T, MAX_DENSE>>,
     dry: Box<DrySolver<T>>,
-    factored: Box<FactoredSolver<T>>,
-    /// Problems that wait for a lane, by [`Kind`].
-    waiting: [VecDeque<usize>; 4],
+    large: Option<Box<LargeSolver<T>>>,
+    /// Those of problems with factors, by pattern.
+    factored: Vec<(Arc<Pattern>, Box<FactoredSolver<T>>)>,
+    /// Problems that wait for a lane of each: [`Kind::index`].
+    waiting: Vec<VecDeque<usize>>,
     groups: Groups,
 }
 
@@ -78,14 +85,15 @@ enum Kind {
     Few,
     Many,
     Dry,
-    Factored,
+    Large,
+    /// That of a pattern, by its place.
+    Factored(usize),
 }
 
 impl Kind {
-    fn of(problem: &ContactProblem) -> Self {
-        if problem.is_factored() {
-            Self::Factored
-        } else if problem.n_dry > 0 {
+    /// That of a problem with the whole operator.
+    fn of_dense(problem: &ContactProblem) -> Self {
+        if problem.n_dry > 0 {
             Self::Dry
         } else if problem.n_contacts > FEW {
             Self::Many
@@ -93,12 +101,24 @@ impl Kind {
             Self::Few
         }
     }
+
+    /// Its place among all.
+    #[inline(always)]
+    fn index(self) -> usize {
+        match self {
+            Self::Few => 0,
+            Self::Many => 1,
+            Self::Dry => 2,
+            Self::Large => 3,
+            Self::Factored(place) => 4 + place,
+        }
+    }
 }
 
 /// How far the groups are.
 #[derive(Debug, Default)]
 struct Groups {
-    n_lanes: usize,
+    size: usize,
     /// Problems of each that have not ended.
     left: Vec<usize>,
     /// Those without any left, in the order in which they ended.
@@ -133,7 +153,7 @@ impl ProblemSource for Waiting<'_> {
 impl Groups {
     #[inline(always)]
     fn end(&mut self, index: usize) {
-        let group = index / self.n_lanes;
+        let group = index / self.size;
         self.left[group] -= 1;
         if self.left[group] == 0 {
             self.ready.push_back(group);
@@ -150,22 +170,30 @@ impl<T: Lane> Queue<T> {
             few: Box::new(DenseSolver::new(token)),
             many: Box::new(DenseSolver::new(token)),
             dry: Box::new(DrySolver::new(token)),
-            factored: Box::new(FactoredSolver::new(token)),
-            waiting: [const { VecDeque::new() }; 4],
-            groups: Groups {
-                n_lanes: T::LANES,
-                ..Groups::default()
-            },
+            large: None,
+            factored: Vec::new(),
+            waiting: vec![VecDeque::new(); Kind::Factored(0).index()],
+            groups: Groups::default(),
         }
     }
 
-    /// Makes room for `n` groups and forgets all earlier ones.
-    pub fn begin(&mut self, n: usize) {
+    /// Makes room for `n` groups of `size` problems and forgets all earlier ones.
+    pub fn begin(&mut self, n: usize, size: usize) {
         self.few.clear();
         self.many.clear();
         self.dry.clear();
-        self.factored.clear();
+        if let Some(large) = &mut self.large {
+            large.clear();
+        }
         self.waiting.iter_mut().for_each(VecDeque::clear);
+        if self.factored.len() > MOST_PATTERNS {
+            self.factored.clear();
+            self.waiting.truncate(Kind::Factored(0).index());
+        }
+        for (_, solver) in &mut self.factored {
+            solver.clear();
+        }
+        self.groups.size = size;
         self.groups.left.clear();
         self.groups.left.resize(n, 0);
         self.groups.ready.clear();
@@ -186,13 +214,19 @@ impl<T: Lane> Queue<T> {
         problems: &mut [ContactProblem],
         is_asked: impl Fn(usize) -> bool,
     ) {
-        let first = group * T::LANES;
-        let own = &mut problems[first..][..T::LANES];
+        let size = self.groups.size;
+        let first = group * size;
+        let own = &mut problems[first..][..size];
         let mut left = 0;
         for (place, problem) in own.iter_mut().enumerate().filter(|(k, _)| is_asked(*k)) {
             problem.begin();
             if !problem.is_solved {
-                self.waiting[Kind::of(problem) as usize].push_back(first + place);
+                let kind = match &problem.factored.pattern {
+                    Some(_) if problem.factored.is_multiplied => Kind::Large,
+                    Some(pattern) => self.kind_of(pattern),
+                    None => Kind::of_dense(problem),
+                };
+                self.waiting[kind.index()].push_back(first + place);
                 left += 1;
             }
         }
@@ -200,6 +234,18 @@ impl<T: Lane> Queue<T> {
         if left == 0 {
             self.groups.ready.push_back(group);
         }
+    }
+
+    /// The solver of problems with factors of a pattern.
+    fn kind_of(&mut self, pattern: &Arc<Pattern>) -> Kind {
+        let is_own = |(own, _): &(Arc<Pattern>, _)| Arc::ptr_eq(own, pattern);
+        let place = self.factored.iter().position(is_own);
+        Kind::Factored(place.unwrap_or_else(|| {
+            let solver = Box::new(FactoredSolver::new(self.token));
+            self.factored.push((Arc::clone(pattern), solver));
+            self.waiting.push(VecDeque::new());
+            self.factored.len() - 1
+        }))
     }
 
     /// Works as long as its lanes are full, and until the problems of a group have all ended.
@@ -211,14 +257,21 @@ impl<T: Lane> Queue<T> {
     ) -> Option<usize> {
         let tolerances = squares::<T>(self.token, options);
         loop {
-            let mut counts = self.waiting.each_ref().map(VecDeque::len);
-            counts[0] += self.few.n_active();
-            counts[1] += self.many.n_active();
-            counts[2] += self.dry.n_active();
-            counts[3] += self.factored.n_active();
-            let (mut kind, mut most, mut n_others) = (Kind::Few, counts[0], 0);
-            for other in [Kind::Many, Kind::Dry, Kind::Factored] {
-                let count = counts[other as usize];
+            let waiting = |kind: Kind| self.waiting[kind.index()].len();
+            let factored = self.factored.iter().enumerate();
+            let n_large = self.large.as_ref().map_or(0, |large| large.n_active());
+            let others = [
+                (Kind::Many, self.many.n_active()),
+                (Kind::Dry, self.dry.n_active()),
+                (Kind::Large, n_large),
+            ];
+            let others = (others.into_iter()).chain(
+                factored.map(|(place, (_, solver))| (Kind::Factored(place), solver.n_active())),
+            );
+            let (mut kind, mut n_others) = (Kind::Few, 0);
+            let mut most = waiting(kind) + self.few.n_active();
+            for (other, n_active) in others {
+                let count = waiting(other) + n_active;
                 n_others = n_others.max(count.min(most));
                 if count > most {
                     (kind, most) = (other, count);
@@ -245,15 +298,8 @@ impl<T: Lane> Queue<T> {
         n_others: usize,
     ) {
         let token = self.token;
-        let Self {
-            few,
-            many,
-            dry,
-            factored,
-            ..
-        } = self;
         let mut line = Waiting {
-            problems: &mut self.waiting[kind as usize],
+            problems: &mut self.waiting[kind.index()],
             groups: &mut self.groups,
             n_others,
         };
@@ -261,22 +307,32 @@ impl<T: Lane> Queue<T> {
             Kind::Few => T::vectorize(
                 token,
                 #[inline(always)]
-                || few.run(token, problems, tolerances, &mut line),
+                || (self.few).run(token, problems, tolerances, &mut line),
             ),
             Kind::Many => T::vectorize(
                 token,
                 #[inline(always)]
-                || many.run(token, problems, tolerances, &mut line),
+                || (self.many).run(token, problems, tolerances, &mut line),
             ),
             Kind::Dry => T::vectorize(
                 token,
                 #[inline(always)]
-                || dry.run(token, problems, tolerances, &mut line),
+                || (self.dry).run(token, problems, tolerances, &mut line),
             ),
-            Kind::Factored => T::vectorize(
+            Kind::Large => {
+                let large = self
+                    .large
+                    .get_or_insert_with(|| Box::new(LargeSolver::new(token)));
+                T::vectorize(
+                    token,
+                    #[inline(always)]
+                    || large.run(token, problems, tolerances, &mut line),
+                );
+            }
+            Kind::Factored(place) => T::vectorize(
                 token,
                 #[inline(always)]
-                || factored.run(token, problems, tolerances, &mut line),
+                || (self.factored[place].1).run(token, problems, tolerances, &mut line),
             ),
         }
     }

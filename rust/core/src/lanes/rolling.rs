@@ -18,11 +18,9 @@ impl<T: Lane> Contacts<T> {
         (s, centre): (Vec3<T>, Vec3<T>),
         reach: T,
     ) -> T::Mask {
-        let origin = sight.middle.origin;
-        let (radius, first) = (
-            self.parts.wheels[w].radius,
-            self.parts.wheels[w].slots.start,
-        );
+        let wheel = &self.parts.wheels[w];
+        let origin = sight.middle.origin_of(wheel.tree);
+        let (radius, first) = (wheel.radius, wheel.slots.start);
         let rim = Rim {
             centre: origin + centre,
             axle: s,

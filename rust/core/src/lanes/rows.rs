@@ -2,11 +2,13 @@
 //!
 //! The rows are those of `crate::contact::rows`, along the path of each slot's part
 //! ([`super::contacts`]). A slot that is active in some lanes only never changes what the others
-//! accumulate.
+//! accumulate. Contacts of different clusters have no block of W: the operator of each cluster's
+//! problem is its own.
 
 use std::sync::Arc;
 
 use super::by_lane::OneLane;
+use super::clusters::WidePatterns;
 use super::contacts::{Contacts, Slot};
 use super::joint_slots::JointRow;
 use super::machine::Machine;
@@ -18,7 +20,7 @@ use crate::contact::{Contact, rollers};
 use crate::multibody::loops::Placed;
 use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::{Factor, Poses};
-use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::loops::Loops;
 
 /// What is read of a problem.
@@ -37,21 +39,30 @@ pub struct Rows<T: Lane> {
     /// Bodies of the parts: wheels, spare slots, and joints; none of a spare slot with all
     /// velocities.
     bodies: Vec<Option<usize>>,
-    /// Velocities of the joints that move each part, from the trunk outwards.
+    /// First velocity of the root that carries each part.
+    bases: Vec<usize>,
+    /// Velocities of the joints that move each part, from the root outwards.
     movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
     /// Whether wheels have rollers.
     has_rollers: bool,
-    /// Length of the longest path.
-    stride: usize,
-    /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
+    /// Z along the path of each slot's part: `Z[starts[slot] + k]`.
     Z: Vec<Triple<T>>,
-    /// Blocks of W for the slots in use by lanes without factors, row-major: [`block`] of their
-    /// positions among them.
+    starts: Vec<usize>,
+    /// Blocks of W for the slots of each cluster in use by lanes without factors, row-major:
+    /// [`block`] of their positions among them, from the cluster's first.
     pub(super) W: Vec<[T; 9]>,
-    /// Pattern of the problems with factors.
-    pattern: Arc<Pattern>,
+    first_blocks: Vec<usize>,
+    /// Patterns of the problems with factors: of each cluster, and of those whose bodies touch each
+    /// other.
+    patterns: Vec<Arc<Pattern>>,
+    wide: WidePatterns,
+    /// Number of each slot in its cluster's pattern.
+    numbers: Vec<usize>,
+    /// Of each velocity, its cluster and its place among the cluster's velocities; number of those.
+    velocities: Vec<[usize; 2]>,
+    sizes: Vec<usize>,
     /// Diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
     pub(super) diagonal: Vec<[T; 9]>,
     pub(super) softness: Vec<T>,
@@ -78,9 +89,8 @@ impl<T: Lane> Rows<T> {
         let joints = joints.map(|joint| Some(machine.joints[joint].body));
         let bodies: Vec<Option<usize>> = wheels.chain(spares).chain(joints).collect();
         let whole: Vec<usize> = (0..machine.nv()).collect();
-        let paths: Vec<&[usize]> = (bodies.iter())
-            .map(|body| body.map_or(&whole[..], |body| machine.path(body)))
-            .collect();
+        let path_of = |body: Option<usize>| body.map_or(&whole[..], |body| machine.path(body));
+        let paths: Vec<&[usize]> = bodies.iter().map(|body| path_of(*body)).collect();
         let mut common = Vec::with_capacity(paths.len() * paths.len());
         for a in &paths {
             for b in &paths {
@@ -97,19 +107,45 @@ impl<T: Lane> Rows<T> {
                 None => all.clone().collect(),
             })
             .collect();
-        let stride = paths.iter().map(|path| path.len()).max().unwrap_or(0);
+        let n_clusters = machine.n_problems();
+        let mut counts = vec![0; n_clusters];
+        let (mut starts, mut n_rows, mut numbers) = (Vec::new(), 0, Vec::new());
+        for body in machine.slot_bodies() {
+            starts.push(n_rows);
+            n_rows += path_of(body).len();
+            let cluster = body.map(|body| machine.cluster_of(body));
+            numbers.push(cluster.map_or(0, |cluster| counts[cluster]));
+            if let Some(cluster) = cluster {
+                counts[cluster] += 1;
+            }
+        }
+        let (mut first_blocks, mut n_blocks) = (Vec::new(), 0);
+        for n in &counts {
+            first_blocks.push(n_blocks);
+            n_blocks += block(*n, 0);
+        }
         let zero = T::splat(token, 0.0);
         let loops = Loops::new(token, machine, &machine.loops, 0);
         Self {
             token,
+            bases: (paths.iter()).map(|path| path[0]).collect(),
             bodies,
             movers,
             common,
             has_rollers: (machine.wheels.iter()).any(|wheel| wheel.rollers.is_some()),
-            stride,
-            Z: vec![[zero; 3]; n_slots * stride],
-            W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
-            pattern: Arc::clone(machine.pattern()),
+            Z: vec![[zero; 3]; n_rows],
+            starts,
+            W: vec![[zero; 9]; n_blocks],
+            first_blocks,
+            patterns: (0..n_clusters)
+                .map(|cluster| Arc::clone(machine.pattern(cluster)))
+                .collect(),
+            wide: machine.clusters.wide().clone(),
+            numbers,
+            velocities: machine.clusters.places(machine.nv()),
+            sizes: (0..n_clusters)
+                .map(|cluster| machine.clusters.nv(cluster))
+                .collect(),
             diagonal: vec![[zero; 9]; n_slots],
             softness: vec![zero; n_slots],
             normal: vec![zero; n_slots],
@@ -179,8 +215,17 @@ impl<T: Lane> Rows<T> {
     /// Path of a slot, and its rows of Z.
     #[inline(always)]
     pub(super) fn of(&self, contacts: &Contacts<T>, slot: usize) -> (Path<'_>, &[Triple<T>]) {
-        let path = Path::from_trunk(&self.movers[contacts.part(slot)]);
-        (path, &self.Z[slot * self.stride..][..path.len()])
+        let path = self.path(contacts.part(slot));
+        (path, &self.Z[self.starts[slot]..][..path.len()])
+    }
+
+    /// Path of a part; of a spare slot with all velocities, they follow each other.
+    #[inline(always)]
+    fn path(&self, part: usize) -> Path<'_> {
+        Path {
+            base: Some(self.bases[part]),
+            movers: &self.movers[part],
+        }
     }
 
     /// Z and `Hᵀ v` of a slot.
@@ -195,15 +240,24 @@ impl<T: Lane> Rows<T> {
         slot: usize,
     ) {
         let part = contacts.part(slot);
-        let path = Path::from_trunk(&self.movers[part]);
-        let rows = &mut self.Z[slot * self.stride..][..path.len()];
+        let path = Path {
+            base: Some(self.bases[part]),
+            movers: &self.movers[part],
+        };
+        let rows = &mut self.Z[self.starts[slot]..][..path.len()];
         let u = &mut self.u_before[slot];
         if let Some((_, row)) = contacts.joint_row(slot) {
             let (which, entry) = row.entry(v[0]);
             *u = path.write_joint(which, entry, v, rows);
         } else {
-            let place = place_of(contacts.slot(slot));
-            *u = path.write(|m| end.motions[m], &place, v, rows);
+            if self.bodies[part].is_some() {
+                let place = place_of(contacts.slot(slot));
+                *u = path.write(|m| end.motions[m], &place, v, rows);
+            } else {
+                let zero = [v[0].like(0.0); 3];
+                rows.fill(zero);
+                *u = zero;
+            }
             for (lane, contact) in contacts.by_lane.guests(slot) {
                 let one = OneLane {
                     machine,
@@ -211,7 +265,7 @@ impl<T: Lane> Rows<T> {
                     v,
                     lane,
                 };
-                write_guest(&one, contact, path.movers, rows, u);
+                write_guest(&one, contact, path, rows, u);
             }
         }
         match self.bodies[part] {
@@ -239,7 +293,7 @@ impl<T: Lane> Rows<T> {
     /// Diagonal blocks of W from Z.
     #[inline(always)]
     fn multiply_diagonal(&mut self, contacts: &Contacts<T>) {
-        for &slot in contacts.used() {
+        for slot in contacts.used_nearby() {
             self.diagonal[slot] = self.own_block(contacts, slot);
         }
     }
@@ -247,24 +301,26 @@ impl<T: Lane> Rows<T> {
     /// W from Z.
     #[inline(always)]
     fn multiply(&mut self, contacts: &Contacts<T>) {
-        let used = contacts.used_densely();
         let (n_parts, zero) = (self.movers.len(), T::splat(self.token, 0.0));
-        let mut at = 0;
-        for (i, &row) in used.iter().enumerate() {
-            let a = contacts.part(row);
-            for &column in &used[..i] {
-                let b = contacts.part(column);
-                let shared = self.common[a * n_parts + b];
-                let x = &self.Z[row * self.stride..][..shared];
-                let y = &self.Z[column * self.stride..][..shared];
-                self.W[at] = product(zero, x, y);
-                if let Some(loops) = &self.loops {
-                    loops.project_block([row, column], &mut self.W[at]);
+        for cluster in 0..contacts.n_clusters() {
+            let used = contacts.used_densely(cluster);
+            let mut at = self.first_blocks[cluster];
+            for (i, &row) in used.iter().enumerate() {
+                let a = contacts.part(row);
+                for &column in &used[..i] {
+                    let b = contacts.part(column);
+                    let shared = self.common[a * n_parts + b];
+                    let x = &self.Z[self.starts[row]..][..shared];
+                    let y = &self.Z[self.starts[column]..][..shared];
+                    self.W[at] = product(zero, x, y);
+                    if let Some(loops) = &self.loops {
+                        loops.project_block([row, column], &mut self.W[at]);
+                    }
+                    at += 1;
                 }
+                self.W[at] = self.own_block(contacts, row);
                 at += 1;
             }
-            self.W[at] = self.own_block(contacts, row);
-            at += 1;
         }
     }
 
@@ -291,11 +347,14 @@ impl<T: Lane> Rows<T> {
                 own[k] += diagonal(slot);
             }
         };
-        for (i, &slot) in contacts.used_densely().iter().enumerate() {
-            soften(&mut self.W[block(i, i)], slot);
+        for cluster in 0..contacts.n_clusters() {
+            let blocks = &mut self.W[self.first_blocks[cluster]..];
+            for (i, &slot) in contacts.used_densely(cluster).iter().enumerate() {
+                soften(&mut blocks[block(i, i)], slot);
+            }
         }
         if contacts.factored() != 0 {
-            for &slot in contacts.used() {
+            for slot in contacts.used_nearby() {
                 self.softness[slot] = diagonal(slot);
                 soften(&mut self.diagonal[slot], slot);
             }
@@ -366,26 +425,37 @@ impl<T: Lane> Rows<T> {
     ) {
         let zero = T::splat(self.token, 0.0);
         out.fill(zero);
-        let mut sums = [Vec3::new(zero, zero, zero); 2];
+        // Force and moment on a root; the slots of a tree follow each other, mostly.
+        let mut tree = 0;
+        let mut sums = [zero; BASE];
         let mut guests = 0;
         for &slot in contacts.used_by_shapes() {
             let own = contacts.slot(slot);
             let own_guests = contacts.by_lane.guests(slot);
             let of_guests = own_guests.fold(0, |all, (lane, _)| all | 1 << lane);
             guests |= of_guests;
-            let here = own.active & lanes & !T::mask(self.token, of_guests);
-            let wrench = place_of(own).wrench(p[slot]);
-            for (sum, x) in sums.iter_mut().zip(wrench) {
-                *sum = Vec3::select(here, *sum + x, *sum);
+            if self.bodies[contacts.part(slot)].is_none() {
+                continue;
             }
-            let [force, moment] = wrench;
-            for mover in &self.movers[contacts.part(slot)] {
+            let here = own.active & lanes & !T::mask(self.token, of_guests);
+            let [force, moment] = place_of(own).wrench(p[slot]);
+            let Path { base, movers } = self.path(contacts.part(slot));
+            let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+            let base = base.unwrap_or(0);
+            if base != tree {
+                out[tree..][..BASE].copy_from_slice(&sums);
+                sums.copy_from_slice(&out[base..][..BASE]);
+                tree = base;
+            }
+            for k in 0..BASE {
+                add(here, &mut sums[k], both[k]);
+            }
+            for mover in movers {
                 let power = end.motions[mover.motion].power(force, moment);
                 add(here, &mut out[mover.velocity], power);
             }
         }
-        let [total, couple] = sums;
-        out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
+        out[tree..][..BASE].copy_from_slice(&sums);
         if (lanes & T::mask(self.token, guests)).any() {
             add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
@@ -416,22 +486,23 @@ impl<T: Lane> Rows<T> {
             self.token,
             #[inline(always)]
             || {
-                let problems = &mut problems[..T::LANES];
+                let problems = &mut problems[..contacts.n_problems()];
                 let factored = contacts.factored();
-                for (lane, problem) in problems.iter_mut().enumerate() {
-                    problem.n_contacts = contacts.list(lane).n;
-                    problem.n_dry = contacts.slots_of_friction().len();
+                for (index, problem) in problems.iter_mut().enumerate() {
+                    problem.n_contacts = contacts.list(index).n;
+                    problem.n_dry = contacts.n_dry(index);
                     problem.make_room();
                     problem.has_start = false;
-                    if factored >> lane & 1 == 1 {
-                        problem.factored.adopt(&self.pattern);
+                    if problem.n_contacts > 0 && contacts.is_factored(index) {
+                        problem.factored.adopt(self.pattern_of(contacts, index));
                         problem.factored.slots = 0;
+                        problem.factored.is_multiplied = contacts.is_multiplied(index);
                     } else {
                         problem.factored.pattern = None;
                     }
                 }
                 for &slot in contacts.used() {
-                    let places = contacts.places(slot);
+                    let (homes, places) = (contacts.homes(slot), contacts.places(slot));
                     let [n, t, b] = q[slot];
                     let values = store_all(&[n, t, b, mu[slot]]);
                     each::<T>(
@@ -439,44 +510,59 @@ impl<T: Lane> Rows<T> {
                         #[inline(always)]
                         |lane| {
                             let place = usize::from(places[lane]);
-                            let q = &mut problems[lane].q[3 * place..][..3];
+                            let problem = &mut problems[usize::from(homes[lane])];
+                            let q = &mut problem.q[3 * place..][..3];
                             for i in 0..3 {
                                 q[i] = values[i][lane];
                             }
-                            problems[lane].mu[place] = values[3][lane];
+                            problem.mu[place] = values[3][lane];
                         },
                     );
-                    if factored != 0 {
+                    if factored != 0 && contacts.near(slot) != 0 {
                         self.write_factors(contacts, slot, problems);
                     }
                 }
-                let mut at = 0;
-                let dense = contacts.used_densely();
-                for (i, &row) in dense.iter().enumerate() {
-                    for &column in &dense[..=i] {
-                        self.write_block(contacts, [row, column], at, problems);
-                        at += 1;
+                for cluster in 0..contacts.n_clusters() {
+                    let problems = &mut problems[cluster * T::LANES..][..T::LANES];
+                    let mut at = 0;
+                    let dense = contacts.used_densely(cluster);
+                    for (i, &row) in dense.iter().enumerate() {
+                        for &column in &dense[..=i] {
+                            let w = &self.W[self.first_blocks[cluster] + at];
+                            self.write_block(contacts, [row, column], (at, w), problems);
+                            at += 1;
+                        }
                     }
                 }
             },
         );
     }
 
-    /// Writes the block of W of two slots, which is at `at`.
+    /// Pattern of a problem with factors.
+    #[inline(always)]
+    fn pattern_of(&self, contacts: &Contacts<T>, problem: usize) -> &Arc<Pattern> {
+        match contacts.members(problem) {
+            None => &self.patterns[problem / T::LANES],
+            Some(members) => self.wide.of(members.map(|own| self.sizes[own]).sum()),
+        }
+    }
+
+    /// Writes the block `w` of W of two slots of a cluster to its problems; `at`: their position in
+    /// problems that have all slots in use.
     #[inline(always)]
     fn write_block(
         &self,
         contacts: &Contacts<T>,
         [row, column]: [usize; 2],
-        at: usize,
+        (at, w): (usize, &[T; 9]),
         problems: &mut [ContactProblem],
     ) {
         let (of_row, of_column) = (contacts.places(row), contacts.places(column));
-        let [first @ .., last] = &self.W[at];
+        let [first @ .., last] = w;
         let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
         T::transpose(first, &mut rows);
         last.store(&mut ends[..T::LANES]);
-        if contacts.is_full() {
+        if contacts.is_full() && contacts.factored() == 0 {
             for (lane, problem) in problems.iter_mut().enumerate() {
                 let out = &mut problem.W[at];
                 out[..8].copy_from_slice(&rows[lane]);
@@ -484,7 +570,7 @@ impl<T: Lane> Rows<T> {
             }
             return;
         }
-        let dense = T::mask(self.token, !contacts.factored());
+        let dense = T::mask(self.token, !contacts.near(row));
         let both = contacts.slot(row).active & contacts.slot(column).active & dense;
         each::<T>(
             both,
@@ -501,82 +587,130 @@ impl<T: Lane> Rows<T> {
     /// Writes a slot's part of the factors.
     #[inline(always)]
     fn write_factors(&self, contacts: &Contacts<T>, slot: usize, problems: &mut [ContactProblem]) {
-        let pattern = &*self.pattern;
-        let places = contacts.places(slot);
-        let active = contacts.slot(slot).active & T::mask(self.token, contacts.factored());
-        let movers = &self.movers[contacts.part(slot)];
-        let n = BASE + movers.len();
-        let (stride, length) = (pattern.stride(), BASE + pattern.joints(slot).len());
+        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        let near = T::mask(self.token, contacts.near(slot));
+        let (path, rows) = self.of(contacts, slot);
         let softness = store_all(&[self.softness[slot], self.normal[slot]]);
         let diagonal = store_all(&self.diagonal[slot]);
+        // Lanes whose problem has all velocities.
+        let mut whole = 0;
         each::<T>(
-            active,
+            near,
             #[inline(always)]
             |lane| {
-                let (contact, out) = (usize::from(places[lane]), &mut problems[lane].factored);
-                out.slots |= 1 << slot;
+                let out = &mut problems[usize::from(homes[lane])].factored;
+                let contact = usize::from(places[lane]);
                 out.softness[contact] = softness[0][lane];
                 out.normal[contact] = softness[1][lane];
                 let own = &mut out.diagonal[contact];
                 for k in 0..9 {
                     own[k] = diagonal[k][lane];
                 }
-                if length > n {
-                    out.Z[contact * stride..][..length].fill([0.0; 3]);
+                let (stride, is_whole) = out.shape();
+                if is_whole {
+                    whole |= 1 << lane;
+                    out.slots |= 1 << contact;
+                    out.Z[contact * stride..][..stride].fill([0.0; 3]);
+                } else {
+                    out.slots |= 1 << self.numbers[slot];
                 }
             },
         );
-        let Z = &self.Z[slot * self.stride..][..n];
-        for k in 0..n {
-            let values = store_all(&Z[k]);
-            // Its place on a path of all velocities is the velocity.
-            let k = match k.checked_sub(BASE) {
-                Some(k) if length > n => movers[k].velocity,
-                _ => k,
-            };
+        if whole == 0 {
+            self.write_along_path(contacts, slot, rows, problems);
+            return;
+        }
+        for (k, (velocity, z)) in path.velocities().zip(rows).enumerate() {
+            let values = store_all(z);
+            let [cluster, place] = self.velocities[velocity];
             each::<T>(
-                active,
+                near,
+                #[inline(always)]
+                |lane| {
+                    let home = usize::from(homes[lane]);
+                    let column = if whole >> lane & 1 == 1 {
+                        contacts.first_column(cluster, home).map(|k| k + place)
+                    } else {
+                        Some(k)
+                    };
+                    let out = &mut problems[home].factored;
+                    if let Some(column) = column {
+                        let at = usize::from(places[lane]) * out.shape().0 + column;
+                        let out = &mut out.Z[at];
+                        for i in 0..3 {
+                            out[i] = values[i][lane];
+                        }
+                    }
+                },
+            );
+        }
+        if self.loops.is_some() {
+            self.project_factors(contacts, slot, T::mask(self.token, whole), problems);
+        }
+    }
+
+    /// Writes the rows of a slot to problems with the pattern of its cluster.
+    #[inline(always)]
+    fn write_along_path(
+        &self,
+        contacts: &Contacts<T>,
+        slot: usize,
+        rows: &[Triple<T>],
+        problems: &mut [ContactProblem],
+    ) {
+        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        let near = T::mask(self.token, contacts.near(slot));
+        let Some(cluster) = contacts.cluster_of(slot) else {
+            return;
+        };
+        let stride = self.patterns[cluster].stride();
+        for (k, z) in rows.iter().enumerate() {
+            let values = store_all(z);
+            each::<T>(
+                near,
                 #[inline(always)]
                 |lane| {
                     let at = usize::from(places[lane]) * stride + k;
-                    let out = &mut problems[lane].factored.Z[at];
+                    let out = &mut problems[usize::from(homes[lane])].factored.Z[at];
                     for i in 0..3 {
                         out[i] = values[i][lane];
                     }
                 },
             );
         }
-        if self.loops.is_some() {
-            self.project_factors(contacts, active, slot, problems);
-        }
     }
 
-    /// `Z − Qᵀ B` in place of a slot's Z, which the problems have along all velocities.
+    /// `Z − Qᵀ B` in place of a slot's Z, in lanes whose problems have it along all velocities.
     #[inline(always)]
     fn project_factors(
         &self,
         contacts: &Contacts<T>,
-        active: T::Mask,
         slot: usize,
+        whole: T::Mask,
         problems: &mut [ContactProblem],
     ) {
         let Some(loops) = &self.loops else {
             return;
         };
-        let (zero, stride) = (T::splat(self.token, 0.0), self.pattern.stride());
-        let places = contacts.places(slot);
-        for k in 0..stride {
+        let zero = T::splat(self.token, 0.0);
+        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        for (k, &[cluster, place]) in self.velocities.iter().enumerate() {
             let mut taken = [zero; 3];
             for row in 0..loops.m() {
                 add_scaled(&mut taken, loops.product(row, slot), loops.q(row)[k]);
             }
             let taken = store_all(&taken);
             each::<T>(
-                active,
+                whole,
                 #[inline(always)]
                 |lane| {
-                    let at = usize::from(places[lane]) * stride + k;
-                    let out = &mut problems[lane].factored.Z[at];
+                    let home = usize::from(homes[lane]);
+                    let Some(first) = contacts.first_column(cluster, home) else {
+                        return;
+                    };
+                    let out = &mut problems[home].factored;
+                    let at = usize::from(places[lane]) * out.shape().0 + first + place;
+                    let out = &mut out.Z[at];
                     for i in 0..3 {
                         out[i] -= taken[i][lane];
                     }
@@ -598,15 +732,15 @@ impl<T: Lane> Rows<T> {
         answer: Answer,
         out: &mut [Triple<T>],
     ) {
-        let problems = &problems[..T::LANES];
+        let problems = &problems[..contacts.n_problems()];
         for &slot in contacts.used() {
             let mut values = store_all(&out[slot]);
-            let places = contacts.places(slot);
+            let (homes, places) = (contacts.homes(slot), contacts.places(slot));
             each::<T>(
                 contacts.slot(slot).active,
                 #[inline(always)]
                 |lane| {
-                    let problem = &problems[lane];
+                    let problem = &problems[usize::from(homes[lane])];
                     let all = match answer {
                         Answer::Impulses => &problem.p,
                         Answer::Velocities => &problem.u,
@@ -664,7 +798,7 @@ fn add_impulses_of_guests<T: Lane>(
 fn write_guest<T: Lane>(
     one: &OneLane<'_, T>,
     contact: &Contact,
-    movers: &[Mover],
+    path: Path<'_>,
     rows: &mut [Triple<T>],
     u: &mut Triple<T>,
 ) {
@@ -674,9 +808,9 @@ fn write_guest<T: Lane>(
     }
     for_each_row(one, contact, |velocity, row| {
         let is_own = |mover: &Mover| mover.velocity == velocity;
-        let own = match movers.iter().position(is_own) {
+        let own = match path.movers.iter().position(is_own) {
             Some(k) => &mut rows[BASE + k],
-            None => &mut rows[velocity],
+            None => &mut rows[velocity - path.base.unwrap_or(0)],
         };
         let v = one.v[velocity].get(lane);
         for (i, x) in row.iter().enumerate() {

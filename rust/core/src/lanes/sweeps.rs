@@ -66,8 +66,8 @@ fn friction<T: Lane>([a, b, c]: [T; 3], f: [T; 2], limit: T) -> [T; 2] {
 }
 
 impl<T: Lane> Rows<T> {
-    /// Improves impulses by slot, N s, with `n` sweeps; `q`: free velocity by slot, m/s. Slots that
-    /// a lane does not use get zero.
+    /// Improves impulses by slot, N s, with `n` sweeps; `q`: free velocity by slot, m/s. Only slots
+    /// with problems that have factors are swept; those that a lane does not use get zero.
     #[inline(always)]
     pub(super) fn sweep(
         &mut self,
@@ -81,7 +81,7 @@ impl<T: Lane> Rows<T> {
         let mut of_loops = std::mem::take(&mut self.swept_loops);
         motion.fill(zero);
         of_loops.fill(zero);
-        for &slot in contacts.used() {
+        for slot in contacts.used_nearby() {
             let active = contacts.slot(slot).active;
             for p in &mut p[slot] {
                 *p = T::select(active, *p, zero);
@@ -91,7 +91,7 @@ impl<T: Lane> Rows<T> {
             self.push_loops(slot, &p[slot], &mut of_loops);
         }
         for _ in 0..n {
-            for &slot in contacts.used() {
+            for slot in contacts.used_nearby() {
                 let (path, rows) = self.of(contacts, slot);
                 let mut u = q[slot];
                 add_scaled(&mut u, &p[slot], self.softness[slot]);
@@ -128,7 +128,9 @@ impl<T: Lane> Rows<T> {
     }
 }
 
-/// Writes impulses by slot as the start of the problems of a mask's lanes.
+/// Writes impulses by slot as the start of the problems with factors of a mask's lanes. Those of
+/// rigid discs start from the last step: parked wheels would press against each other with what
+/// the sweeps leave.
 #[inline(always)]
 pub(super) fn write_start<T: Lane>(
     contacts: &Contacts<T>,
@@ -136,18 +138,19 @@ pub(super) fn write_start<T: Lane>(
     p: &[Triple<T>],
     problems: &mut [super::problem::ContactProblem],
 ) {
-    for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-        problem.has_start |= lanes.get(lane);
-    }
     for &slot in contacts.used() {
-        let active = contacts.slot(slot).active & lanes;
-        let places = contacts.places(slot);
-        for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-            if active.get(lane) {
-                let own = &mut problem.start[3 * usize::from(places[lane])..][..3];
-                for k in 0..3 {
-                    own[k] = p[slot][k].get(lane);
-                }
+        let near =
+            contacts.slot(slot).active & lanes & T::mask(contacts.token, contacts.near(slot));
+        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        for lane in (0..T::LANES).filter(|lane| near.get(*lane)) {
+            let problem = &mut problems[usize::from(homes[lane])];
+            if problem.factored.is_multiplied {
+                continue;
+            }
+            problem.has_start = true;
+            let own = &mut problem.start[3 * usize::from(places[lane])..][..3];
+            for k in 0..3 {
+                own[k] = p[slot][k].get(lane);
             }
         }
     }

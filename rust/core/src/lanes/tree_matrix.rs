@@ -65,10 +65,8 @@ impl<T: Lane> TreeMatrix<T> {
             column: [zero; BASE],
             pivot: zero,
         };
-        self.joints.clear();
         self.joints.resize(pattern.n_joints(), joint);
         for entries in [&mut self.rows, &mut self.columns] {
-            entries.clear();
             entries.resize(pattern.n_entries(), zero);
         }
     }

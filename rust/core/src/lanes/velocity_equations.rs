@@ -32,7 +32,8 @@ use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{Few, Mode, System, Triple};
 
-/// Factored operators of several problems of one machine; a contact's place is its slot.
+/// Factored operators of several problems with the same pattern, that of the first; a contact's
+/// place is its slot.
 #[derive(Clone, Debug)]
 pub(super) struct VelocitySystem<T: Lane, const C: usize> {
     zero: T,
@@ -40,8 +41,6 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
     /// Slots of each lane, and of any.
     slots: [u32; MAX_LANES],
     used: u32,
-    /// Places whose other data in each lane are those of another machine's problem.
-    stale: [u32; MAX_LANES],
     /// `Z` by slot; zero in lanes without a contact there.
     Z: Vec<Columns<T>>,
     q: [Triple<T>; C],
@@ -79,19 +78,13 @@ impl Iterator for Bits {
 }
 
 impl<T: Lane, const C: usize> VelocitySystem<T, C> {
-    /// Makes room for the problems of a machine.
+    /// Makes room for the problems of a pattern.
     #[cold]
     fn adopt(&mut self, pattern: &Arc<Pattern>) {
         let zero = self.zero;
-        for (stale, slots) in self.stale.iter_mut().zip(self.slots) {
-            *stale |= slots;
-        }
-        (self.slots, self.used) = ([0; MAX_LANES], 0);
         let columns = Columns::new(zero, pattern.stride() - BASE);
         (self.left, self.right) = (columns.clone(), columns.clone());
-        self.Z.clear();
         self.Z.resize(C, columns);
-        self.joints.clear();
         self.joints.resize(pattern.n_joints(), zero);
         self.matrix.adopt(pattern, zero);
         self.pattern = Some(Arc::clone(pattern));
@@ -304,7 +297,6 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
             pattern: None,
             slots: [0; MAX_LANES],
             used: 0,
-            stale: [0; MAX_LANES],
             Z: Vec::new(),
             q: [[zero; 3]; C],
             diagonal: [[zero; 9]; C],
@@ -323,12 +315,10 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
     fn load(&mut self, lane: usize, problem: &ContactProblem) -> Bits {
         let factored = &problem.factored;
         let pattern = Self::pattern(factored.pattern.as_ref());
-        let is_own = (self.pattern.as_deref()).is_some_and(|own| std::ptr::eq(own, pattern));
-        if let (false, Some(pattern)) = (is_own, &factored.pattern) {
+        if let (None, Some(pattern)) = (&self.pattern, &factored.pattern) {
             self.adopt(pattern);
         }
-        let stale = std::mem::take(&mut self.stale[lane]);
-        let changed = self.slots[lane] | factored.slots | stale;
+        let changed = self.slots[lane] | factored.slots;
         self.slots[lane] = factored.slots;
         self.used = self.slots.iter().fold(0, |all, own| all | own);
         for slot in Bits(changed) {
@@ -411,7 +401,7 @@ pub(super) mod tests {
             wheel.width = Some(0.1);
         }
         let model = Model::from_description(description).unwrap();
-        Arc::clone(Machine::of(&model).unwrap().pattern())
+        Arc::clone(Machine::of(&model).unwrap().pattern(0))
     }
 
     /// A problem of the first slots of the rover with both forms of its operator.

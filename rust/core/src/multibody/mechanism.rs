@@ -183,6 +183,13 @@ impl Mechanism {
         self.links[b].tree
     }
 
+    /// Index of a velocity's tree.
+    #[inline]
+    #[must_use]
+    pub(crate) fn tree_of_velocity(&self, k: usize) -> usize {
+        self.tree_of[k]
+    }
+
     /// The rows of the velocities that move body `b`, in order, counted from the first row of its
     /// tree; empty for a free root.
     #[inline(always)]

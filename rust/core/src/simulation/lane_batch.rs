@@ -103,6 +103,8 @@ struct Lanes<T: Lane> {
     courses: Vec<Course>,
     queue: Queue<T>,
     problems: Vec<ContactProblem>,
+    /// Number of the problems of a block.
+    size: usize,
     slots: Vec<Option<Slot>>,
 }
 
@@ -124,6 +126,7 @@ impl<T: Lane> Lanes<T> {
             courses: Vec::new(),
             queue: Queue::new(token),
             problems: Vec::new(),
+            size: 0,
             slots: Vec::new(),
         }
     }
@@ -214,8 +217,11 @@ impl<T: Lane> Lanes<T> {
         while self.blocks.len() < n_slots / T::LANES {
             self.blocks.push(Block::new(self.token, own));
         }
-        if self.problems.len() < n_slots {
-            self.problems.resize_with(n_slots, ContactProblem::default);
+        self.size = T::LANES * own.n_problems();
+        let n_problems = n_slots / T::LANES * self.size;
+        if self.problems.len() < n_problems {
+            self.problems
+                .resize_with(n_problems, ContactProblem::default);
         }
         n_slots
     }
@@ -229,7 +235,7 @@ impl<T: Lane> Lanes<T> {
         go_on: &mut dyn FnMut() -> bool,
     ) {
         let solver = self.blocks[0].options().solver;
-        self.queue.begin(n_blocks);
+        self.queue.begin(n_blocks, self.size);
         self.courses.clear();
         let start = Course {
             left: n,
@@ -259,20 +265,25 @@ impl<T: Lane> Lanes<T> {
     /// First part of a block's step: its problems enter the queue.
     fn prepare(&mut self, b: usize) {
         let block = &mut self.blocks[b];
-        block.prepare(&mut self.problems[b * T::LANES..][..T::LANES], &mut NoProbe);
-        (self.queue).enter(b, &mut self.problems, |lane| block.is_going(lane));
+        let problems = &mut self.problems[b * self.size..][..self.size];
+        block.prepare(problems, &mut NoProbe);
+        (self.queue).enter(b, &mut self.problems, |problem| {
+            block.is_going(Block::<T>::lane_of(problem))
+        });
     }
 
     /// The rest of a block's step, once its problems have ended. Returns whether others must be
     /// solved before: with the next branch of a motor, or those of the position projection.
     fn conclude(&mut self, b: usize) -> bool {
         let (block, course) = (&mut self.blocks[b], &mut self.courses[b]);
-        let problems = &mut self.problems[b * T::LANES..][..T::LANES];
+        let problems = &mut self.problems[b * self.size..][..self.size];
         let projects = std::mem::take(&mut course.projects);
         if !projects {
             match block.conclude(problems, &mut NoProbe) {
                 Next::Retake => {
-                    (self.queue).enter(b, &mut self.problems, |lane| block.is_retaken(lane));
+                    (self.queue).enter(b, &mut self.problems, |problem| {
+                        block.is_retaken(Block::<T>::lane_of(problem))
+                    });
                     return true;
                 }
                 Next::Project => {

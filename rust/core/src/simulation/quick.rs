@@ -14,8 +14,8 @@ pub(super) struct Quick {
     pub(super) block: Option<Box<Block<f64>>>,
     /// The solver's scratch.
     pub(super) queue: Option<Box<Queue<f64>>>,
-    pub(super) problem: Box<[ContactProblem; 1]>,
-    pub(super) gap_problem: Box<[ContactProblem; 1]>,
+    pub(super) problems: Vec<ContactProblem>,
+    pub(super) gap_problems: Vec<ContactProblem>,
     /// Whether the last step was taken here.
     is_last: bool,
     /// The operator of the last step, once somebody has asked for it.
@@ -51,25 +51,42 @@ impl Quick {
 
     /// Delassus operator of the last step, row-major, 1/kg; none if it was not taken here.
     pub(super) fn operator(&self) -> Option<&[f64]> {
-        let operator = || self.problem[0].operator();
+        let operator = || operator_of(&self.problems);
         self.is_last
             .then(|| &self.operator.get_or_init(operator)[..])
     }
 
-    /// The problem of the last step taken here, and its block.
-    pub(super) fn last(&self) -> Option<(&Block<f64>, &ContactProblem)> {
+    /// The problems of the last step taken here, and its block.
+    pub(super) fn last(&self) -> Option<(&Block<f64>, &[ContactProblem])> {
         let block = self.block.as_deref().filter(|_| self.is_last)?;
-        Some((block, &self.problem[0]))
+        Some((block, &self.problems))
     }
 }
 
-/// Solves one problem.
+/// Solves a rover's problems.
 pub(super) fn solve(
     queue: &mut Queue<f64>,
-    problem: &mut [ContactProblem],
+    problems: &mut [ContactProblem],
     options: &SolverOptions,
 ) {
-    queue.begin(1);
-    queue.enter(0, problem, |_| true);
-    while queue.next_group(problem, options).is_some() {}
+    queue.begin(1, problems.len());
+    queue.enter(0, problems, |_| true);
+    while queue.next_group(problems, options).is_some() {}
+}
+
+/// The operator of all contacts of several problems, row-major, 1/kg.
+fn operator_of(problems: &[ContactProblem]) -> Vec<f64> {
+    let n: usize = problems.iter().map(ContactProblem::n_unknowns).sum();
+    let mut operator = vec![0.0; n * n];
+    let mut first = 0;
+    for problem in problems {
+        let own = problem.n_unknowns();
+        for i in 0..own {
+            for j in 0..own {
+                operator[(first + i) * n + first + j] = problem.entry(i, j);
+            }
+        }
+        first += own;
+    }
+    operator
 }

@@ -224,14 +224,14 @@ impl Scene for RoverScene {
 
     fn publish(&self, parts: &mut RoverParts, scratch: &mut SceneScratch<Self>) {
         let RoverParts { tree, quick, .. } = parts;
-        if let Some((block, problem)) = quick.last() {
-            tree.show(block.origin(0));
+        if let Some((block, problems)) = quick.last() {
+            tree.show(block.origins(0));
             scratch.show(
                 |show| {
                     block.visit_contacts(0, |contact, _, p, u| show(contact, p, u));
                 },
-                &problem.q,
-                &problem.mu,
+                problems.iter().flat_map(|own| &own.q[..own.n_unknowns()]),
+                problems.iter().flat_map(|own| &own.mu[..own.n_contacts]),
             );
         }
     }

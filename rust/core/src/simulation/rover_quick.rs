@@ -10,6 +10,7 @@ use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepRepor
 use crate::lanes::admission::{FallbackReason, admit};
 use crate::lanes::lane_rover::LaneRover;
 use crate::lanes::machine::Machine;
+use crate::lanes::problem::ContactProblem;
 use crate::lanes::queue::Queue;
 use crate::lanes::step::{Block, Next};
 use crate::scalar::{Lane, Single};
@@ -71,23 +72,25 @@ impl RoverScene {
         };
         block.load_rover(0, &mut lane_rover);
         block.begin();
-        let problem = &mut *quick.problem;
-        block.prepare(problem, probe);
+        let (problems, gap_problems) = (&mut quick.problems, &mut quick.gap_problems);
+        for all in [&mut *problems, &mut *gap_problems] {
+            all.resize_with(block.n_problems(), ContactProblem::default);
+        }
+        block.prepare(problems, probe);
         let solver = &step.options.solver;
         let mut next = Next::Retake;
         while next == Next::Retake {
-            solve(queue, problem, solver);
+            solve(queue, problems, solver);
             probe.end(Phase::Solve);
-            next = block.conclude(problem, probe);
+            next = block.conclude(problems, probe);
         }
         let is_deep = next == Next::Project;
-        let gap_problem = &mut *quick.gap_problem;
         if is_deep {
-            gap_problem.clone_from_slice(problem);
-            block.set_gaps(gap_problem);
-            solve(queue, gap_problem, solver);
+            gap_problems.clone_from_slice(problems);
+            block.set_gaps(gap_problems);
+            solve(queue, gap_problems, solver);
         }
-        block.finish(is_deep.then_some(&gap_problem[..]), probe);
+        block.finish(is_deep.then_some(&gap_problems[..]), probe);
         if block.fallback(0).is_some() {
             block.return_ruts(0, &mut lane_rover);
             return None;

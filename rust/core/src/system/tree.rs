@@ -196,14 +196,9 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
-        // Two trees may approach each other.
-        let (mut fastest, mut next) = (0.0_f64, 0.0_f64);
-        for tree in self.model.trees() {
-            let places = |body: usize| self.parts.kinematics.r(body);
-            let speed = self.model.fastest_point(tree, places, v);
-            (fastest, next) = (fastest.max(speed), next.max(fastest.min(speed)));
-        }
-        activation.margin = activation.lead.abs() * (fastest + next);
+        let places = |body: usize| self.parts.kinematics.r(body);
+        let fastest = self.model.fastest_approach(places, v);
+        activation.margin = activation.lead.abs() * fastest;
         self.parts.unknown_ground = detect(
             self.model,
             &self.parts.kinematics,

@@ -147,10 +147,12 @@ impl TreeScratch {
         &self.drives
     }
 
-    /// Makes a step of the first tree that was taken elsewhere the last one: the world position of
-    /// its origin where contacts were evaluated, m.
-    pub(crate) fn show(&mut self, origin: [f64; 3]) {
-        self.kinematics_end.set_origin(0, origin.into());
+    /// Makes a step that was taken elsewhere the last one: the world positions of the trees'
+    /// origins where contacts were evaluated, m.
+    pub(crate) fn show(&mut self, origins: impl Iterator<Item = [f64; 3]>) {
+        for (tree, origin) in origins.enumerate() {
+            self.kinematics_end.set_origin(tree, origin.into());
+        }
     }
 
     /// Impulses of the rows of the loops in the last step, N s and N m s; empty without loops.

@@ -2,6 +2,7 @@
 
 use crate::integrator::StepReport;
 use crate::integrator::energy_audit::{Excess, GAIN};
+use crate::multibody::mechanism::TreeSpan;
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
 /// What the energies of a step are judged by.
@@ -10,7 +11,8 @@ pub(super) struct Conditions<T: Lane> {
     pub mass: T,
     /// Speed of a body that falls for the step from rest, m/s.
     pub fall: T,
-    /// Lanes without a contact, and those of them whose scheme conserves energy.
+    /// Lanes that nothing outside touches, and those of them without a contact whose scheme
+    /// conserves energy.
     pub untouched: T::Mask,
     pub is_free: T::Mask,
 }
@@ -85,9 +87,14 @@ impl<T: Lane> Balance<T> {
     }
 
     /// Removes the excess from the velocity `v` at the end of the step. Returns the lanes whose
-    /// whole velocity was shortened, and by which factor.
+    /// local velocities are shortened, and by which factor.
     #[inline(always)]
-    pub fn correct(&self, conditions: &Conditions<T>, v: &mut [T]) -> (T::Mask, T) {
+    pub fn correct(
+        &self,
+        conditions: &Conditions<T>,
+        trees: &[TreeSpan],
+        v: &mut [T],
+    ) -> (T::Mask, T) {
         let zero = conditions.mass.like(0.0);
         let Some(excess) = self.excess else {
             return (self.is_corrected & !self.is_corrected, zero);
@@ -101,15 +108,17 @@ impl<T: Lane> Balance<T> {
         let lanes = lanes & (is_relative | is_gain);
         let translation = momentum * (mass.like(1.0) / mass);
         let common = [translation.x, translation.y, translation.z];
-        for (k, v) in v.iter_mut().enumerate() {
-            let common = if k < 3 {
-                T::select(is_relative, common[k], zero)
-            } else {
-                zero
-            };
-            *v = T::select(lanes, common + share * (*v - common), *v);
+        for tree in trees {
+            for (k, v) in v[tree.velocities.clone()].iter_mut().enumerate() {
+                let common = if k < 3 {
+                    T::select(is_relative, common[k], zero)
+                } else {
+                    zero
+                };
+                *v = T::select(lanes, common + share * (*v - common), *v);
+            }
         }
-        (lanes & !is_relative, share)
+        (lanes, share)
     }
 
     /// Enters the balance into the lanes' reports.

@@ -45,10 +45,9 @@ impl<T: Lane> Block<T> {
             self.mix_materials();
         }
         let mut is_same = 0;
-        for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-            let is_own = self
-                .contacts
-                .recall(lane, &self.memories[lane], &mut problem.p);
+        for lane in 0..T::LANES {
+            let memory = &self.memories[lane];
+            let is_own = self.contacts.recall(lane, memory, problems);
             is_same |= u32::from(is_own) << lane;
         }
         self.is_same = T::mask(self.token, is_same);
@@ -63,8 +62,7 @@ impl<T: Lane> Block<T> {
             else {
                 continue;
             };
-            for place in 0..self.contacts.list(lane).n {
-                let (slot, contact) = self.contacts.contact(&self.machine, lane, place);
+            for (slot, contact) in self.contacts.all_of(&self.machine, lane) {
                 let law = contact.between_materials(model, &**terrain, &self.options.materials);
                 if let Some([mu, _]) = law {
                     self.mu[slot].set(lane, mu);
@@ -80,10 +78,10 @@ impl<T: Lane> Block<T> {
         lane: usize,
         mut visit: impl FnMut(Contact, [f64; 3], [f64; 3], [f64; 3]),
     ) {
-        let origin = Vector3::from(self.origin(lane));
-        for place in 0..self.contacts.list(lane).n {
-            let (slot, contact) = self.contacts.contact(&self.machine, lane, place);
+        for (slot, contact) in self.contacts.all_of(&self.machine, lane) {
             let at = |x: &[Triple<T>]| x[slot].map(|x| x.get(lane));
+            let tree = self.machine.tree_of_body(contact.body);
+            let origin = Vector3::from(self.poses_end.origin_of(tree).get(lane));
             let position = (origin + contact.point).into();
             visit(contact, position, at(&self.p), at(&self.u));
         }

@@ -270,10 +270,10 @@ impl<T: Lane> Block<T> {
         &self.reports[lane]
     }
 
-    /// World position of a lane's trunk where the contacts of the last step were evaluated, m.
-    #[must_use]
-    pub fn origin(&self, lane: usize) -> [f64; 3] {
-        self.poses_end.origin.get(lane)
+    /// World positions of a lane's roots where the contacts of the last step were evaluated, m.
+    pub fn origins(&self, lane: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
+        let trees = 0..self.machine.trees.len();
+        trees.map(move |tree| self.poses_end.origin_of(tree).get(lane))
     }
 
     #[inline(always)]
@@ -328,6 +328,30 @@ impl<T: Lane> Block<T> {
             in_touch = in_touch | self.contacts.slot(slot).active;
         }
         in_touch
+    }
+
+    /// Lanes with a contact with the ground.
+    #[inline(always)]
+    fn on_ground(&self) -> T::Mask {
+        let mut on_ground = T::mask(self.token, 0);
+        for &slot in self.contacts.used_by_shapes() {
+            if self.contacts.cluster_of(slot).is_some() {
+                on_ground = on_ground | self.contacts.slot(slot).active;
+            }
+        }
+        on_ground
+    }
+
+    /// Number of the friction-contact problems of all lanes: one of each cluster in each lane.
+    #[must_use]
+    pub fn n_problems(&self) -> usize {
+        self.contacts.n_problems()
+    }
+
+    /// The lane of a problem.
+    #[must_use]
+    pub fn lane_of(problem: usize) -> usize {
+        problem % T::LANES
     }
 }
 

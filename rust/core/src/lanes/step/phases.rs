@@ -19,7 +19,7 @@ impl<T: Lane> Block<T> {
     /// First part of a step: everything up to the friction-contact problems, which it writes.
     ///
     /// # Panics
-    /// If there are fewer problems than lanes.
+    /// If there are fewer than [`Self::n_problems`].
     pub fn prepare(&mut self, problems: &mut [ContactProblem], probe: &mut dyn Probe) {
         let token = self.token;
         self.going = self.occupied;
@@ -97,7 +97,6 @@ impl<T: Lane> Block<T> {
         } else {
             self.retaken
         };
-        let lanes = lanes & T::mask(self.token, self.contacts.factored());
         self.p.copy_from_slice(&self.p_last);
         let data = (&self.u[..], &self.mu[..]);
         self.rows.sweep(&self.contacts, SWEEPS, data, &mut self.p);
@@ -146,31 +145,31 @@ impl<T: Lane> Block<T> {
     /// `problems`: those of [`Self::prepare`], solved.
     ///
     /// # Panics
-    /// If there are fewer problems than lanes.
+    /// If there are fewer than [`Self::n_problems`].
     pub fn conclude(&mut self, problems: &mut [ContactProblem], probe: &mut dyn Probe) -> Next {
         let token = self.token;
         let mut solved = 0;
-        for (lane, problem) in problems[..T::LANES].iter().enumerate() {
-            let has_answer = problem.n_contacts == 0 || problem.is_solved;
-            solved |= u32::from(has_answer) << lane;
-            self.reports[lane] = StepReport {
+        for lane in 0..T::LANES {
+            let mut report = StepReport {
                 steps: 1,
                 retaken: self.n_retaken[lane],
-                n_contacts: problem.n_contacts,
-                iterations: problem.iterations,
-                factorisations: problem.iterations,
-                residual: problem.residual.relative,
                 ..StepReport::default()
             };
-            self.contacts
-                .remember(lane, &problem.p, &mut self.next_memories[lane]);
-            if problem.n_contacts == 0 {
-                self.reports[lane] = StepReport {
-                    steps: 1,
-                    retaken: self.n_retaken[lane],
-                    ..StepReport::default()
-                };
+            let mut is_solved = true;
+            for index in self.contacts.problems_of(lane) {
+                let problem = &problems[index];
+                if problem.n_contacts > 0 {
+                    is_solved &= problem.is_solved;
+                    report.n_contacts += problem.n_contacts;
+                    report.iterations += problem.iterations;
+                    report.factorisations += problem.iterations;
+                    report.residual = report.residual.max(problem.residual.relative);
+                }
             }
+            solved |= u32::from(is_solved) << lane;
+            self.reports[lane] = report;
+            let memory = &mut self.next_memories[lane];
+            self.contacts.remember(lane, problems, memory);
         }
         self.fall_back(Fallback::Solver, !T::mask(token, solved));
         T::vectorize(
@@ -240,7 +239,7 @@ impl<T: Lane> Block<T> {
         }
         for lane in (0..T::LANES).filter(|&lane| self.retaken.get(lane)) {
             self.n_retaken[lane] += 1;
-            (self.contacts).recall(lane, &self.memories[lane], &mut problems[lane].p);
+            (self.contacts).recall(lane, &self.memories[lane], problems);
         }
         self.set_up(problems, false, probe);
         true
@@ -284,18 +283,18 @@ impl<T: Lane> Block<T> {
             released = self.yields.supplied(contacts, h, &self.p, &self.u, before);
         }
         let nobody = T::mask(self.token, 0);
-        let untouched = !self.in_touch();
         let conserves = self.options.theta <= 0.5;
         let conditions = Conditions {
             mass: self.inertias.mass,
             fall: self.gravity.norm() * h,
-            untouched,
-            is_free: if conserves { untouched } else { nobody },
+            untouched: !self.on_ground(),
+            is_free: if conserves { !self.in_touch() } else { nobody },
         };
         let is_lost = (self.balance).audit((work, released), &conditions, self.going);
         self.fall_back(Fallback::Energy, is_lost);
         if self.balance.is_corrected.any() {
-            let (shortened, share) = self.balance.correct(&conditions, &mut self.v_end);
+            let trees = &self.machine.trees;
+            let (shortened, share) = self.balance.correct(&conditions, trees, &mut self.v_end);
             for &slot in self.contacts.used() {
                 for u in &mut self.u[slot] {
                     *u = T::select(shortened, *u * share, *u);
@@ -315,11 +314,11 @@ impl<T: Lane> Block<T> {
     /// must be projected.
     ///
     /// # Panics
-    /// If there are fewer problems than lanes.
+    /// If there are fewer than [`Self::n_problems`].
     pub fn finish(&mut self, problems: Option<&[ContactProblem]>, probe: &mut dyn Probe) {
         let token = self.token;
         if let Some(problems) = problems.filter(|_| self.is_deep.any()) {
-            self.project(&problems[..T::LANES]);
+            self.project(problems);
         }
         probe.end(Phase::Projection);
         T::vectorize(

@@ -55,7 +55,7 @@ impl<T: Lane> Block<T> {
     /// Turns the problems into those of the position projection; none where nothing penetrates.
     ///
     /// # Panics
-    /// If there are fewer problems than lanes.
+    /// If there are fewer than [`Self::n_problems`].
     pub fn set_gaps(&mut self, problems: &mut [ContactProblem]) {
         T::vectorize(
             self.token,
@@ -63,8 +63,9 @@ impl<T: Lane> Block<T> {
             || {
                 let (h, theta) = self.time_step();
                 let zero = h.like(0.0);
-                for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-                    if !self.is_deep.get(lane) {
+                let problems = &mut problems[..self.contacts.n_problems()];
+                for (index, problem) in problems.iter_mut().enumerate() {
+                    if !self.is_deep.get(Self::lane_of(index)) {
                         problem.n_contacts = 0;
                     }
                     let n = problem.n_unknowns();
@@ -75,12 +76,11 @@ impl<T: Lane> Block<T> {
                     let gap = self.gap_at_end(slot, h, theta);
                     self.gaps[slot] = [gap, zero, zero];
                     self.pushes[slot] = [zero; 3];
-                    let places = self.contacts.places(slot);
+                    let (homes, places) = (self.contacts.homes(slot), self.contacts.places(slot));
                     let active = self.contacts.slot(slot).active & self.is_deep;
-                    for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-                        if active.get(lane) {
-                            problem.q[3 * usize::from(places[lane])] = gap.get(lane);
-                        }
+                    for lane in (0..T::LANES).filter(|lane| active.get(*lane)) {
+                        let problem = &mut problems[usize::from(homes[lane])];
+                        problem.q[3 * usize::from(places[lane])] = gap.get(lane);
                     }
                 }
                 let swept = self.is_deep & T::mask(self.token, self.contacts.factored());
@@ -98,7 +98,8 @@ impl<T: Lane> Block<T> {
     pub(super) fn project(&mut self, problems: &[ContactProblem]) {
         let token = self.token;
         let mut unsolved = 0;
-        for (lane, problem) in problems.iter().enumerate() {
+        for (index, problem) in problems[..self.n_problems()].iter().enumerate() {
+            let lane = Self::lane_of(index);
             if self.is_deep.get(lane) {
                 unsolved |= u32::from(!problem.is_solved) << lane;
                 let report = &mut self.reports[lane];
@@ -137,8 +138,8 @@ impl<T: Lane> Block<T> {
     fn displace(&mut self, problems: &[ContactProblem]) {
         let zero = self.number(0.0);
         let mut farthest = [0.0_f64; MAX_LANES];
-        for (lane, problem) in problems.iter().enumerate() {
-            let n = problem.n_unknowns();
+        for (index, problem) in problems[..self.n_problems()].iter().enumerate() {
+            let (lane, n) = (Self::lane_of(index), problem.n_unknowns());
             for (u, q) in problem.u[..n].iter().zip(&problem.q[..n]) {
                 farthest[lane] = farthest[lane].max((u - q).abs());
             }

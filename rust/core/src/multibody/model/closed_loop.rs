@@ -2,6 +2,7 @@
 
 use crate::multibody::description::LoopKind;
 use crate::multibody::joint::{Joint, JointModel};
+use crate::multibody::mechanism::Mechanism;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Attitude of a body, its origin relative to that of its tree, m, and the latter in the world, m.
@@ -136,6 +137,17 @@ impl Loop {
             Closure::Bodies(ends) => ends.iter().any(|end| end.body.is_none()),
             Closure::Joints { .. } => false,
         }
+    }
+
+    /// The trees of its ends.
+    pub(crate) fn trees<'a>(&'a self, mechanism: &'a Mechanism) -> impl Iterator<Item = usize> {
+        let (bodies, joints) = match &self.closure {
+            Closure::Bodies(ends) => (Some(ends.iter().filter_map(|end| end.body)), None),
+            Closure::Joints { own, other, .. } => (None, Some(std::iter::once(own).chain(other))),
+        };
+        let of_bodies = (bodies.into_iter().flatten()).map(|body| mechanism.tree_of_body(body));
+        let of_joints = joints.into_iter().flatten();
+        of_bodies.chain(of_joints.map(|own| mechanism.tree_of_velocity(own.velocity)))
     }
 
     /// Writes φ (n_rows). `pose`: of each body; `joints`: coordinates of the joints there.

@@ -122,14 +122,20 @@ impl Model {
         &self.inertias
     }
 
-    /// Upper bound on the speed of all points of a tree, m/s; `place`: origin of a body's frame, m.
+    /// Upper bound on the speed at which two trees approach each other, m/s, or of all points of a
+    /// single one; `place`: origin of a body's frame, m.
     #[inline]
-    pub(crate) fn fastest_point(
-        &self,
-        tree: &Tree,
-        place: impl Fn(usize) -> Vector3<f64>,
-        v: &[f64],
-    ) -> f64 {
+    pub(crate) fn fastest_approach(&self, place: impl Fn(usize) -> Vector3<f64>, v: &[f64]) -> f64 {
+        let (mut fastest, mut next) = (0.0_f64, 0.0_f64);
+        for tree in self.trees() {
+            let speed = self.fastest_point(tree, &place, v);
+            (fastest, next) = (fastest.max(speed), next.max(fastest.min(speed)));
+        }
+        fastest + next
+    }
+
+    /// Upper bound on the speed of all points of a tree, m/s.
+    fn fastest_point(&self, tree: &Tree, place: impl Fn(usize) -> Vector3<f64>, v: &[f64]) -> f64 {
         let v = &v[tree.velocities.clone()];
         let linear = match v {
             [x, y, z, ..] if tree.is_free => (x * x + y * y + z * z).sqrt(),

@@ -1,0 +1,156 @@
+//! The clusters of a machine: trees that closed loops tie together.
+//!
+//! Contacts of different clusters do not feel each other, so each cluster of a rover has a contact
+//! problem of its own. Where clusters touch, their contacts are in one problem, that of the first
+//! of them.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, OnceLock};
+
+use super::pattern::Pattern;
+use super::problem::MAX_CONTACTS;
+use crate::multibody::Mechanism;
+use crate::multibody::model::Loop;
+
+/// The clusters of a machine.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Clusters {
+    /// Of each tree, its cluster.
+    of_tree: Vec<usize>,
+    /// Velocities of each cluster, ascending; those of a free root come first.
+    velocities: Vec<Vec<usize>>,
+    /// Whether loops tie the trees of a cluster, or a tree to itself or to the world.
+    has_loops: Vec<bool>,
+    /// Pattern of the contact problems of each.
+    patterns: Vec<LazyPattern>,
+    wide: WidePatterns,
+}
+
+/// A pattern, found where it is first needed. It follows from the rest of the machine.
+#[derive(Clone, Debug, Default)]
+struct LazyPattern(Arc<OnceLock<Arc<Pattern>>>);
+
+impl PartialEq for LazyPattern {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl LazyPattern {
+    fn get(&self, find: impl FnOnce() -> Arc<Pattern>) -> &Arc<Pattern> {
+        self.0.get_or_init(find)
+    }
+}
+
+/// Patterns with all entries, by number of velocities: of bodies that touch each other.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct WidePatterns(Vec<(usize, LazyPattern)>);
+
+impl WidePatterns {
+    /// That of clusters that have `nv` velocities together.
+    pub(super) fn of(&self, nv: usize) -> &Arc<Pattern> {
+        let Some((_, own)) = self.0.iter().find(|(size, _)| *size == nv) else {
+            unreachable!("invariant: all sums of clusters are listed")
+        };
+        own.get(|| Arc::new(Pattern::whole(nv, MAX_CONTACTS)))
+    }
+}
+
+impl Clusters {
+    /// Those of a mechanism.
+    pub(super) fn of(mechanism: &Mechanism, loops: &[Loop]) -> Self {
+        let mut of_tree: Vec<usize> = (0..mechanism.trees.len()).collect();
+        for closure in loops {
+            let tied: Vec<usize> = (closure.trees(mechanism))
+                .map(|tree| of_tree[tree])
+                .collect();
+            let first = tied.iter().copied().min();
+            for own in of_tree.iter_mut().filter(|own| tied.contains(own)) {
+                *own = first.unwrap_or(*own);
+            }
+        }
+        let names: BTreeSet<usize> = of_tree.iter().copied().collect();
+        for own in &mut of_tree {
+            *own = names.range(..*own).count();
+        }
+        let n = names.len();
+        let mut velocities = vec![Vec::new(); n];
+        for (tree, own) in mechanism.trees.iter().zip(&of_tree) {
+            velocities[*own].extend(tree.velocities.clone());
+        }
+        let mut has_loops = vec![false; n];
+        for tree in loops.iter().flat_map(|closure| closure.trees(mechanism)) {
+            has_loops[of_tree[tree]] = true;
+        }
+        let mut sizes = BTreeSet::from([0]);
+        for own in &velocities {
+            let larger: Vec<usize> = sizes.iter().map(|size| size + own.len()).collect();
+            sizes.extend(larger);
+        }
+        let wide = sizes.into_iter().skip(1);
+        Self {
+            of_tree,
+            velocities,
+            has_loops,
+            patterns: vec![LazyPattern::default(); n],
+            wide: WidePatterns(wide.map(|size| (size, LazyPattern::default())).collect()),
+        }
+    }
+
+    /// Their number.
+    pub(super) fn n(&self) -> usize {
+        self.velocities.len()
+    }
+
+    /// That of a tree.
+    pub(super) fn of_tree(&self, tree: usize) -> usize {
+        self.of_tree[tree]
+    }
+
+    /// Number of trees of one.
+    pub(super) fn n_trees(&self, cluster: usize) -> usize {
+        self.of_tree.iter().filter(|own| **own == cluster).count()
+    }
+
+    /// Number of velocities of one.
+    pub(super) fn nv(&self, cluster: usize) -> usize {
+        self.velocities[cluster].len()
+    }
+
+    /// Of each of `nv` velocities, its cluster and its place among the cluster's velocities.
+    pub(super) fn places(&self, nv: usize) -> Vec<[usize; 2]> {
+        let mut places = vec![[0; 2]; nv];
+        for (cluster, own) in self.velocities.iter().enumerate() {
+            for (place, &velocity) in own.iter().enumerate() {
+                places[velocity] = [cluster, place];
+            }
+        }
+        places
+    }
+
+    /// Patterns of problems with contacts between bodies.
+    pub(super) fn wide(&self) -> &WidePatterns {
+        &self.wide
+    }
+
+    /// Pattern of the problems of a cluster, whose slots move the bodies with these paths. Where
+    /// loops are closed, or a coupled joint follows one with other carriers, it has all entries.
+    /// Equal clusters have the same one.
+    pub(super) fn pattern(&self, cluster: usize, paths: &[&[usize]]) -> &Arc<Pattern> {
+        self.patterns[cluster].get(|| {
+            let own = &self.velocities[cluster];
+            let place = |velocity: &usize| own.binary_search(velocity).ok();
+            let local = |path: &&[usize]| path.iter().map(place).collect::<Option<Vec<_>>>();
+            let paths = paths.iter().map(local).collect::<Option<Vec<_>>>();
+            let of_tree = paths
+                .filter(|_| !self.has_loops[cluster])
+                .and_then(|paths| Pattern::new(own.len(), &paths));
+            let Some(found) = of_tree else {
+                return Arc::clone(self.wide.of(own.len()));
+            };
+            let known = self.patterns.iter().filter_map(|own| own.0.get());
+            let same = known.into_iter().find(|known| ***known == found);
+            same.map_or_else(|| Arc::new(found), Arc::clone)
+        })
+    }
+}

@@ -1,0 +1,359 @@
+//! Several machines in one model take their steps in lanes, as the general step does.
+
+use std::sync::Arc;
+
+use rover_core::draw::resting_pose;
+use rover_core::geometry::{Plane, Terrain};
+use rover_core::integrator::StepOptions;
+use rover_core::integrator::moreau_jean::MoreauJean;
+use rover_core::multibody::description::{LoopDescription, LoopKind, Shape};
+use rover_core::multibody::{Model, ModelDescription, coordinates};
+use rover_core::scalar::Instructions;
+use rover_core::simulation::RoverSimulation;
+
+use super::Random;
+use super::lane_batch::{command, drive_all, rocks};
+use super::surfaces::hills;
+
+/// A machine of a scene: its description, its place and heading on the ground, how high it starts
+/// over the plane, m, its speed along x, m/s, and the mean torque of its wheels, N m.
+struct Part {
+    description: ModelDescription,
+    at: [f64; 3],
+    lift: f64,
+    speed: f64,
+    torque: f64,
+}
+
+/// Machines on a ground.
+struct Scene {
+    name: &'static str,
+    parts: Vec<Part>,
+    loops: Vec<LoopDescription>,
+    ground: Arc<dyn Terrain>,
+    /// Largest torque that is drawn beside the mean one, N m.
+    noise: f64,
+}
+
+fn part(description: ModelDescription, x: f64, z: f64) -> Part {
+    Part {
+        description,
+        at: [x, z, 0.0],
+        lift: 0.0,
+        speed: 0.0,
+        torque: 0.0,
+    }
+}
+
+fn named(name: &str) -> ModelDescription {
+    ModelDescription::named(name).unwrap()
+}
+
+/// A free solid of one shape that collides.
+fn block(mass: f64, shape: &Shape) -> ModelDescription {
+    let mut own = ModelDescription::rover();
+    own.solids.truncate(1);
+    own.wheels.clear();
+    own.tags.clear();
+    own.solids[0].mass = mass;
+    own.solids[0].shape = Some(shape.clone());
+    own.solids[0].inertia = None;
+    own.solids[0].centre_of_mass = None;
+    own.solids[0].collides = true;
+    own
+}
+
+fn connect(
+    name: &str,
+    solid: &str,
+    position: [f64; 3],
+    other: &str,
+    at: [f64; 3],
+) -> LoopDescription {
+    LoopDescription {
+        name: name.into(),
+        kind: LoopKind::Connect,
+        solid: solid.into(),
+        other: Some(other.into()),
+        position: Some(position),
+        other_position: Some(at),
+        other_rotation: None,
+        polynomial: None,
+    }
+}
+
+impl Scene {
+    fn new(name: &'static str, parts: Vec<Part>) -> Self {
+        Self {
+            name,
+            parts,
+            loops: Vec::new(),
+            ground: Arc::new(Plane::ground()),
+            noise: 5.0,
+        }
+    }
+
+    /// Its machines at rest on their ground, or where it is rough, above it.
+    fn begin(&self) -> RoverSimulation {
+        let names = ["a", "b", "c"];
+        let parts = names.iter().zip(&self.parts);
+        let parts = parts.map(|(name, part)| ((*name).to_owned(), part.description.clone()));
+        let joined = ModelDescription::joined(self.name, parts.collect(), self.loops.clone());
+        let model = Arc::new(Model::from_description(joined).unwrap());
+        let (mut q, mut v) = (Vec::new(), Vec::new());
+        for part in &self.parts {
+            let own = Model::from_description(part.description.clone()).unwrap();
+            let [x, z, heading] = part.at;
+            let mut place = if own.wheels().is_empty() {
+                let mut place = vec![0.0; own.nv()];
+                (place[0], place[2]) = (x, z);
+                place
+            } else {
+                resting_pose(&own, &Plane::ground(), [x, z], heading).unwrap()
+            };
+            place[1] += part.lift;
+            q.extend(place);
+            let first = v.len();
+            v.resize(first + own.nv(), 0.0);
+            v[first] = part.speed;
+        }
+        let q = coordinates::from_public(&model, &q).unwrap();
+        let q = rover_core::system::loops::closed(&model, &q, &mut v).unwrap();
+        let ground = Arc::clone(&self.ground);
+        let mut sim = RoverSimulation::new(model, ground, StepOptions::default()).unwrap();
+        assert_eq!(sim.fallback_reason(), None, "{}", self.name);
+        sim.set_state(q, v);
+        sim
+    }
+
+    fn torques(&self, numbers: &mut Random) -> Vec<f64> {
+        let wheels = self.parts.iter().flat_map(|part| {
+            let n = part.description.wheels.len();
+            std::iter::repeat_n(part.torque, n)
+        });
+        wheels
+            .map(|mean| mean + self.noise * numbers.next())
+            .collect()
+    }
+}
+
+fn scenes() -> Vec<Scene> {
+    let bar = Shape::Box {
+        size: [0.5, 0.03, 0.03],
+    };
+    let mut bar = block(1.0, &bar);
+    bar.solids[0].collides = false;
+    let skid = || named("skid-steered");
+    let moving = |part: Part, speed: f64, torque: f64| Part {
+        speed,
+        torque,
+        ..part
+    };
+    let mut tow = Scene::new(
+        "tow with a bar",
+        vec![
+            Part {
+                torque: 6.0,
+                ..part(skid(), 0.0, 0.0)
+            },
+            part(named("open-rover"), -1.6, 0.0),
+            Part {
+                lift: 0.3,
+                ..part(bar, -0.9, 0.0)
+            },
+        ],
+    );
+    tow.loops = vec![
+        connect(
+            "front",
+            "c/trunk",
+            [0.25, 0.0, 0.0],
+            "a/trunk",
+            [-0.55, 0.0, 0.0],
+        ),
+        connect(
+            "rear",
+            "c/trunk",
+            [-0.25, 0.0, 0.0],
+            "b/trunk",
+            [0.5, -0.06, 0.0],
+        ),
+    ];
+    let deck = Shape::Box {
+        size: [3.0, 0.2, 2.0],
+    };
+    let mut on_hills = Scene::new(
+        "meet on hills",
+        vec![
+            Part {
+                lift: 0.15,
+                speed: 0.8,
+                torque: 8.0,
+                ..part(ModelDescription::rover(), -1.3, 0.1)
+            },
+            Part {
+                lift: 0.15,
+                speed: -0.8,
+                torque: -8.0,
+                ..part(ModelDescription::rover(), 1.3, -0.2)
+            },
+        ],
+    );
+    on_hills.ground = hills(0.25, 3);
+    let mut on_rocks = Scene::new(
+        "among rocks",
+        vec![
+            Part {
+                lift: 0.15,
+                ..part(skid(), -1.5, 0.0)
+            },
+            Part {
+                lift: 0.15,
+                ..part(named("open-rover"), 0.5, 0.4)
+            },
+            Part {
+                lift: 0.15,
+                ..part(ModelDescription::rover(), 3.0, -0.4)
+            },
+        ],
+    );
+    on_rocks.ground = rocks(&mut Random(5));
+    let mut wide = skid();
+    for wheel in &mut wide.wheels {
+        wheel.width = Some(0.08);
+        wheel.stiffness = Some(2e6);
+        wheel.damping = Some(1e4);
+    }
+    vec![
+        Scene::new(
+            "apart",
+            vec![
+                part(ModelDescription::rover(), 0.0, 0.0),
+                part(named("open-rover"), 0.0, 4.0),
+            ],
+        ),
+        Scene::new(
+            "head-on",
+            vec![
+                moving(part(skid(), -1.0, 0.0), 1.5, 4.0),
+                moving(part(skid(), 1.0, 0.1), -1.5, -4.0),
+            ],
+        ),
+        Scene::new(
+            "push on rigid discs",
+            vec![
+                moving(part(ModelDescription::rover(), -2.05, 0.05), 0.5, 8.0),
+                part(ModelDescription::rover(), 0.0, 0.0),
+            ],
+        ),
+        Scene::new(
+            "push",
+            vec![
+                moving(part(wide, -1.0, 0.05), 0.5, 8.0),
+                part(skid(), 0.6, 0.0),
+            ],
+        ),
+        tow,
+        Scene::new(
+            "on a deck",
+            vec![
+                Part {
+                    lift: 0.1,
+                    ..part(block(500.0, &deck), 0.0, 0.0)
+                },
+                Part {
+                    lift: 0.2,
+                    ..part(skid(), 0.0, 0.0)
+                },
+            ],
+        ),
+        on_hills,
+        on_rocks,
+    ]
+}
+
+/// How the steps of a scene went.
+#[derive(Default)]
+struct Met {
+    differences: Vec<f64>,
+    fallbacks: usize,
+    pairs: usize,
+    unsolved: usize,
+}
+
+fn compare(scene: &Scene, steps: usize) -> Met {
+    let mut numbers = Random(7);
+    let mut own = scene.begin();
+    let mut met = Met::default();
+    for step in 0..steps {
+        if step % 10 == 0 {
+            own.set_wheel_torques(&scene.torques(&mut numbers)).unwrap();
+        }
+        let mut general = own.clone();
+        general.step_with(&MoreauJean, 1).unwrap();
+        let report = own.step(1).unwrap();
+        met.fallbacks += report.fallbacks;
+        met.unsolved += usize::from(!report.is_converged());
+        assert!(
+            report.energy_gain < 1e-9,
+            "{}: {}",
+            scene.name,
+            report.energy_gain
+        );
+        let pairs = own.contacts().iter();
+        met.pairs += usize::from(pairs.clone().any(|own| own.contact.other.is_some()));
+        let both = own.v().iter().zip(general.v());
+        let difference = both.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        met.differences.push(difference);
+        if difference < 1e-9 {
+            let places = |sim: &RoverSimulation| {
+                let mut all: Vec<_> = (sim.contacts().iter())
+                    .map(|own| (own.contact.key.part, own.position))
+                    .collect();
+                all.sort_by_key(|own| own.0);
+                all
+            };
+            for (a, b) in places(&own).iter().zip(&places(&general)) {
+                assert_eq!(a.0, b.0);
+                assert!((0..3).all(|k| (a.1[k] - b.1[k]).abs() < 1e-9));
+            }
+        }
+    }
+    met.differences.sort_by(f64::total_cmp);
+    met
+}
+
+#[test]
+fn several_machines_obey_the_law_of_the_general_step() {
+    for scene in scenes() {
+        let steps = 300;
+        let met = compare(&scene, steps);
+        let name = scene.name;
+        let touching = met.pairs;
+        let should_touch = !["apart", "tow with a bar", "among rocks"].contains(&name);
+        assert_eq!(touching > 50, should_touch, "{name}: {touching}");
+        assert!(met.fallbacks * 50 < steps, "{name}: {}", met.fallbacks);
+        // A few friction problems have several answers.
+        let typical = met.differences[steps * 95 / 100];
+        assert!(typical < 1e-9, "{name}: {typical:e}");
+    }
+}
+
+#[test]
+fn several_machines_in_lanes_move_as_they_would_alone() {
+    for scene in scenes() {
+        for instructions in Instructions::all_of_this_machine() {
+            let mut numbers = Random(3);
+            let start = scene.begin();
+            let rovers = (0..9).map(|k| {
+                let mut own = start.clone();
+                command(&mut own, scene.noise, &mut numbers);
+                // So that some touch while others do not.
+                own.step(12 * k).unwrap();
+                own
+            });
+            let rovers = rovers.collect();
+            drive_all(instructions, rovers, scene.noise, &mut Random(4));
+        }
+    }
+}
