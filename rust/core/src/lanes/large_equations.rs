@@ -149,14 +149,16 @@ impl<T: Lane> Loaded<T, MAX_LARGE> for LargeSystem<T> {
 mod tests {
     use super::*;
     use crate::lanes::equations::DenseSystem;
-    use crate::lanes::problem::MAX_DENSE;
-    use crate::lanes::velocity_equations::tests::{pattern, problem};
+    use crate::lanes::pattern::Pattern;
+    use crate::lanes::problem::{MAX_CONTACTS, MAX_DENSE};
+    use crate::lanes::velocity_equations::tests::problem;
     use crate::scalar::Single;
+    use std::sync::Arc;
 
     #[test]
     fn the_operator_of_the_factors_is_that_of_the_problem() {
         let mut numbers = (1..).map(|k: u32| (f64::from(k) * 0.618).fract() - 0.5);
-        let pattern = pattern();
+        let pattern = Arc::new(Pattern::whole(12, MAX_CONTACTS));
         let problem = problem(&pattern, &mut numbers);
         let token = Single::best();
         let mut dense = DenseSystem::<f64, MAX_DENSE>::new(token);
