@@ -8,9 +8,8 @@ from refusals import refused
 
 from rover_gym import OptionError, RoverEnv
 from rover_gym.models.lookup import open_model
-from rover_gym.policy import ArcNetwork, ArcNetworkPolicy, GuidedPolicy, ScanPolicy, named_policy
+from rover_gym.policy import ArcNetwork, GuidedPolicy, ScanPolicy, named_policy
 from rover_gym.policy.arc_driver import ARCS
-from rover_gym.policy.guided_policy import has_forecast
 
 
 def on_rocks(name: str | None = None) -> RoverEnv:
@@ -51,21 +50,13 @@ def test_the_network_decides_where_to_push() -> None:
     np.testing.assert_allclose(np.abs(speeds), shipped._driver.planner.push)
 
 
-def test_a_rover_without_a_forecast_is_driven_by_the_network() -> None:
-    env = on_rocks("skid-steered")
-    assert has_forecast(on_rocks("open-rover").model)
-    assert not has_forecast(env.model)
-    alone = commands(ArcNetworkPolicy(env, GuidedPolicy(env)._network), env, 4)
-    np.testing.assert_array_equal(commands(GuidedPolicy(env), env, 4), alone)
-
-
 def test_bad_weights_are_refused() -> None:
     for weight in (-0.1, float("nan")):
         with refused(OptionError, "weight"):
             GuidedPolicy(on_rocks(), weight=weight)
 
 
-@pytest.mark.parametrize("name", [None, "open-rover"])
+@pytest.mark.parametrize("name", [None, "open-rover", "skid-steered", "four-steered"])
 def test_it_drives(name: str | None) -> None:
     env = on_rocks(name)
     policy = named_policy("guided", None if name is None else env.model).make(env)

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from commands import error_of, output_of
 
-from rover_gym.models import open_model
 from rover_gym.policy import ArcNetwork, Network, PolicyError
 from rover_gym.policy.arc_driver import observation_space
 from rover_gym.policy.arc_forecast import OUTPUTS
-from rover_gym.policy.network_files import FOLDER, forecast_folder
+from rover_gym.policy.network_files import FOLDER, FORECAST
 
 pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
@@ -41,14 +40,12 @@ def features(network: Network, n: int = 500) -> np.ndarray:
     return (network.mean + draw * network.deviation).astype(np.float32)
 
 
-@pytest.mark.parametrize(("rover", "terrain"), [(None, "plane"), (None, "hills"), ("open-rover", "plane")])
-def test_the_forecast_gives_the_same_outcomes(rover: str | None, terrain: str) -> None:
-    model = None if rover is None else open_model(rover)
-    network = Network.read(forecast_folder(model, hills=terrain == "hills") / "forecast.npz")
+def test_the_forecast_gives_the_same_outcomes() -> None:
+    network = Network.read(FOLDER / FORECAST / "forecast.npz")
     rows = features(network)
     expected = network(rows) * OUTPUTS
     expected[:, 1:] = expected[:, 1:].clip(0.0, 1.0)
-    assert np.abs(run(onnx_policy("foresight", terrain, model), rows) - expected).max() < 1e-5
+    assert np.abs(run(onnx_policy("foresight"), rows) - expected).max() < 1e-5
 
 
 @pytest.mark.parametrize("policy", ["pd", "scan", "no/such/folder"])
@@ -60,11 +57,9 @@ def test_what_has_no_network_is_refused(policy: str, tmp_path: Path) -> None:
 
 
 def test_the_command_writes_a_file_that_the_checker_accepts(tmp_path: Path) -> None:
-    for model in ("rover", "open-rover"):
-        path = tmp_path / model / "a.onnx"
-        output_of("export", "onnx", "foresight", "--model", model, "--output", path)
-        onnx.checker.check_model(str(path), full_check=True)
-    assert (tmp_path / "rover" / "a.onnx").read_bytes() != (tmp_path / "open-rover" / "a.onnx").read_bytes()
+    path = tmp_path / "a.onnx"
+    output_of("export", "onnx", "foresight", "--output", path)
+    onnx.checker.check_model(str(path), full_check=True)
 
 
 def test_the_network_for_any_rover_gives_the_same_logits() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 from refusals import refused
 
-from rover_gym import OptionError, RoverEnv
+from rover_gym import OptionError
 from rover_gym.learning.fit_forecast import ArcOutcomes, fit_forecast, try_arcs
 from rover_gym.policy import ScanPolicy
 from rover_gym.policy.arc_forecast import ArcFeatures
@@ -14,9 +14,7 @@ ARGUMENTS = {"terrain": "rocks", "difficulty": 1.0, **ScanPolicy.arguments()}
 def test_arcs_are_tried_from_states_of_a_drive() -> None:
     counted: list[int] = []
     tried = try_arcs(ARGUMENTS, 5, 6, copies=40, progress=counted.append)
-    env = RoverEnv(**ARGUMENTS)
-    size = ArcFeatures(env, ScanPolicy(env)).size + 1
-    assert tried.features.shape == (6 * 40, size)
+    assert tried.features.shape == (6 * 40, ArcFeatures.size + 1)
     assert tried.outcomes.shape == (6 * 40, 3)
     assert counted == [1, 2, 3, 4, 5, 6]
     assert np.bincount(tried.state).tolist() == [40] * 6
@@ -41,20 +39,22 @@ def made_up(rng: np.random.Generator, states: int) -> ArcOutcomes:
 
 def test_the_fit_explains_states_that_it_has_not_seen() -> None:
     tried = made_up(np.random.default_rng(0), 2000)
-    network, explained = fit_forecast(tried, seed=1, epochs=20, hidden=(32, 32))
-    assert explained[0] > 0.9
-    assert explained[1] > 0.95
-    assert np.isnan(explained[2])
+    other = made_up(np.random.default_rng(2), 100)
+    network, explained = fit_forecast([tried, other], seed=1, epochs=20, hidden=(32, 32))
+    assert explained.shape == (2, 3)
+    assert (explained[:, 0] > 0.9).all()
+    assert (explained[:, 1] > 0.95).all()
+    assert np.isnan(explained[:, 2]).all()
     unseen = made_up(np.random.default_rng(1), 50)
     errors = network(unseen.features) - unseen.outcomes
     assert np.abs(errors[:, :2]).mean() < 0.1
-    again, _ = fit_forecast(tried, seed=1, epochs=20, hidden=(32, 32))
+    again, _ = fit_forecast([tried, other], seed=1, epochs=20, hidden=(32, 32))
     np.testing.assert_array_equal(again.weights[0], network.weights[0])
 
 
 def test_too_few_states_and_bad_numbers_are_refused() -> None:
     with refused(OptionError, "tried"):
-        fit_forecast(made_up(np.random.default_rng(0), 5))
+        fit_forecast([made_up(np.random.default_rng(0), 5)])
     with refused(OptionError, "seed"):
         try_arcs(ARGUMENTS, 0, 5)
     with refused(OptionError, "states"):

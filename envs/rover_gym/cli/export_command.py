@@ -74,13 +74,11 @@ def onnx(
         typer.Argument(help="'anywhere', 'foresight', or the folder of a run, a forecast or a raw run."),
     ],
     output: Annotated[Path, typer.Option(dir_okay=False, help="File to write.")],
-    terrain: Annotated[str, typer.Option(help="Of 'foresight': 'rocks' or 'hills'.")] = "rocks",
-    model: Annotated[str, typer.Option(help="Of 'foresight': the rover, a name of the gallery or a file.")] = BUILT_IN,
 ) -> None:
     """Write a policy's network as ONNX, with the normalisation of its inputs."""
     require("onnx", "onnx")
     check_file("output", output)
-    say_path("ONNX", write_onnx(policy, output, terrain, named_model(model)))
+    say_path("ONNX", write_onnx(policy, output))
 
 
 @export.command()

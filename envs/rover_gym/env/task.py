@@ -54,7 +54,6 @@ class Task:
         n_actions: Entries of an action: a torque for each wheel, then a set-point for each joint that steers.
         ground: The given terrain, which is the ground of every episode; None without one.
         has_rocks: Whether there are rocks.
-        on_hills: Whether the ground is hills.
         soils: Soils that the sand is drawn from; none on firm ground.
         scan: `(n, 2)` points of the height scan in the heading frame, m; None without one.
         is_noisy: Whether observations have noise.
@@ -77,7 +76,6 @@ class Task:
     n_actions: int
     ground: Terrain | None
     has_rocks: bool
-    on_hills: bool
     soils: tuple[Soil, ...]
     scan: npt.NDArray[np.float64] | None
     is_noisy: bool
@@ -151,7 +149,6 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         n_actions=len(rover.wheel_names) + len(steering.joints),
         ground=ground,
         has_rocks=rocks is not None,
-        on_hills=hills is not None,
         soils=soils,
         scan=points,
         is_noisy=given["observation_noise"] > 0.0,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,25 +15,15 @@ from rover_gym.policy.arc_forecast import FORECAST_FILE, OUTPUTS
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.features import LARGEST_FEATURE
-from rover_gym.policy.network_files import (
-    ANYWHERE,
-    FOLDER,
-    Network,
-    PolicyError,
-    forecast_folder,
-    is_there,
-)
+from rover_gym.policy.network_files import ANYWHERE, FOLDER, FORECAST, Network, PolicyError, is_there
 from rover_gym.validation import checked, refuse
-
-if TYPE_CHECKING:
-    from rover_gym.mechanics import RoverModel
 
 #: The file that identifies a run of `RawPolicy.save`.
 RAW_FILE = "model.zip"
 
 
-@checked(policy=Path, path=Path, terrain=str, model=("RoverModel", None))
-def write_onnx(policy: str | Path, path: str | Path, terrain: str = "rocks", model: RoverModel | None = None) -> Path:
+@checked(policy=Path, path=Path)
+def write_onnx(policy: str | Path, path: str | Path) -> Path:
     """Writes a policy's network as ONNX, with the normalisation of its inputs.
 
     | policy | input | output |
@@ -45,8 +35,6 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "rocks", mod
     Args:
         policy: The policy.
         path: The file to write, with its folder.
-        terrain: Ground of the policy "foresight".
-        model: Rover of the policy "foresight"; the built-in one by default.
 
     Raises:
         PolicyError: There is no such policy, it has no network, or its files are damaged.
@@ -54,15 +42,15 @@ def write_onnx(policy: str | Path, path: str | Path, terrain: str = "rocks", mod
         MissingExtraError: An extra is not installed.
     """
     require("onnx", "onnx")
-    graph = onnx_policy(policy, terrain, model)
+    graph = onnx_policy(policy)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(graph.SerializeToString())
     return path
 
 
-@checked(policy=Path, terrain=str, model=("RoverModel", None))
-def onnx_policy(policy: str | Path, terrain: str = "rocks", model: RoverModel | None = None) -> Any:
+@checked(policy=Path)
+def onnx_policy(policy: str | Path) -> Any:
     """The `onnx.ModelProto` of a policy, as `write_onnx` writes it.
 
     Raises:
@@ -70,7 +58,7 @@ def onnx_policy(policy: str | Path, terrain: str = "rocks", model: RoverModel | 
         OSError: A file may not be read.
         MissingExtraError: An extra is not installed.
     """
-    folder = forecast_folder(model, hills=terrain == "hills") if policy == "foresight" else Path(policy)
+    folder = FOLDER / FORECAST if policy == FORECAST else Path(policy)
     if is_there(folder / FORECAST_FILE):
         facts: Mapping[str, Any] = {
             "kind": "forecast",
@@ -94,7 +82,7 @@ def forecast_network(network: Network) -> Perceptron:
     return Perceptron(
         network.weights,
         network.biases,
-        "Tanh",
+        "Relu",
         network.mean,
         network.deviation,
         LARGEST_FEATURE,

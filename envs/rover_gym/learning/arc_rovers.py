@@ -16,11 +16,12 @@ from rover_gym.learning.configuration import environment_arguments
 from rover_gym.learning.varied_rover import varied
 from rover_gym.mechanics import RoverModel
 from rover_gym.models.lookup import open_model
-from rover_gym.policy.arc_driver import LARGEST, N_ARCS, ArcObservation
+from rover_gym.policy.arc_driver import N_ARCS, ArcObservation
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ArcNetworkPolicy
 from rover_gym.policy.arcs_env import RoverArcsVectorEnv
 from rover_gym.policy.evaluation import EvaluatedEpisode, drive_all
+from rover_gym.policy.rover_view import LARGEST
 from rover_gym.policy.scan_policy import ScanPolicy
 
 #: Of a scan in a byte.

@@ -5,7 +5,6 @@ rover can steer, so that the same table serves every rover. Lengths in the obser
 reach, heights to its wheel radius: a policy sees every rover in its own measure.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,10 +14,10 @@ import numpy.typing as npt
 
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import drive_signs, wheel_centres
-from rover_gym.mechanics import CommandError, Plane, RoverModel, exp, sin_cos
+from rover_gym.mechanics import CommandError, sin_cos
 from rover_gym.policy.command import N_COMMANDS, CommandController
 from rover_gym.policy.features import ground_slope
+from rover_gym.policy.rover_view import LARGEST, N_FEATURES, RoverView
 from rover_gym.policy.scan_policy import SCAN, ScanMemory, ScanPolicy, scan_grid
 from rover_gym.validation import array, refuse
 
@@ -41,15 +40,8 @@ ARCS: Array = np.array(
 #: Actions: each arc at cruising speed, then each while pushing.
 N_ARCS = 2 * len(ARCS)
 
-#: Entries are clipped to this.
-LARGEST = 5.0
-
 #: Traps that are observed, the last ones, and the farthest, in reaches.
 SEEN_TRAPS, FARTHEST_TRAP = 3, 4.0
-
-#: Places of wheels, three on each side, and what is observed of the wheels at each: contact, load, traction, rim speed,
-#: steering.
-PLACES, OF_A_WHEEL = 6, 5
 
 #: Steps of the rover: applies actions to the active rovers, with or without the height scan. Returns observations,
 #: rewards, and which episodes have ended or reached their time limit.
@@ -58,7 +50,7 @@ Step = Callable[[Observations, Mask, bool], tuple[Observations, Array, Mask, Mas
 ArcObservation = dict[str, npt.NDArray[np.float32]]
 
 #: Sizes of the observation's parts beside the scan.
-SIZES = {"features": 29 + PLACES * OF_A_WHEEL, "command": N_COMMANDS, "clocks": 5 + 3 * SEEN_TRAPS}
+SIZES = {"features": N_FEATURES, "command": N_COMMANDS, "clocks": 5 + 3 * SEEN_TRAPS}
 
 
 def observation_space() -> gym.spaces.Dict:
@@ -104,12 +96,10 @@ class ArcDriver:
         self.controller: CommandController = plan.controller
         speeds = np.repeat([plan.cruise, plan.push], len(ARCS))[:, None]
         self.commands = np.concatenate((ARCS, ARCS)) * np.concatenate((speeds, np.ones((N_ARCS, 2))), axis=1)
-        layout, model = rover.observation_layout, rover.model
+        layout = rover.observation_layout
         self._layout, self._scale, self._shape = layout, layout.scale, SCAN[:2]
         self._offsets = scan_grid(rover).offsets
-        self._level = -float(model.resting_pose(Plane(), (0.0, 0.0), 0.0)[1])
-        self._rover = _measures(rover, plan, self._level)
-        self._wheels = _Wheels(rover, plan.cruise_speed)
+        self._view = RoverView(rover, plan)
 
     # -- memory
 
@@ -170,33 +160,15 @@ class ArcDriver:
         layout, plan, memory, n = self._layout, self.planner, self.memory, len(seen)
         slope = ground_slope(layout, rows)
         rise = slope[:, :1] * self._offsets[:, 0] + slope[:, 1:] * self._offsets[:, 1]
-        heights = rows[:, layout["height_scan"]] * self._scale[layout["height_scan"]] - rise - self._level
+        heights = rows[:, layout["height_scan"]] * self._scale[layout["height_scan"]] - rise - self._view.level
         heights = (heights / plan.radius).clip(-LARGEST, LARGEST)
         beyond = plan.beyond_field(rows, memory.start)
         if beyond is not None:
             heights[beyond] = LARGEST
         scan = heights.reshape(n, *self._shape)
-
-        q, velocity = layout["q"].start, layout["velocity"].start
-        speeds = rows[:, velocity : velocity + 6] / ([plan.cruise_speed] * 3 + [1.0] * 3)
-        goal = rows[:, layout["goal"]] * self._scale[layout["goal"]]
-        distance = np.sqrt((goal**2).sum(axis=1))
-        toward = goal / np.maximum(distance, 1e-3)[:, None]
-        away = distance / plan.reach
-        parts = [
-            rows[:, [q + 3, q + 5]] * 2.0,
-            slope * 3.0,
-            speeds,
-            rows[:, layout["stuck"]],
-            toward,
-            np.stack((np.minimum(away / 10.0, 3.0), exp(-away), exp(-0.2 * away)), axis=1),
-            np.broadcast_to(self._rover, (n, len(self._rover))),
-            self._wheels(rows),
-        ]
-        features = np.concatenate(parts, axis=1).clip(-LARGEST, LARGEST)
         return {
             "scan": scan.astype(np.float32),
-            "features": features.astype(np.float32),
+            "features": self._view(rows, slope),
             "command": memory.command.astype(np.float32),
             "clocks": self._clocks(rows).clip(-LARGEST, LARGEST).astype(np.float32),
         }
@@ -235,66 +207,3 @@ def check_arcs(actions: object, n: int) -> npt.NDArray[np.int64]:
     if not ((arcs >= 0) & (arcs < N_ARCS) & (arcs == np.floor(arcs))).all():
         refuse(CommandError, "action", actions, f"must be whole numbers from 0 to {N_ARCS - 1}")
     return arcs.astype(np.int64)
-
-
-def _measures(rover: RoverEnv, plan: ScanPolicy, level: float) -> Array:
-    """The rover itself: its measures over its reach, its speed, traction, mass and the height of its mass centre."""
-    model: RoverModel = rover.model
-    centres, reach = wheel_centres(model), plan.reach
-    weight = model.mass * math.hypot(*rover.gravity)
-    limits, controller = plan.controller.limits, plan.controller
-    pull = float((model.wheel_torque_limits / model.wheel_radii).sum()) / weight
-    radius = plan.radius
-    return np.array(
-        [
-            float(np.ptp(centres[:, 0])) / reach,
-            float(np.ptp(centres[:, 1])) / reach,
-            3.0 * radius / reach,
-            plan.clearance / radius,
-            len(centres) / 6.0,
-            limits.curvature * reach,
-            float(bool(controller.steers_sideways)),
-            float(bool(rover.task.steering.joints)),
-            plan.cruise_speed / reach,
-            math.log10(model.mass) - 2.0,
-            math.log(pull),
-            math.log(reach),
-            float(model.tags(np.zeros(model.nq))["centre_of_mass"][1] - level) / reach,
-        ]
-    )
-
-
-class _Wheels:
-    """What is observed of the wheels: means over those at the front, in the middle and at the rear of each side."""
-
-    def __init__(self, rover: RoverEnv, speed: float) -> None:
-        layout, model = rover.observation_layout, rover.model
-        joints = list(model.wheel_joint_indices)
-        centres = wheel_centres(model)
-        middle, span = 0.5 * (centres[:, 0].max() + centres[:, 0].min()), max(1e-6, float(np.ptp(centres[:, 0])))
-        along = (centres[:, 0] - middle) / span
-        place = np.where(along > 0.25, 0, np.where(along < -0.25, 2, 1)) + 3 * (centres[:, 1] > 0.0)
-        members = (np.arange(PLACES)[:, None] == place).astype(np.float64)
-        self._share = members / np.maximum(members.sum(axis=1, keepdims=True), 1.0)
-        self._contact, self._load = layout["wheel_contact"], layout["normal_force"]
-        rolling = layout["tangential_force"]
-        self._traction = slice(rolling.start, rolling.stop, 2)
-        self._rates = layout["velocity"].start + np.asarray(joints, np.intp)
-        self._rim = model.wheel_radii * drive_signs(model) * layout.scale[self._rates] / speed
-        q, steering = layout["q"].start, rover.task.steering
-        steered = [steering.joints[entry] if entry >= 0 else 0 for entry in steering.entries]
-        self._joints = q + np.array(steered, np.intp)
-        self._steered = np.array([float(entry >= 0) for entry in steering.entries])
-
-    def __call__(self, rows: Array) -> Array:
-        """`(n, PLACES * OF_A_WHEEL)`; zeros at a place without a wheel."""
-        of_wheels = (
-            rows[:, self._contact],
-            0.5 * rows[:, self._load].clip(0.0, 6.0),
-            0.5 * rows[:, self._traction].clip(-6.0, 6.0),
-            (self._rim * rows[:, self._rates]).clip(-3.0, 3.0),
-            self._steered * rows[:, self._joints],
-        )
-        # Sums wheel by wheel: the same bits for any number of rovers.
-        means = [(values[:, None, :] * self._share).sum(axis=2) for values in of_wheels]
-        return np.concatenate(means, axis=1)

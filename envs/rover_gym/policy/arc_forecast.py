@@ -4,10 +4,10 @@ For each arc, at cruising speed and fast, a network predicts the rover's state a
 
 - what lies under wheels and underside on the way, from the height scan;
 - the command;
-- the rover's state: attitude, joints, velocities, contacts, loads, how long its trunk has been held;
-- the slope of the ground plane.
+- the rover in its own measure (`rover_gym.policy.rover_view`).
 
-`rover_gym.learning.fit_forecast` trains it on copies of the rover in the simulator.
+These inputs have the same entries for every rover, so that one network serves all of them.
+`rover_gym.learning.fit_forecast` trains it on copies of rovers in the simulator.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,9 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.policy.arc_search import Arcs, ArcSearch
+from rover_gym.policy.command import N_COMMANDS
 from rover_gym.policy.network_files import Network, PolicyError
+from rover_gym.policy.rover_view import N_FEATURES, PLACES, Planner, RoverView
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -28,8 +30,8 @@ Features = npt.NDArray[np.float32]
 #: Time that the forecast looks ahead, s, and poses of an arc at which it looks at the ground.
 HORIZON, POSES = 1.0, 8
 
-#: Largest height in wheel radii, and largest entry of the state, that the network is given.
-LARGEST_HEIGHT, LARGEST_ENTRY = 4.0, 5.0
+#: Largest height in wheel radii that the network is given.
+LARGEST_HEIGHT = 4.0
 
 #: What the network's outputs are multiplied by: way, stuck, failed.
 OUTPUTS = np.array([2.0, 1.0, 1.0], np.float32)
@@ -50,13 +52,16 @@ class Outcomes:
     failed: Array
 
 
-class ArcPolicy(Protocol):
+class ArcPolicy(Planner, Protocol):
     """A policy that chooses among arcs: `ScanPolicy`, whose attributes these are."""
 
     arcs: Arcs
     commands: Array
     search: ArcSearch
-    cruise_speed: float
+
+
+#: What is given of each pose: the ground under the wheels at six places, and three measures of the underside.
+OF_A_POSE = PLACES + 3
 
 
 class ArcFeatures:
@@ -67,36 +72,31 @@ class ArcFeatures:
         policy: The policy, a `ScanPolicy`.
 
     Attributes:
+        size: Number of features.
         length: Way at cruising speed within the horizon, m.
         poses: `(n_arcs, POSES, 3)` on the way, see `Arcs.poses`.
-        size: Number of features.
     """
+
+    size = (POSES + 1) * OF_A_POSE + N_COMMANDS + N_FEATURES
 
     def __init__(self, rover: RoverEnv, policy: ArcPolicy) -> None:
         self.length = HORIZON * policy.cruise_speed
         self.poses = policy.arcs.poses(self.length, POSES)
-        self._commands, self._search = policy.commands, policy.search
+        self._commands, self._search = policy.commands.astype(np.float32), policy.search
         self._looked_at = np.concatenate((np.zeros((1, 3)), self.poses.reshape(-1, 3)))
-        layout, model = rover.observation_layout, rover.model
-        q, velocity = layout["q"].start, layout["velocity"].start
-        wheels = set(model.wheel_joint_indices)
-        taken = [q + 3, q + 5, *(q + i for i in range(6, model.nq) if i not in wheels)]
-        taken += range(velocity, layout["velocity"].stop)
-        for name in ("wheel_contact", "normal_force", "stuck"):
-            taken += range(layout[name].start, layout[name].stop)
-        self._taken = np.array(taken)
-        n_wheels = len(model.wheel_radii)
-        self.size = POSES * (n_wheels + 3) + 3 + len(taken) + 2 + n_wheels + 1
+        self._view, self._n_wheels = RoverView(rover, policy), len(rover.model.wheel_radii)
 
     def __call__(self, row: Array, slope: list[float], heights: Array) -> Features:
         """`(n_arcs, size)` features, for an observation, the ground plane's slope, and heights over that plane."""
-        n = len(self._commands)
+        n, n_wheels = len(self._commands), self._n_wheels
         under = np.clip(self._search.under(heights, self._looked_at), -LARGEST_HEIGHT, LARGEST_HEIGHT)
-        state = np.concatenate((row[self._taken].clip(-LARGEST_ENTRY, LARGEST_ENTRY), 5.0 * np.array(slope)))
-        shared = np.concatenate((state, under[0, :-2]))
-        return np.concatenate(
-            (under[1:].reshape(n, -1), self._commands, np.broadcast_to(shared, (n, len(shared)))), axis=1
-        ).astype(np.float32)
+        seen = np.concatenate((self._view.at_places(under[:, :n_wheels]), under[:, n_wheels:]), axis=1)
+        shared = np.concatenate((seen[0], self._view(row[None], np.array([slope]))[0]))
+        along = seen[1:].reshape(n, -1)
+        features: Features = np.concatenate(
+            (along, self._commands, np.broadcast_to(shared, (n, len(shared)))), axis=1, dtype=np.float32
+        )
+        return features
 
 
 class ArcForecast:
@@ -113,7 +113,7 @@ class ArcForecast:
     def __init__(self, features: ArcFeatures, network: Network) -> None:
         inputs, outputs = network.weights[0].shape[1], network.weights[-1].shape[0]
         if inputs != features.size + 1:
-            refuse(PolicyError, "forecast", features.size + 1, f"needs a rover with {inputs} features")
+            refuse(PolicyError, "forecast", inputs, f"must have {features.size + 1} inputs")
         if outputs != len(OUTPUTS):
             refuse(PolicyError, "forecast", outputs, f"must have {len(OUTPUTS)} outputs")
         self._features, self._network = features, network

@@ -5,12 +5,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import RoverModel
 from rover_gym.policy.arc_driver import ARCS, ArcDriver, arc_of
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
 from rover_gym.policy.features import ground_slope
-from rover_gym.policy.network_files import ANYWHERE, FOLDER, FORECASTS
+from rover_gym.policy.network_files import ANYWHERE, FOLDER
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.policy.scan_policy import ScanPolicy
 from rover_gym.validation import number
@@ -23,8 +22,7 @@ class GuidedPolicy(ArcNetworkPolicy):
     """`ScanPolicy` with a forecast, for which an arc costs more the less probable a network finds it.
 
     The cost is `weight` times the rover's reach times minus the logarithm of the arc's probability, that of the more
-    probable of its two speeds. Whether to push is the network's choice. A rover without a forecast is driven by the
-    network alone.
+    probable of its two speeds. Whether to push is the network's choice.
 
     Args:
         env: A rover environment made with `ScanPolicy.arguments(model)`, wrapped or not, or a vector of them. It is
@@ -41,18 +39,14 @@ class GuidedPolicy(ArcNetworkPolicy):
         super().__init__(env, ArcNetwork.read(FOLDER / ANYWHERE / ARCS_FILE) if network is None else network, seed=seed)
         self.weight = number("weight", weight, at_least=0.0)
         rover = find_rover_env(env)
-        self._plans = has_forecast(rover.model)
-        if self._plans:
-            planner = ScanPolicy(env, forecast=True)
-            self._driver = ArcDriver(rover, 1, planner)
-            self._layout = rover.observation_layout
-            self._table = np.array([arc_of(command, pushes=False) for command in planner.commands])
+        planner = ScanPolicy(env, forecast=True)
+        self._driver = ArcDriver(rover, 1, planner)
+        self._layout = rover.observation_layout
+        self._table = np.array([arc_of(command, pushes=False) for command in planner.commands])
 
     def _choice(
         self, logits: npt.NDArray[Any], rows: npt.NDArray[np.float32], which: npt.NDArray[np.intp]
     ) -> npt.NDArray[np.int64]:
-        if not self._plans:
-            return super()._choice(logits, rows, which)
         n, driver = len(ARCS), self._driver
         planner = driver.planner
         slow, fast = logits[:, :n].astype(np.float64), logits[:, n:].astype(np.float64)
@@ -63,8 +57,3 @@ class GuidedPolicy(ArcNetworkPolicy):
             chosen = self._table[arc]
             arcs[k] = chosen + n * bool(fast[k, chosen] > slow[k, chosen])
         return arcs
-
-
-def has_forecast(model: RoverModel) -> bool:
-    """Whether the package has a forecast for a rover."""
-    return model.name == RoverModel().name or model.name in FORECASTS

@@ -4,7 +4,7 @@ import io
 import math
 import stat
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import OptionError, RoverGymError, RoverModel
+from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.policy.features import LARGEST_FEATURE
 from rover_gym.validation import refuse
 
@@ -76,7 +76,7 @@ Array = npt.NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Network:
-    """A multilayer perceptron with tanh between its layers.
+    """A multilayer perceptron with rectifiers between its layers.
 
     Attributes:
         mean: `(features,)` mean of the features, which is subtracted.
@@ -91,10 +91,10 @@ class Network:
     biases: tuple[Array, ...]
 
     def __call__(self, features: Array) -> Array:
-        """The outputs `(n, outputs)` for features `(n, features)`, clipped to [-1, 1] as in stable-baselines3."""
+        """The outputs `(n, outputs)` for features `(n, features)`, clipped to [-1, 1]."""
         x = np.clip((features - self.mean) / self.deviation, -LARGEST_FEATURE, LARGEST_FEATURE)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
-            x = np.tanh(x @ weight.T + bias)
+            x = np.maximum(x @ weight.T + bias, np.float32(0.0))
         outputs: Array = x @ self.weights[-1].T + self.biases[-1]
         return outputs.clip(-1.0, 1.0)
 
@@ -184,19 +184,10 @@ def _read_array(path: Path, name: str, data: bytes, expected: np.dtype[Any]) -> 
     return np.frombuffer(body, dtype=kind).astype(np.float32).reshape(shape)
 
 
-#: Folder names of the shipped forecasts: by the name of the rover's model, of the built-in one on hills, and of it
-#: on all other ground.
-FORECASTS: Mapping[str, str] = {"open-rover": "foresight-open-rover"}
-
-HILLS_FORECAST, ROCKS_FORECAST = "foresight-hills", "foresight"
+#: The shipped forecast: the name of its folder.
+FORECAST = "foresight"
 
 #: The shipped network for any rover: its name, and its folder's.
 ANYWHERE = "anywhere"
 
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
-
-
-def forecast_folder(model: RoverModel | None = None, *, hills: bool = False) -> Path:
-    """The folder of the forecast shipped for a rover, None for the built-in one, among rocks or on hills."""
-    of_terrain = HILLS_FORECAST if hills else ROCKS_FORECAST
-    return FOLDER / (of_terrain if model is None else FORECASTS.get(model.name, of_terrain))

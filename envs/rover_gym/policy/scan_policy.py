@@ -16,7 +16,7 @@ from rover_gym.policy.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import check_observed, ground_slope
 from rover_gym.policy.ground_map import GroundMap, MapOptions
-from rover_gym.policy.network_files import Network, PolicyError, forecast_folder, is_there
+from rover_gym.policy.network_files import FOLDER, FORECAST, Network, PolicyError, is_there
 from rover_gym.policy.pd_policy import Turning, find_rover_env
 from rover_gym.validation import array, number, refuse
 
@@ -246,9 +246,8 @@ class ScanPolicy:
         costs: Costs of a path.
         map: Options of a map of all scans, which gives the cost-to-go; None for the straight distance.
         forecast: A learned one-second prediction of each arc (`rover_gym.policy.arc_forecast`): the folder of a trained
-            one, or True for the package's: one for the built-in rover on hills, one for it on other ground, one for
-            `open-rover`. The policy adds the costs of the predicted outcomes, and drives an arc fast if that is
-            cheaper.
+            one, or True for the package's. The policy adds the costs of the predicted outcomes, and drives an arc fast
+            if that is cheaper.
         foresight: Costs of predicted outcomes.
 
     Attributes:
@@ -263,7 +262,7 @@ class ScanPolicy:
 
     Raises:
         OptionError: The environment has no height scan, or all wheels are in one line.
-        PolicyError: The folder does not contain a forecast for this rover.
+        PolicyError: The folder does not contain a forecast.
     """
 
     def __init__(
@@ -298,6 +297,7 @@ class ScanPolicy:
         # Times are meant for a rover that takes at most a second for its own reach.
         speed = min(self.gains.speed, SHARE_OF_TOP_SPEED * _top_speed(model))
         self.pace = max(1.0, self.reach / speed)
+        self.controller = CommandController(rover, limits)
         self.cruise_speed = speed
         self.cruise, self.push = speed / limits.speed, self.gains.push / limits.speed
         first, further = _arcs(rover, turning, limits)
@@ -323,14 +323,13 @@ class ScanPolicy:
         self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
         self.forecast: ArcForecast | None = None
         if forecast is not None and forecast is not False:
-            folder = forecast_folder(model, hills=rover.task.on_hills) if forecast is True else Path(forecast)
+            folder = FOLDER / FORECAST if forecast is True else Path(forecast)
             if not is_there(folder / FORECAST_FILE):
                 refuse(PolicyError, "forecast", str(folder / FORECAST_FILE), "is not there")
             features = ArcFeatures(rover, self)
             self._length = features.length
             self.forecast = ArcForecast(features, Network.read(folder / FORECAST_FILE))
             self._caution = self.foresight.caution
-        self.controller = CommandController(rover, limits)
         self.hold_periods = hold_periods(self.gains.period, rover.dt)
         self._period = self.hold_periods * rover.dt
 
@@ -430,10 +429,7 @@ class ScanPolicy:
         goal = row[self._goal] * self._scale[self._goal]
         sine, cosine = sin_cos(heading)
         ahead, right, turned = (memory.known_traps(i) - [x, z, heading]).T
-        heights = self._over_plane(row, slope)
-        beyond = self.beyond_field(row[None], memory.start[i : i + 1])
-        if beyond is not None:
-            heights[beyond[0]] = FENCE * self.radius
+        heights = self.fenced(row, slope, memory.start[i])
         boldness = self._boldness(memory.fruitless[i])
         extra, fast = self._outlook(row, slope, heights, boldness)
         fence = self._through_fence(row, memory.start[i])
@@ -520,6 +516,20 @@ class ScanPolicy:
             )
             memory.ways_corner[i] = corner
         return self._map.at_scan(memory.ways[i], memory.ways_corner[i], (x, z), heading)
+
+    def fenced(self, row: Array, slope: list[float], start: Array) -> Array:
+        """The scan's heights over the ground plane, m, with a fence where the field ends.
+
+        Args:
+            row: An observation `(size,)`.
+            slope: Slope of the ground plane ahead and to the right.
+            start: `(2,)` where the episode began, m.
+        """
+        heights = self._over_plane(row, slope)
+        beyond = self.beyond_field(row[None], start[None])
+        if beyond is not None:
+            heights[beyond[0]] = FENCE * self.radius
+        return heights
 
     def ground(self, row: Array) -> tuple[list[float], Array]:
         """Slope of the ground plane ahead and to the right, and the scan's heights over it, m, for an observation."""
