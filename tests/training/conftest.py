@@ -41,3 +41,9 @@ def passable() -> Script:
 def ablations() -> Script:
     """`ablations.py`."""
     return script("ablations", "ablations")
+
+
+@pytest.fixture(scope="session")
+def train_foresight() -> Script:
+    """`train_foresight.py`."""
+    return script("train_foresight", "train")

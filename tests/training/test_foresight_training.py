@@ -1,9 +1,15 @@
 """The arcs that are tried for a forecast, and the fit to what became of them."""
 
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+import pytest
 from refusals import refused
 
-from rover_gym import OptionError
+from rover_gym import OptionError, RoverEnv, RoverModel
 from rover_gym.learning.fit_forecast import ArcOutcomes, fit_forecast, try_arcs
 from rover_gym.policy import ScanPolicy
 from rover_gym.policy.arc_forecast import ArcFeatures
@@ -59,3 +65,20 @@ def test_too_few_states_and_bad_numbers_are_refused() -> None:
         try_arcs(ARGUMENTS, 0, 5)
     with refused(OptionError, "states"):
         try_arcs(ARGUMENTS, 1, 0)
+
+
+@pytest.mark.takes_long("copies of three rovers drive for a second from a hundred states")
+def test_the_script_writes_a_forecast_that_drives_any_rover(
+    train_foresight: Callable[..., Any], tmp_path: Path
+) -> None:
+    result = train_foresight("--states", 100, "--epochs", 1, "--policy", "scan", "--output", tmp_path)
+    assert result.exit_code == 0, result.output
+    told = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
+    assert told["states"] == [50, 30, 20]
+    assert [len(row) for row in told["explained"]] == [3, 3, 3]
+    for name in RoverModel.names():
+        model = RoverModel.named(name)
+        env = RoverEnv(terrain="plane", model=model, **ScanPolicy.arguments(model))
+        policy = ScanPolicy(env, forecast=tmp_path)
+        action, _ = policy.predict(env.reset(seed=1)[0])
+        assert np.isfinite(action).all()

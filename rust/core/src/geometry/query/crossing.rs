@@ -49,10 +49,11 @@ mod tests {
         fn a_crossing_is_found_to_rounding(root in 0.01..0.99_f64, bend in 0.0..60.0_f64) {
             // Steep on one side of the root and almost flat on the other.
             let f = |x: f64| (bend * x).exp() - (bend * root).exp() + x - root;
+            let rounding = 1e-15 * (bend * root).exp();
             let mut n = 0;
             let x = crossing([f(0.0), f(1.0)], |x| {
                 n += 1;
-                (f(x), 0.0)
+                (f(x), rounding)
             });
             prop_assert!((x - root).abs() < 1e-13, "{x} {root}");
             prop_assert!(n < MAX_EVALUATIONS, "{n}");
