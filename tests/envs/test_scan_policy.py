@@ -301,7 +301,7 @@ def test_one_forecast_serves_every_rover(name: str) -> None:
     outcomes = foreseen_by(policy, row)
     assert outcomes.way.shape == (2, len(policy.arcs))
     ahead = int(np.argmin(np.abs(policy.commands - [1.0, 0.0, 0.0]).sum(axis=1)))
-    assert outcomes.way[0, ahead] > 0.3
+    assert outcomes.way[0, ahead] > 0.15
     assert outcomes.stuck[0, ahead] < 0.2
 
 
@@ -357,7 +357,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     with refused(OptionError, "foresight.stuck"):
         ForesightCosts(stuck=-1.0)
     constant(5, [0.0, 0.0, 0.0]).save(tmp_path / FORECAST_FILE)
-    with pytest.raises(PolicyError, match="must have 144 inputs, got 5"):
+    with pytest.raises(PolicyError, match="must have 139 inputs, got 5"):
         ScanPolicy(env, forecast=tmp_path)
     size = ArcFeatures(env, ScanPolicy(env)).size + 1
     constant(size, [0.0, 0.0]).save(tmp_path / FORECAST_FILE)

@@ -102,7 +102,7 @@ def try_arcs(
                 break
         env.has_scan = True
     features, outcomes = (np.concatenate(parts) for parts in zip(*tried, strict=True))
-    return ArcOutcomes(features, outcomes, np.repeat(np.arange(states), trial.copies))
+    return ArcOutcomes(features, outcomes, np.repeat(np.arange(states), [len(part) for part, _ in tried]))
 
 
 class _Trial:
@@ -122,7 +122,10 @@ class _Trial:
         self._start = self._env.simulation.q[[0, 2]]
 
     def drive(self, observation: Single, rng: np.random.Generator) -> tuple[Single, Single]:
-        """Features `(copies, size + 1)` and outcomes `(copies, 3)` of drawn arcs, for the present observation."""
+        """Features `(n, size + 1)` and outcomes `(n, 3)` of drawn arcs, for the present observation.
+
+        Arcs that reach the goal end there, and are left out: they would tell that it is hard to get near a goal.
+        """
         env, planner, features, n = self._env, self._planner, self._features, len(self._chords)
         picked = rng.permutation(2 * n)[: self.copies]
         hold = max(1, round(HORIZON / env.dt))
@@ -136,7 +139,8 @@ class _Trial:
         slope, _ = planner.ground(row)
         given = features(row, slope, planner.fenced(row, slope, self._start))
         found = np.column_stack((way, ends.stuck, ends.failed)) / OUTPUTS
-        return with_speed(given[picked % n], picked >= n), found.clip(-1.0, 1.0).astype(np.float32)
+        seen, goes_on = with_speed(given[picked % n], picked >= n), ~ends.reached
+        return seen[goes_on], found[goes_on].clip(-1.0, 1.0).astype(np.float32)
 
 
 #: Weights of the squared errors of way, stuck and failed.

@@ -4,7 +4,7 @@ For each arc, at cruising speed and fast, a network predicts the rover's state a
 
 - what lies under wheels and underside on the way, from the height scan;
 - the command;
-- the rover in its own measure (`rover_gym.policy.rover_view`).
+- the rover in its own measure (`rover_gym.policy.rover_view`), without the goal.
 
 These inputs have the same entries for every rover, so that one network serves all of them.
 `rover_gym.learning.fit_forecast` trains it on copies of rovers in the simulator.
@@ -20,7 +20,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.policy.arc_search import Arcs, ArcSearch
 from rover_gym.policy.command import N_COMMANDS
 from rover_gym.policy.network_files import Network, PolicyError
-from rover_gym.policy.rover_view import N_FEATURES, PLACES, Planner, RoverView
+from rover_gym.policy.rover_view import GOAL, N_FEATURES, PLACES, Planner, RoverView
 from rover_gym.validation import number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -77,7 +77,7 @@ class ArcFeatures:
         poses: `(n_arcs, POSES, 3)` on the way, see `Arcs.poses`.
     """
 
-    size = (POSES + 1) * OF_A_POSE + N_COMMANDS + N_FEATURES
+    size = (POSES + 1) * OF_A_POSE + N_COMMANDS + N_FEATURES - (GOAL.stop - GOAL.start)
 
     def __init__(self, rover: RoverEnv, policy: ArcPolicy) -> None:
         self.length = HORIZON * policy.cruise_speed
@@ -91,7 +91,8 @@ class ArcFeatures:
         n, n_wheels = len(self._commands), self._n_wheels
         under = np.clip(self._search.under(heights, self._looked_at), -LARGEST_HEIGHT, LARGEST_HEIGHT)
         seen = np.concatenate((self._view.at_places(under[:, :n_wheels]), under[:, n_wheels:]), axis=1)
-        shared = np.concatenate((seen[0], self._view(row[None], np.array([slope]))[0]))
+        rover = self._view(row[None], np.array([slope]))[0]
+        shared = np.concatenate((seen[0], rover[: GOAL.start], rover[GOAL.stop :]))
         along = seen[1:].reshape(n, -1)
         features: Features = np.concatenate(
             (along, self._commands, np.broadcast_to(shared, (n, len(shared)))), axis=1, dtype=np.float32

@@ -24,8 +24,9 @@ LARGEST = 5.0
 #: steering.
 PLACES, OF_A_WHEEL = 6, 5
 
-#: Number of entries.
+#: Number of entries, and those that tell where the goal is.
 N_FEATURES = 29 + PLACES * OF_A_WHEEL
+GOAL = slice(11, 16)
 
 
 class Planner(Protocol):
