@@ -12,7 +12,7 @@ from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.features import check_observed
 from rover_gym.policy.network_files import PolicyError, is_there
 from rover_gym.policy.pd_policy import find_rover_env
-from rover_gym.policy.scan_policy import ScanMemory
+from rover_gym.policy.scan_policy import ScanMemory, ScanPolicy
 from rover_gym.validation import array, refuse
 
 #: The file of a network in its folder.
@@ -26,16 +26,17 @@ class ArcNetworkPolicy:
         env: A rover environment made with `ScanPolicy.arguments(model)`, wrapped or not, or a vector of them. It is
             read once.
         network: The network.
+        planner: A planner for the rover, whose limits and memory it shares; a new `ScanPolicy` by default.
         seed: Of the arcs that are drawn with `deterministic=False`.
 
     Raises:
         OptionError: The environment has no height scan.
     """
 
-    def __init__(self, env: Any, network: ArcNetwork, *, seed: int = 0) -> None:
+    def __init__(self, env: Any, network: ArcNetwork, *, planner: ScanPolicy | None = None, seed: int = 0) -> None:
         rover = find_rover_env(env)
         self._size = rover.observation_layout.size
-        self._driver = ArcDriver(rover, 1)
+        self._driver = ArcDriver(rover, 1, planner)
         self._network = network
         self._random = np.random.default_rng(seed)
 

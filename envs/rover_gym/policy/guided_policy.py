@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.policy.arc_driver import ARCS, ArcDriver, arc_of
+from rover_gym.policy.arc_driver import ARCS, arc_of
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
 from rover_gym.policy.features import ground_slope
@@ -36,12 +36,11 @@ class GuidedPolicy(ArcNetworkPolicy):
     """
 
     def __init__(self, env: Any, network: ArcNetwork | None = None, *, weight: float = WEIGHT, seed: int = 0) -> None:
-        super().__init__(env, ArcNetwork.read(FOLDER / ANYWHERE / ARCS_FILE) if network is None else network, seed=seed)
         self.weight = number("weight", weight, at_least=0.0)
-        rover = find_rover_env(env)
         planner = ScanPolicy(env, forecast=True)
-        self._driver = ArcDriver(rover, 1, planner)
-        self._layout = rover.observation_layout
+        network = ArcNetwork.read(FOLDER / ANYWHERE / ARCS_FILE) if network is None else network
+        super().__init__(env, network, planner=planner, seed=seed)
+        self._layout = find_rover_env(env).observation_layout
         self._table = np.array([arc_of(command, pushes=False) for command in planner.commands])
 
     def _choice(
