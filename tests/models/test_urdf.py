@@ -75,6 +75,7 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     assert any("torque limit" in entry for entry in report.assumed)
     assert any("yields 0.03 mm" in entry for entry in report.assumed)
     given = {"torque_limit": 12.0, "steering_stiffness": 300.0, "steering_damping": 4.0, "steering_limit": 0.3}
+    given |= {"brake_stiffness": 700.0, "brake_damping": 9.0}
     model = RoverModel.from_urdf(path, wheel_stiffness=0.0, **given)
     assert model.to_dict()["wheels"][0]["stiffness"] == 0.0
     soft = RoverModel.from_urdf(path, wheel_stiffness=2e5).to_dict()["wheels"][0]
@@ -85,6 +86,8 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     assert model.steering_limit == 0.3
     fork = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "left_fork")
     assert fork["hold"] == {"stiffness": 300.0, "damping": 4.0}
+    wheel = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "rear_wheel")
+    assert wheel["hold"] == {"stiffness": 700.0, "damping": 9.0}
 
 
 def test_another_forward_axis_turns_the_machine(tmp_path):
@@ -178,13 +181,13 @@ def test_dry_friction_is_read_or_left_out_by_word(tmp_path):
 
 
 def test_what_is_not_simulated_is_listed(tmp_path):
-    extra = '<gazebo reference="chassis"><mu1>0.9</mu1></gazebo><sensor name="eye"/>'
+    extra = '<gazebo reference="chassis"><kp>1e6</kp></gazebo><sensor name="eye"/>'
     model = RoverModel.from_urdf(
         write(tmp_path, changed(rover(extra=extra), "<box size.*?/>", '<mesh filename="hull.dae"/>'))
     )
     listed = "\n".join(model.import_report.left_out)
     for what in (
-        "<gazebo> of <robot>",
+        "gazebo[chassis]: <kp>",
         "<sensor> of <robot>",
         "a shape that touches is the mesh",
         "hull.dae, which cannot be read",

@@ -6,13 +6,14 @@ import functools
 import os
 import re
 import warnings
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.import_report import ImportReport, RobotFileWarning, axes_of, check_folders, solid_rows, together
 from rover_gym.models.loop_description import close_distant_couplings
+from rover_gym.models.masses import state_masses
 from rover_gym.models.meshes import MOST_PARTS, MOST_VERTICES, MeshOptions
 from rover_gym.models.mjcf import read_mjcf_tree
 from rover_gym.models.robot_tree import (
@@ -54,6 +55,7 @@ def _read(
     steering: Steering = None,
     forward: str = "x",
     ignore: Collection[str] = (),
+    masses: Mapping[str, float] | None = None,
     mesh_parts: int = MeshOptions.parts,
     mesh_vertices: int = MeshOptions.vertices,
     frames: int = 3,
@@ -73,6 +75,7 @@ def _read(
         whole("mesh_vertices", mesh_vertices, at_least=4, at_most=MOST_VERTICES, error=ModelError),
     )
     tree = reader(place, ignore=ignored)
+    state_masses(tree, masses)
     drop_distant_limits(tree)
     join_rigid_groups(tree, free_base=bool(free_base))
     for link in tree.links.values():

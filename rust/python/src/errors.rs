@@ -316,6 +316,10 @@ impl From<CommandError> for BorderError {
                 value,
                 ..
             } => (*field, Some(index), Value::Number(*value)),
+            CommandError::NoGains { solid, name } => {
+                let field = format!("solids[{solid}].hold");
+                return Kind::Command.of(&e, field, Value::Text(name.clone()));
+            }
             CommandError::Negative { field, value } => (*field, None, Value::Number(*value)),
             CommandError::UnknownJoint { field, name }
             | CommandError::UnknownSolid { field, name } => {

@@ -478,8 +478,9 @@ impl Simulation {
     ///     damping: Damping of the controllers, N m s/rad; the model's by default.
     ///
     /// Raises:
-    ///     CommandError: There is no such joint, the number of set-points differs, or a number is
-    ///         negative or not finite. Nothing has changed.
+    ///     CommandError: There is no such joint, the number of set-points differs, a number is
+    ///         negative or not finite, or neither model nor arguments give a stiffness or a
+    ///         damping. Nothing has changed.
     #[pyo3(signature = (joints, set_points = None, *, stiffness = None, damping = None))]
     fn hold(
         &self,
@@ -514,8 +515,13 @@ impl Simulation {
     }
 
     /// Holds all wheels at their present angles, as `hold` does, and sets their torques to 0.
+    ///
+    /// Raises:
+    ///     CommandError: The model states no gains to hold a wheel. Nothing has changed.
     fn brake(&self) -> Result<()> {
-        self.open()?.brake();
+        let mut open = self.open()?;
+        open.check_brakes()?;
+        open.brake();
         Ok(())
     }
 

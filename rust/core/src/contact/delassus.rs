@@ -85,7 +85,7 @@ impl ContactSystem {
             match contact.part {
                 Part::Limit(..) => close_stop(&mut own),
                 Part::Friction(_) => joint_friction::close(&mut own),
-                Part::Wheel(_) if rollers::rollers_of(model, contact).is_some() => {
+                Part::Wheel(_) if rollers::has_a_row_of_its_own(model, contact) => {
                     rollers::close(&mut own);
                 }
                 Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) | Part::Collider(_) => {}

@@ -71,12 +71,14 @@ pub struct Slot<T: Lane> {
 impl<T: Lane> Slot<T> {
     /// Completes the frame of a wheel from its normal and rolling direction.
     #[inline(always)]
-    fn finish_frame(&mut self, rollers: Option<[f64; 2]>) {
+    fn finish_frame(&mut self, rollers: Option<[f64; 2]>, across: Option<f64>) {
         self.b = self.t.cross(self.n);
         if let Some(angle) = rollers {
             self.t = rollers::axis_of(self.t, self.b, angle);
             let zero = self.gap.like(0.0);
             self.b = Vec3::new(zero, zero, zero);
+        } else if let Some(across) = across {
+            self.b = self.b * self.gap.like(across);
         }
     }
 }
@@ -1064,7 +1066,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + to_point, slot.point);
             slot.gap = T::select(here, distance - sphere.radius, slot.gap);
         }
-        slot.finish_frame(wheel.rollers);
+        slot.finish_frame(wheel.rollers, wheel.across);
         undefined
     }
 
@@ -1114,7 +1116,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + near.point, slot.point);
             slot.gap = T::select(here, near.distance - slot.sphere.radius, slot.gap);
         }
-        slot.finish_frame(wheel.rollers);
+        slot.finish_frame(wheel.rollers, wheel.across);
         undefined
     }
 

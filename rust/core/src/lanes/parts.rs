@@ -46,6 +46,8 @@ pub(super) struct Wheel {
     pub is_soft: bool,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
     pub rollers: Option<[f64; 2]>,
+    /// Friction across over that along, if they differ.
+    pub across: Option<f64>,
     /// Radius of a bounding ball, m.
     pub bound: f64,
     /// Twist of the body that moves its centre.
@@ -130,6 +132,7 @@ impl Parts {
                     rounding: wheel.rounding,
                     is_soft: wheel.compliance.is_some(),
                     rollers: wheel.rollers,
+                    across: wheel.across,
                     bound: wheel.bound(),
                     carrier: carrier_of(machine, mover, &mut carriers),
                     spin: spins.then_some(link.velocity),

@@ -45,7 +45,7 @@ pub struct Rows<T: Lane> {
     movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
-    /// Whether wheels have rollers.
+    /// Whether wheels have rollers or no friction across.
     has_rollers: bool,
     /// Z along the path of each slot's part: `Z[starts[slot] + k]`.
     Z: Vec<Triple<T>>,
@@ -132,7 +132,8 @@ impl<T: Lane> Rows<T> {
             bodies,
             movers,
             common,
-            has_rollers: (machine.wheels.iter()).any(|wheel| wheel.rollers.is_some()),
+            has_rollers: (machine.wheels.iter())
+                .any(|wheel| wheel.rollers.is_some() || wheel.across.is_some()),
             Z: vec![[zero; 3]; n_rows],
             starts,
             W: vec![[zero; 9]; n_blocks],

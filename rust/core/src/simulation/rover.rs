@@ -278,6 +278,13 @@ pub struct LastCall {
     pub positive_work: f64,
 }
 
+/// Options with the friction of the model's materials.
+fn with_laws_of(model: &Model, mut options: StepOptions) -> StepOptions {
+    let restitution = options.restitution;
+    options.materials = (options.materials).with_own(model.own_frictions(), restitution);
+    options
+}
+
 impl RoverSimulation {
     /// At rest in the zero configuration, with all loops closed; steering joints held at zero, all
     /// others free.
@@ -290,6 +297,7 @@ impl RoverSimulation {
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
         let (configuration, v) = (Configuration::zero(&model), vec![0.0; model.nv()]);
+        let options = with_laws_of(&model, options);
         let mut made = Self::of(
             RoverScene::new(model, terrain),
             configuration.clone(),
@@ -317,6 +325,7 @@ impl RoverSimulation {
             configuration.is_of(&scene.model),
             "invariant: a configuration of this model"
         );
+        let options = with_laws_of(&scene.model, options);
         let mut made = Self::of(scene, configuration.clone(), options)?;
         made.place_closed(configuration, v);
         Ok(made)
@@ -378,7 +387,7 @@ impl RoverSimulation {
     fn restart(&mut self, placement: Placement) {
         self.command = placement.scene.command();
         self.scene = placement.scene;
-        self.options = placement.options;
+        self.options = with_laws_of(&self.scene.model, placement.options);
         self.place_closed(placement.configuration, placement.v);
     }
 

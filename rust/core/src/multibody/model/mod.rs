@@ -16,6 +16,8 @@ mod properties;
 mod spinners;
 mod tree;
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 pub use body::Body;
@@ -33,6 +35,7 @@ use super::inertias::Inertias;
 use super::joint::Joint;
 pub use super::mechanism::BASE;
 use super::mechanism::{Mechanism, Mover};
+use crate::law::materials::OwnFriction;
 
 /// Kinematic trees. Velocities are in the order of the bodies; [`super::joint`] lists those of each
 /// joint.
@@ -60,6 +63,7 @@ pub struct Model {
     /// Indices of the joints with dry friction.
     rubbing: Vec<usize>,
     loops: Vec<Loop>,
+    own_frictions: Arc<[OwnFriction]>,
     machines: Vec<MachineSpan>,
     has_slides: bool,
     mass: f64,
@@ -293,6 +297,12 @@ impl Model {
     #[must_use]
     pub fn has_rollers(&self) -> bool {
         self.wheels.iter().any(|wheel| wheel.rollers.is_some())
+    }
+
+    /// Materials with a friction of their own.
+    #[must_use]
+    pub fn own_frictions(&self) -> &Arc<[OwnFriction]> {
+        &self.own_frictions
     }
 
     /// Whether any wheel yields where it touches.
