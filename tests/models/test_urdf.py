@@ -187,7 +187,7 @@ def test_what_is_not_simulated_is_listed(tmp_path):
     )
     listed = "\n".join(model.import_report.left_out)
     for what in (
-        "gazebo[chassis]: <kp>",
+        "<kp>: gazebo[chassis]",
         "<sensor> of <robot>",
         "a shape that touches is the mesh",
         "hull.dae, which cannot be read",
@@ -353,14 +353,17 @@ def test_substitutions_without_a_value_are_refused(tmp_path, value):
     assert raised.value.value == value
 
 
-def test_a_wheel_that_is_fixed_to_a_link_that_turns_is_refused(tmp_path):
+def test_a_wheel_that_is_fixed_to_a_link_that_turns_makes_one_wheel_with_it(tmp_path):
+    """Such files were refused, and a hub with a round shape of its own gave its radius to the wheel."""
     tyre = body("tyre", mass=1.0, shapes=WHEEL) + joint("glue", "fixed", "rear_hub", "tyre")
     text = rover(extra=tyre).replace("rear_wheel", "rear_hub")
     text = changed(text, r'(name="rear_hub".*?)<collision>.*?</collision>', r"\1")
-    with pytest.raises(ModelError, match=r"link\[tyre\]\.joint: this wheel is fixed to rear_hub, which turns"):
-        RoverModel.from_urdf(write(tmp_path, text))
-    told = {"left_wheel": 0.2, "right_wheel": 0.2, "rear_hub": 0.2}
-    assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=told).wheel_names == list(told)
+    model = RoverModel.from_urdf(write(tmp_path, text))
+    assert model.wheel_names == ["left_wheel", "right_wheel", "rear_hub"]
+    assert model.wheel_radii.tolist() == [0.2] * 3
+    assert "tyre" in model.tags(np.zeros(model.nq))
+    told = ["left_wheel", "right_wheel", "tyre"]
+    assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=told) == model
 
 
 def test_a_motor_with_a_leg_is_no_wheel(tmp_path):

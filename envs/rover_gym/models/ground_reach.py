@@ -32,15 +32,28 @@ def check_wheels_reach_the_ground(tree: RobotTree, wheels: Sequence[tuple[str, f
     """Rejects wheels that cannot touch level ground, because other parts reach farther down.
 
     Args:
-        tree: The robot after its wheels were joined.
+        tree: The robot.
         wheels: Link, radius and shift of the centre along the axis (m) of each wheel.
         up: Unit vector upwards in the file's axes, (3,).
 
     Raises:
         ModelError: A wheel cannot touch the ground.
     """
+    for name, reason in above_the_ground(tree, wheels, up).items():
+        text = f"this wheel {reason}; choose the wheels by wheels=[...], or give their radii: wheels={{name: radius}}"
+        tree.refuse(f"link[{name}]", name, text)
+
+
+def above_the_ground(tree: RobotTree, wheels: Sequence[tuple[str, float, float]], up: Array) -> dict[str, str]:
+    """The wheels that cannot touch level ground, each with the reason. A robot on a fixed base has none.
+
+    Args:
+        tree: The robot.
+        wheels: Link, radius and shift of the centre along the axis (m) of each wheel.
+        up: Unit vector upwards in the file's axes, (3,).
+    """
     if any(link.parent is None and link.joint.kind != "free" for link in tree.links.values()):
-        return
+        return {}
     poses = tree.poses()
     names = {name for name, _, _ in wheels}
     lowest: dict[str, list[tuple[str, Array]]] = {}
@@ -63,12 +76,13 @@ def check_wheels_reach_the_ground(tree: RobotTree, wheels: Sequence[tuple[str, f
             points = _points(shape, R.T @ up) if shape.collides else None
             if points is not None:
                 lowest[mount].append((link.name, p + points @ R.T))
+    reasons = {}
     for name, radius, _ in wheels:
         mount, bottom = bottoms[name]
         others = [(other, points - bottom) for other, points in lowest[mount] if other != name]
         if others and (found := _deepest(others, up)) is not None and found[1] > RAISED * radius:
-            reason = f"this wheel cannot touch level ground: {found[0]} reaches {found[1]:.3g} m farther down"
-            tree.refuse(f"link[{name}]", radius, f"{reason}; choose other wheels, or give radii: wheels={{name: radius}}")
+            reasons[name] = f"cannot touch level ground: {found[0]} reaches {found[1]:.3g} m farther down"
+    return reasons
 
 
 def _turns_freely(link: FileLink) -> bool:

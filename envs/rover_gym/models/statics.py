@@ -27,7 +27,8 @@ import numpy.typing as npt
 
 from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
 from rover_gym.models.import_report import Array
-from rover_gym.models.robot_tree import FileLink, RobotTree, round_radius
+from rover_gym.models.ground_reach import above_the_ground
+from rover_gym.models.robot_tree import FileLink, RobotTree, largest_round, round_radius
 from rover_gym.rotations import rotation_matrix
 from rover_gym.validation import number, refuse
 
@@ -245,6 +246,13 @@ def search_wheels(tree: RobotTree, poses: Poses, up: Array) -> list[str]:
             if follows is not None and leaders.get(follows[0]) not in chosen:
                 chosen.remove(name)
                 reasons[name] = f"its joint follows {follows[0]}, which carries no wheel"
+    if not named:
+        outlines = {name: largest_round(tree.as_one(name))[0] for name in chosen}
+        found = [(name, one.radius, one.centre) for name, one in outlines.items() if one is not None]
+        for name, reason in above_the_ground(tree, found, up).items():
+            chosen.remove(name)
+            del round_ones[name]
+            reasons[name] = reason
     doubtful = _on_the_same_ground(poses, up, round_ones, chosen)
     if doubtful:
         likely = f"{', '.join(doubtful)} may be wheels of {tree.path} like {', '.join(chosen)}"
