@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.drawings import Drawer
+from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.loop_description import describe_loops
 from rover_gym.models.meshes import MeshOptions, hulls_of
 from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree, mesh_of
@@ -372,10 +372,9 @@ def _shapes(
             own = [_shape(shape, A, anchor, collides=collides, visible=visible)]
         elif shape.mesh is not None and collides:
             own = _hulls(tree, link, shape, A, anchor, meshes, visible=not is_drawn)
-        for made in own:
-            made |= {} if material is None else {"material": material}
-            made |= {} if shape.colour is None else {"colour": list(shape.colour)}
-        found += own
+        look: dict[str, Any] = {} if material is None else {"material": material}
+        look |= {} if shape.colour is None else {"colour": list(shape.colour)}
+        found += [made | look for made in own]
     if role is not None:
         turn = rotation_vector(turn_z_to(A @ link.joint.axis))
         disc: dict[str, Any] = {"kind": "disc", "radius": float(role.radius)}

@@ -1,9 +1,9 @@
 """Which wheels of a robot file can touch level ground.
 
 A wheel touches level ground at a tilt of the robot if no other part that collides lies under the plane through the
-wheel's lowest point. The tilts are the planes `z = z0 + a (x - x0) + b (y - y0)` through that point, and the depth of the
-deepest other part under them is a convex function of `(a, b)`. Parts that a suspension moves against the wheel are not
-compared with it.
+wheel's lowest point. The tilts are the planes `z = z0 + a (x - x0) + b (y - y0)` through that point, and the depth of
+the deepest other part under them is a convex function of `(a, b)`. Parts that a suspension moves against the wheel are
+not compared with it.
 """
 
 from __future__ import annotations

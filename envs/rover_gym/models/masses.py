@@ -39,7 +39,9 @@ def state_masses(tree: RobotTree, masses: object) -> None:
             link.inertia = link.inertia * (mass / link.mass)
         else:
             link.centre, link.inertia = _uniform(tree, link, mass)
-            tree.assumed.append(f"link[{name}]: the centre and inertia of its shapes, for its given mass of {mass:g} kg")
+            tree.assumed.append(
+                f"link[{name}]: the centre and inertia of its shapes, for its given mass of {mass:g} kg"
+            )
         link.mass = mass
 
 
@@ -84,5 +86,9 @@ def _body(shape: FileShape) -> tuple[float, Array, Array] | None:
             hull = require("trimesh", "models").Trimesh(mesh.vertices, mesh.faces).convex_hull
             if not hull.volume > 0.0:
                 return None
-            return float(hull.volume), shape.position + R @ hull.center_mass, R @ hull.moment_inertia @ R.T / hull.volume
+            return (
+                float(hull.volume),
+                shape.position + R @ hull.center_mass,
+                R @ hull.moment_inertia @ R.T / hull.volume,
+            )
     return float(volume), shape.position, R @ about @ R.T

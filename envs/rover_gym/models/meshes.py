@@ -101,7 +101,7 @@ def _colour(mesh: Any) -> tuple[float, float, float] | None:
             return None
         material = getattr(visual, "material", None)
         red, green, blue = (int(x) for x in (material if material is not None else visual).main_color[:3])
-    except Exception:  # noqa: BLE001 - colours of damaged files are of many kinds
+    except Exception:
         return None
     return red / 255.0, green / 255.0, blue / 255.0
 

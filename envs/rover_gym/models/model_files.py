@@ -81,7 +81,8 @@ def from_urdf(
     Args:
         path: Path of the file.
         wheels: Names of the wheels' links or joints, or a mapping of names to radii, m. A link that is fixed to a
-            turning one stands for that. By default wheels are found from shapes and names. An empty list means no wheels.
+            turning one stands for that. By default wheels are found from shapes and names. An empty list means no
+            wheels.
         steering: Names of the steering links or joints, or a mapping from wheel names to them. By default they are
             found from their axes. An empty list means no steering.
         free_base: Whether the root link moves freely. Otherwise it is fixed to the world.

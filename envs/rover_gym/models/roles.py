@@ -1,9 +1,9 @@
 """Finds the wheels, their steering joints and radii: as given by the user, otherwise from geometry and names.
 
 `search_wheels` finds the wheels. A wheel is all that is fixed to what its joint carries, and its radius that of the
-largest round shape of all of it; two round shapes apart on one axle are two wheels that turn as one. A wheel is steered by the nearest joint above it that turns about an upright axis and
-carries no other wheel. A wheel is a caster, without drive and steering, if its name indicates it. Ambiguous cases are
-rejected with the candidates.
+largest round shape of all of it; two round shapes apart on one axle are two wheels that turn as one. A wheel is steered
+by the nearest joint above it that turns about an upright axis and carries no other wheel. A wheel is a caster, without
+drive and steering, if its name indicates it. Ambiguous cases are rejected with the candidates.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_gym.mechanics import ModelError
-from rover_gym.models.import_report import Array
 from rover_gym.models.ground_reach import check_wheels_reach_the_ground
+from rover_gym.models.import_report import Array
 from rover_gym.models.robot_tree import (
     FileFriction,
     FileJoint,
@@ -206,7 +206,9 @@ def _check_forward(tree: RobotTree, axles: dict[str, Array], up: Array, ahead: A
     if (wrong and fits_other) or (level and all(along_ahead[name] > along_left[name] for name in level)):
         names = wrong or level
         given, other = _direction(ahead), _direction(left)
-        reason = f"the axles of {', '.join(names)} point along it in {tree.path}: the robot drives along its {other} axis"
+        reason = (
+            f"the axles of {', '.join(names)} point along it in {tree.path}: the robot drives along its {other} axis"
+        )
         refuse(ModelError, "forward", given, f'{reason}, so give forward="{other}", or "-{other}" if that is backwards')
     for name in wrong:
         tree.assumed.append(f"wheel {name}: its axle points forward, so a positive command turns it about its axle")

@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
-from rover_gym.models.import_report import Array
 from rover_gym.models.ground_reach import above_the_ground
+from rover_gym.models.import_report import Array
 from rover_gym.models.robot_tree import FileLink, RobotTree, largest_round, round_radius
 from rover_gym.rotations import rotation_matrix
 from rover_gym.validation import number, refuse
@@ -297,9 +297,7 @@ def _why_not(tree: RobotTree, link: FileLink, poses: Poses, up: Array, carriers:
     rise = abs(float(poses[link.name][0] @ joint.axis @ up))
     if not rise < TILT:
         return f"its axis rises by {math.degrees(math.asin(min(rise, 1.0))):.0f} degrees"
-    if joint.limits is not None and not (
-        _is_named(tree, link) and round_radius(tree.as_one(link.name))[0] is not None
-    ):
+    if joint.limits is not None and not (_is_named(tree, link) and round_radius(tree.as_one(link.name))[0] is not None):
         return f"its joint has stops at {joint.limits[0]:.4g} and {joint.limits[1]:.4g} rad"
     return None
 

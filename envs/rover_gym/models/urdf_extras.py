@@ -1,7 +1,7 @@
 """Colours of a URDF, and what its elements `<gazebo>` say.
 
-Of the contents of `<gazebo>`, joints between two links close loops, `mu1`, `mu2` and `fdir1` are the friction of a link,
-and `material` may be a colour by name. Everything else is for other programs and is listed.
+Of the contents of `<gazebo>`, joints between two links close loops, `mu1`, `mu2` and `fdir1` are the friction of a
+link, and `material` may be a colour by name. Everything else is for other programs and is listed.
 """
 
 from __future__ import annotations
