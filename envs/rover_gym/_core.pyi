@@ -875,10 +875,12 @@ class HeightField(Terrain):
         origin: Place (x, z) of the first height, m. By default the middle of the map is at the
             world's origin.
         material: Name of its material, for the laws of a `Simulation` by pair of materials.
+        map_frame: Easting and northing of the world's origin in the coordinates of a map, and
+            their change per metre along x and along z, (4,). `from_file` reads it from a GeoTIFF.
 
     Raises:
         TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
-            has data, or the spacing is not positive.
+            has data, the spacing is not positive, or a change per metre is 0.
     """
 
     def __new__(
@@ -887,6 +889,7 @@ class HeightField(Terrain):
         spacing: float | tuple[float, float],
         origin: tuple[float, float] | None = None,
         material: str = "ground",
+        map_frame: Sequence[float] | None = None,
     ) -> HeightField: ...
     from_file = staticmethod(terrain_files.height_field_from_file)
     fractal = staticmethod(fractal_map)
@@ -908,6 +911,31 @@ class HeightField(Terrain):
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Corners x_min, z_min, x_max, z_max of the map, m."""
+    @property
+    def map_frame(self) -> tuple[float, float, float, float] | None:
+        """Easting and northing of the world's origin on the map, and their change per metre along x
+        and along z, (4,); None without map coordinates.
+        """
+    def place_of(self, easting: float, northing: float) -> tuple[float, float]:
+        """Place (x, z), m, of a point in map coordinates.
+
+        Args:
+            easting: Easting, in the unit of the map.
+            northing: Northing, in the unit of the map.
+
+        Raises:
+            TerrainError: The ground has no map coordinates, or a number is not finite.
+        """
+    def coordinates_of(self, x: float, z: float) -> tuple[float, float]:
+        """Easting and northing of a place, in the unit of the map.
+
+        Args:
+            x: Along x, m.
+            z: Along z, m.
+
+        Raises:
+            TerrainError: The ground has no map coordinates, or a number is not finite.
+        """
     def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
@@ -1670,8 +1698,9 @@ class Simulation(AnySimulation):
             damping: Damping of the controllers, N m s/rad; the model's by default.
 
         Raises:
-            CommandError: There is no such joint, the number of set-points differs, or a number is
-                negative or not finite. Nothing has changed.
+            CommandError: There is no such joint, the number of set-points differs, a number is
+                negative or not finite, or neither model nor arguments give a stiffness or a
+                damping. Nothing has changed.
         """
     def release(self, joints: str | Sequence[str]) -> None:
         """Releases joints that are held.
@@ -1683,7 +1712,11 @@ class Simulation(AnySimulation):
             CommandError: There is no such joint. Nothing has changed.
         """
     def brake(self) -> None:
-        """Holds all wheels at their present angles, as `hold` does, and sets their torques to 0."""
+        """Holds all wheels at their present angles, as `hold` does, and sets their torques to 0.
+
+        Raises:
+            CommandError: The model states no gains to hold a wheel. Nothing has changed.
+        """
     @property
     def contacts(self) -> Contacts:
         """The contacts of the last step."""

@@ -30,7 +30,9 @@ def test_an_element_with_joint_in_its_name_closes_no_loop_and_is_listed(tmp_path
     assert any(listed in entry for entry in model.import_report.left_out) or listed in str(model.import_report)
 
 
-@pytest.mark.parametrize("inner", ["<parent>left_wheel</parent><child>right_wheel</child>", '<parent link="a"/><child link="b"/>'])
+@pytest.mark.parametrize(
+    "inner", ["<parent>left_wheel</parent><child>right_wheel</child>", '<parent link="a"/><child link="b"/>']
+)
 def test_a_joint_between_two_links_is_a_loop_and_is_never_dropped_in_silence(tmp_path, inner):
     loop = f'<gazebo><plugin name="d"><left_joint>x</left_joint></plugin><joint name="bar" type="revolute">{inner}</joint></gazebo>'
     path = write(tmp_path, rover(extra=loop))

@@ -43,7 +43,9 @@ def four(rear=None, axis="0 1 0", rpy=ABOUT_Y, more=""):
     parts = []
     for name, (x, y) in PLACES.items():
         extra = (rear or {}).get(name, "") + more
-        parts.append(link(f"{name}_wheel", round_shape(0.1, rpy=rpy)) + turning(f"{name}_wheel", x, y, axis=axis, more=extra))
+        parts.append(
+            link(f"{name}_wheel", round_shape(0.1, rpy=rpy)) + turning(f"{name}_wheel", x, y, axis=axis, more=extra)
+        )
     return robot(*parts)
 
 
@@ -124,7 +126,10 @@ def test_a_drawn_box_of_size_0_does_not_refuse_a_robot(tmp_path, size):
 def test_one_axle_with_two_round_shapes_is_two_wheels_on_one_joint(tmp_path):
     """Half of an axle's wheels were lost, and the robot stood on three points."""
     axle = round_shape(0.1, y=0.2) + round_shape(0.1, y=-0.2) + round_shape(0.02, length=0.4)
-    parts = [link(f"{end}_axle", axle, mass=2.0) + turning(f"{end}_axle", x, 0.0) for end, x in (("front", 0.2), ("rear", -0.2))]
+    parts = [
+        link(f"{end}_axle", axle, mass=2.0) + turning(f"{end}_axle", x, 0.0)
+        for end, x in (("front", 0.2), ("rear", -0.2))
+    ]
     model = RoverModel.from_urdf(write(tmp_path, robot(*parts)), torque_limit=5.0)
     assert model.wheel_names == ["front_axle", "rear_axle", "front_axle_2", "rear_axle_2"]
     assert model.mass == pytest.approx(24.0)
@@ -141,7 +146,9 @@ def test_one_axle_with_two_round_shapes_is_two_wheels_on_one_joint(tmp_path):
 def test_a_chosen_wheel_that_cannot_touch_level_ground_is_refused(tmp_path):
     spare = link("spare_wheel", round_shape(0.1)) + turning("spare_wheel", 0.0, 0.0, z=0.3)
     text = four().replace("</robot>", spare + "</robot>")
-    with pytest.raises(ModelError, match=r"link\[spare_wheel\]: this wheel cannot touch level ground: .* 0\.3 m farther down"):
+    with pytest.raises(
+        ModelError, match=r"link\[spare_wheel\]: this wheel cannot touch level ground: .* 0\.3 m farther down"
+    ):
         RoverModel.from_urdf(write(tmp_path, text))
     given = [f"{name}_wheel" for name in PLACES]
     assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=given).wheel_names == given
@@ -224,7 +231,8 @@ def test_a_brake_or_a_hold_without_gains_is_refused_by_the_field_that_lacks_them
 def test_masses_make_a_body_of_what_is_only_drawn(tmp_path):
     drawn = '<link name="base"><visual><geometry><box size="0.6 0.4 0.2"/></geometry></visual></link>'
     wheels = "".join(
-        f'<link name="{n}_wheel">{round_shape(0.1, role="visual")}</link>' + turning(f"{n}_wheel", *at) for n, at in PLACES.items()
+        f'<link name="{n}_wheel">{round_shape(0.1, role="visual")}</link>' + turning(f"{n}_wheel", *at)
+        for n, at in PLACES.items()
     )
     path = write(tmp_path, f'<robot name="r">{drawn}{wheels}</robot>')
     with pytest.raises(ModelError, match="must have a mass"):
@@ -234,9 +242,15 @@ def test_masses_make_a_body_of_what_is_only_drawn(tmp_path):
     assert model.mass == pytest.approx(12.0)
     assert "centre and inertia of its shapes" in str(report)
     base = model.to_dict()["solids"][0]
-    np.testing.assert_allclose(base["inertia"][:3], 10.0 / 12.0 * np.array([0.2**2 + 0.4**2, 0.6**2 + 0.4**2, 0.6**2 + 0.2**2]))
+    np.testing.assert_allclose(
+        base["inertia"][:3], 10.0 / 12.0 * np.array([0.2**2 + 0.4**2, 0.6**2 + 0.4**2, 0.6**2 + 0.2**2])
+    )
     np.testing.assert_allclose(check_statics(model).loads, 3.0 * 9.81, rtol=1e-3)
-    for wrong, reason in (({"nothing": 1.0}, "there is no such link"), ({"base": 0.0}, r"masses\[base\]"), (3, "must be a mapping")):
+    for wrong, reason in (
+        ({"nothing": 1.0}, "there is no such link"),
+        ({"base": 0.0}, r"masses\[base\]"),
+        (3, "must be a mapping"),
+    ):
         with pytest.raises(ModelError, match=reason):
             read_robot(path, masses=wrong)
     heavier, _ = read_robot(write(tmp_path, four()), masses={"base": 40.0})

@@ -143,7 +143,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     `reset` raises `TerrainError`. A refused reset, whatever the reason, changes nothing.
 
     `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
-    `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
+    `heading_deg`, `goal` (x, z), these two in map coordinates as `map_position` and `map_goal` (easting, northing) on a
+    GeoTIFF's ground, or the whole state as `q` (21,) with `v` (21,), as
     `Simulation.set_state` takes them; the `goals` of a course, one (x, z) a waypoint; and `field_seed`, a whole number from
     0, by which the rocks are drawn and the piece of hills is cut: with equal starts and goals, equal fields. Unknown names
     are refused with `OptionError`.

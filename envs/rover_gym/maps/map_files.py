@@ -224,7 +224,7 @@ def read_map(
     """
     if nodata is not None and not (isinstance(nodata, (float, np.floating)) and np.isnan(nodata)):
         nodata = number("nodata", nodata, error=TerrainError)
-    marker = None if nodata is None else float(nodata)  # type: ignore[arg-type]
+    marker = None if nodata is None else float(nodata)
     factor, zero = (
         None if value is None else number(name, value, error=TerrainError)
         for name, value in (("scale", scale), ("datum", datum))
