@@ -362,7 +362,9 @@ def test_a_lone_extreme_minimum_is_refused_with_its_cell(marker: int, dtype: str
     assert np.isnan(HeightField.from_file(tmp_path / "map.npy", spacing=1.0, nodata=marker).grid[2, 3])
 
 
-@pytest.mark.parametrize("depths", [(-1200.0, -900.0, -1100.0, -1000.0), (-3.0, 0.0, 0.0, 0.0), (-1000.5, 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "depths", [(-1200.0, -900.0, -1100.0, -1000.0), (-3.0, 0.0, 0.0, 0.0), (-1000.5, 0.0, 0.0, 0.0)]
+)
 def test_deep_ground_without_a_marker_is_read(depths: tuple[float, ...], tmp_path: Path) -> None:
     np.save(tmp_path / "map.npy", np.array(depths).reshape(2, 2))
     field = HeightField.from_file(tmp_path / "map.npy", spacing=1.0)
