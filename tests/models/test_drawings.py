@@ -5,11 +5,13 @@ import pytest
 from models.robot_files import rover, write
 from models.test_wheel_groups import four, round_shape
 
-from rover_gym import ModelError, RoverModel
+from rover_gym import ModelError, RoverModel, Simulation
 from rover_gym.models.drawings import MOST_OF_ONE, simplified
 from rover_gym.models.meshes import Mesh
 from rover_gym.rendering.appearance import TYRE_COLOUR, part_mesh, rover_parts
 from rover_gym.replay.scenery import coloured_meshes
+from rover_gym.sensors import LaserScanner, Mount
+from rover_gym.sensors.sensor import Moment
 
 pytest.importorskip("yourdfpy")
 
@@ -109,7 +111,7 @@ def test_a_drawing_that_is_none_is_refused(changes, field):
         RoverModel.from_dict(source)
 
 
-def test_drawings_change_nothing_that_moves(tmp_path):
+def test_drawings_change_nothing_that_moves():
     plain = RoverModel.named("open-rover")
     source = plain.to_dict()
     source["solids"][0]["drawings"] = [
@@ -123,10 +125,6 @@ def test_drawings_change_nothing_that_moves(tmp_path):
 
 def test_a_frame_of_a_urdf_carries_sensors_in_its_direction(tmp_path):
     """A sensor could name solids only: `camera_link`, which has no mass, was unknown."""
-    from rover_gym import Simulation
-    from rover_gym.sensors import LaserScanner, Mount
-    from rover_gym.sensors.sensor import Moment
-
     extra = '<link name="camera_link"/><joint name="c" type="fixed"><parent link="chassis"/><child link="camera_link"/>'
     extra += '<origin xyz="0.4 0.1 0.3" rpy="0 0 1.5707963267948966"/></joint>'
     model = RoverModel.from_urdf(write(tmp_path, rover(extra=extra)))
