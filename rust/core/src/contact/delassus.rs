@@ -32,6 +32,8 @@ pub struct ContactSystem {
     spans: Vec<Range<usize>>,
     /// Velocities along the union of two paths, ascending, with Z.
     unions: Vec<(usize, Triple<f64>)>,
+    /// Directions in which closed loops let nothing move each contact; empty if there are none.
+    held: Vec<[bool; 3]>,
     /// One entry a velocity (nv), while a union is assembled.
     full: Vec<Triple<f64>>,
 }
@@ -48,6 +50,7 @@ impl ContactSystem {
             bodies: Vec::with_capacity(n),
             spans: Vec::new(),
             unions: Vec::new(),
+            held: Vec::new(),
             full: Vec::new(),
         }
     }
@@ -107,10 +110,51 @@ impl ContactSystem {
     pub fn soften(&mut self, diagonal: impl Iterator<Item = f64>) {
         let size = 3 * self.n_contacts();
         for (c, term) in diagonal.enumerate() {
-            for i in 3 * c..3 * (c + 1) {
-                self.W[i * (size + 1)] += term;
+            for k in 0..3 {
+                let own = &mut self.W[(3 * c + k) * (size + 1)];
+                // Of a row that is held only this is left.
+                let is_held = term > 0.0 && self.held.get(c).is_some_and(|held| held[k]);
+                *own = if is_held { term } else { *own + term };
             }
         }
+    }
+
+    /// Entries of a contact on W's diagonal, 1/kg.
+    pub(crate) fn diagonal(&self, c: usize) -> Triple<f64> {
+        let size = 3 * self.n_contacts();
+        [0, 1, 2].map(|k| self.W[(3 * c + k) * (size + 1)])
+    }
+
+    /// Makes the rows of H zero along directions in which nothing moves a contact. On their
+    /// diagonal W keeps its largest entry, so that it is regular and the impulses are zero.
+    pub(crate) fn hold(&mut self, model: &Model, c: usize, held: [bool; 3]) {
+        let (n, size) = (self.n_contacts(), 3 * self.n_contacts());
+        self.held.resize(n, [false; 3]);
+        self.held[c] = held;
+        let most = self.diagonal(c).into_iter().fold(0.0, f64::max);
+        let (union, path) = match self.spans.get(c) {
+            Some(span) if !span.is_empty() => (span.clone(), 0),
+            _ => (0..0, model.path(self.bodies[c]).len()),
+        };
+        let of_union = self.unions[union].iter_mut().map(|(_, z)| z);
+        let rows = (self.Z[c * self.stride..][..path].iter_mut()).chain(of_union);
+        for z in rows {
+            for k in 0..3 {
+                z[k] = if held[k] { 0.0 } else { z[k] };
+            }
+        }
+        for i in (0..3).filter(|k| held[*k]).map(|k| 3 * c + k) {
+            for j in 0..size {
+                (self.W[i * size + j], self.W[j * size + i]) = (0.0, 0.0);
+            }
+            self.W[i * (size + 1)] = most;
+            self.u[i] = 0.0;
+        }
+    }
+
+    /// Whether nothing moves a contact along its normal.
+    pub(crate) fn is_immovable(&self, c: usize) -> bool {
+        self.held.get(c).is_some_and(|held| held[0])
     }
 
     /// [`Self::assemble`] without W, which stays what it was.
@@ -128,6 +172,7 @@ impl ContactSystem {
             kinematics,
             v,
         };
+        self.held.clear();
         self.bodies.clear();
         self.bodies.extend(contacts.iter().map(|c| c.body));
         self.spans.clear();
@@ -284,9 +329,10 @@ impl ContactSystem {
         v: &[f64],
         out: &mut [f64],
     ) {
-        for (contact, values) in contacts.iter().zip(out.chunks_exact_mut(3)) {
+        for (c, (contact, values)) in contacts.iter().zip(out.chunks_exact_mut(3)).enumerate() {
+            let held = self.held.get(c).copied().unwrap_or_default();
             if let Some((k, sign, row)) = limit::joint_row(model, contact) {
-                values[row] += sign * v[k];
+                values[row] += if held[row] { 0.0 } else { sign * v[k] };
                 continue;
             }
             let velocity = relative_velocity(
@@ -297,8 +343,8 @@ impl ContactSystem {
                 },
                 contact,
             );
-            for (value, d) in values.iter_mut().zip(contact.frame.rows()) {
-                *value += velocity.dot(&d);
+            for ((value, d), held) in values.iter_mut().zip(contact.frame.rows()).zip(held) {
+                *value += if held { 0.0 } else { velocity.dot(&d) };
             }
         }
     }

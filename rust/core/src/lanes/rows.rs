@@ -74,6 +74,11 @@ pub struct Rows<T: Lane> {
     pub(super) swept_loops: Vec<T>,
     /// The closed loops of the machine, which number the contacts by their slots.
     pub(super) loops: Option<Box<Loops<T>>>,
+    /// Slots that they hold along any direction, and of each slot where they hold its normal.
+    held: Vec<usize>,
+    immovable: Vec<T::Mask>,
+    /// Largest entry on W's diagonal without the loops by slot, 1/kg; zero where nothing is held.
+    closing: Vec<T>,
     n_slots: usize,
     /// Local velocity `Hᵀ v` before the step by slot, m/s.
     pub u_before: Vec<Triple<T>>,
@@ -152,6 +157,9 @@ impl<T: Lane> Rows<T> {
             swept: vec![zero; machine.nv()],
             swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
             loops,
+            held: Vec::new(),
+            immovable: vec![T::mask(token, 0); n_slots],
+            closing: vec![zero; n_slots],
             n_slots,
             u_before: vec![[zero; 3]; n_slots],
         }
@@ -197,13 +205,13 @@ impl<T: Lane> Rows<T> {
                 for &slot in contacts.used() {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
-                self.multiply_loops(contacts);
                 for &slot in contacts.used_by_joints() {
-                    if let Some((_, JointRow::Friction)) = contacts.joint_row(slot) {
+                    if is_friction(contacts, slot) {
                         let (_, rows) = self.of(contacts, slot);
                         self.normal[slot] = square(self.normal[slot].like(0.0), rows)[4];
                     }
                 }
+                self.multiply_loops(contacts);
                 self.multiply(contacts);
                 if contacts.factored() != 0 {
                     self.multiply_diagonal(contacts);
@@ -287,7 +295,90 @@ impl<T: Lane> Rows<T> {
                 *loops.product_mut(row, slot) = path.add_local(rows, loops.q(row), none);
             }
         }
+        self.held.clear();
+        for &slot in contacts.used() {
+            self.hold(&mut loops, contacts, slot);
+        }
         self.loops = Some(loops);
+    }
+
+    /// Makes the rows of a slot zero where the loops let nothing move it. [`Self::close_held`]
+    /// follows.
+    #[inline(always)]
+    fn hold(&mut self, loops: &mut Loops<T>, contacts: &Contacts<T>, slot: usize) {
+        let zero = T::splat(self.token, 0.0);
+        let mut free = [zero; 3];
+        for z in self.of(contacts, slot).1 {
+            for k in 0..3 {
+                free[k] += z[k] * z[k];
+            }
+        }
+        if !is_friction(contacts, slot) {
+            self.normal[slot] = zero;
+        }
+        let held = loops.hold(slot, &free);
+        self.immovable[slot] = held[0];
+        self.closing[slot] = zero;
+        let any = (held[0] | held[1] | held[2]) & contacts.slot(slot).active;
+        if !any.any() {
+            return;
+        }
+        self.held.push(slot);
+        self.closing[slot] = T::select(any, free[0].max(free[1]).max(free[2]), zero);
+        let n = self.of(contacts, slot).1.len();
+        for z in &mut self.Z[self.starts[slot]..][..n] {
+            for k in 0..3 {
+                z[k] = T::select(held[k], zero, z[k]);
+            }
+        }
+        for k in 0..3 {
+            let u = &mut self.u_before[slot][k];
+            *u = T::select(held[k], zero, *u);
+        }
+    }
+
+    /// Makes W regular where its diagonal is zero, since loops let nothing move a contact: the
+    /// impulses there are zero. After [`Self::soften`], as what yields has a load.
+    pub fn close_held(&mut self, contacts: &Contacts<T>) {
+        if self.held.is_empty() {
+            return;
+        }
+        let zero = T::splat(self.token, 0.0);
+        let close = |own: &mut T, closing: T| {
+            *own = T::select(own.le(zero) & zero.lt(closing), closing, *own);
+        };
+        for cluster in 0..contacts.n_clusters() {
+            let blocks = &mut self.W[self.first_blocks[cluster]..];
+            for (i, &slot) in contacts.used_densely(cluster).iter().enumerate() {
+                for k in [0, 4, 8] {
+                    close(&mut blocks[block(i, i)][k], self.closing[slot]);
+                }
+            }
+        }
+        if contacts.factored() != 0 {
+            for slot in contacts.used_nearby() {
+                let own = &mut self.diagonal[slot];
+                if !is_friction(contacts, slot) {
+                    let is_held = own[0].le(zero);
+                    self.normal[slot] = T::select(is_held, self.closing[slot], zero);
+                }
+                for k in [0, 4, 8] {
+                    close(&mut own[k], self.closing[slot]);
+                }
+            }
+        }
+    }
+
+    /// Lanes in which nothing moves a slot's contact along its normal.
+    #[inline(always)]
+    pub(super) fn immovable(&self, slot: usize) -> T::Mask {
+        self.immovable[slot]
+    }
+
+    /// Number of contacts of a lane that nothing moves along their normals.
+    pub(super) fn n_immovable(&self, contacts: &Contacts<T>, lane: usize) -> usize {
+        let here = |slot: &&usize| (self.immovable[**slot] & contacts.slot(**slot).active).get(lane);
+        self.held.iter().filter(here).count()
     }
 
     /// Diagonal blocks of W from Z.
@@ -756,6 +847,12 @@ impl<T: Lane> Rows<T> {
             }
         }
     }
+}
+
+/// Whether a slot is for the dry friction of a joint.
+#[inline(always)]
+fn is_friction<T: Lane>(contacts: &Contacts<T>, slot: usize) -> bool {
+    matches!(contacts.joint_row(slot), Some((_, JointRow::Friction)))
 }
 
 /// Point and frame of a slot.

@@ -139,6 +139,13 @@ impl RoverSimulation {
         block.return_ruts(lane, &mut self.lane_rover());
     }
 
+    /// Leaves a block in whose step something panicked: whatever it holds of the rover comes back.
+    pub(super) fn recover_from<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+        if let Some(sand) = &mut self.memory.sand {
+            block.recover_ruts(lane, &mut sand.ruts);
+        }
+    }
+
     /// Lists the contacts of its last step in a block.
     pub(super) fn list_from<T: Lane>(&mut self, block: &Block<T>, lane: usize) {
         self.active.clear();

@@ -14,6 +14,10 @@
 //! `A(q⁺) v = 0`, both along `M̂⁻¹ Aᵀ`. The second changes v by O(h²) and takes energy of O(h⁴),
 //! which the energy audit gives back to free motion.
 //!
+//! Where the loops let nothing move a contact along one of its directions, that entry on W's
+//! diagonal is the rounding of a difference. Such a row of H counts as zero: no impulse along it
+//! changes any velocity, and the least that obeys the law is zero.
+//!
 //! Rows that follow from earlier ones, such as those across the plane of a planar linkage, are left
 //! out: their part outside the span is below `DEPENDENT` of the loop's longest row. Their
 //! reactions count as zero.
@@ -43,6 +47,12 @@ use crate::scalar::{Lane, LaneMask, Single};
 ///
 /// Loops that close to a micrometre make redundant rows differ by 1e-6 of their length.
 const DEPENDENT: f64 = 1e-5;
+
+/// Part of an entry on W's diagonal that the loops leave, relative to what it is without them, below
+/// which it is rounding.
+///
+/// ROUNDED_MEASURED
+const ROUNDED: f64 = 1e-13;
 
 /// Gap below which a loop is closed, m or rad.
 const TIGHT: f64 = 1e-13;
@@ -339,6 +349,32 @@ impl<T: Lane> Loops<T> {
         }
     }
 
+    /// Sets the products of a contact to zero along the directions in which the loops let nothing
+    /// move it, and returns where. `free`: its part of W's diagonal without the loops, 1/kg.
+    #[inline(always)]
+    pub(crate) fn hold(&mut self, contact: usize, free: &Triple<T>) -> [T::Mask; 3] {
+        let (zero, n) = (T::splat(self.token, 0.0), self.n);
+        let mut taken = [zero; 3];
+        for b in self.B.iter().skip(contact).step_by(n) {
+            for k in 0..3 {
+                taken[k] += b[k] * b[k];
+            }
+        }
+        let rounded = |k: usize| {
+            let is_left = (zero.like(ROUNDED) * free[k]).lt(free[k] - taken[k]);
+            zero.lt(free[k]) & !is_left
+        };
+        let held = [rounded(0), rounded(1), rounded(2)];
+        if (held[0] | held[1] | held[2]).any() {
+            for b in self.B.iter_mut().skip(contact).step_by(n) {
+                for k in 0..3 {
+                    b[k] = T::select(held[k], zero, b[k]);
+                }
+            }
+        }
+        held
+    }
+
     /// `y −= Qᵀ B p` in the lanes of a mask: what the loops make of impulses, given by contact and
     /// the lanes in which there is one.
     #[inline(always)]
@@ -557,7 +593,7 @@ impl Loops<f64> {
         Self::new(Single::best(), model.mechanism(), model.loops(), 0)
     }
 
-    /// Computes B, and subtracts `Bᵀ B` from W.
+    /// Computes B, subtracts `Bᵀ B` from W, and takes out the rows of contacts that the loops hold.
     pub(super) fn project_operator(&mut self, model: &Model, system: &mut ContactSystem) {
         let n = system.n_contacts();
         self.set_size(n);
@@ -568,6 +604,12 @@ impl Loops<f64> {
         for row in 0..self.m() {
             let b = self.B[row * n..][..n].as_flattened_mut();
             system.local(model, self.middle.q(row, model.nv()), b);
+        }
+        for c in 0..n {
+            let held = self.hold(c, &system.diagonal(c));
+            if held.contains(&true) {
+                system.hold(model, c, held);
+            }
         }
         for b in self.B.chunks_exact(n) {
             for (row, x) in system.W.chunks_exact_mut(size).zip(b.as_flattened()) {
