@@ -77,6 +77,11 @@ impl RoverScene {
             all.resize_with(block.n_problems(), ContactProblem::default);
         }
         block.prepare(problems, probe);
+        if !block.is_going(0) {
+            // Its problems may have more contacts than fit.
+            block.return_ruts(0, &mut lane_rover);
+            return None;
+        }
         let solver = &step.options.solver;
         let mut next = Next::Retake;
         while next == Next::Retake {
