@@ -64,7 +64,11 @@ mod tests {
         assert!(fault.message.contains("out of bounds"), "{fault}");
         let place = fault.place.clone().unwrap();
         assert!(place.contains("caught.rs"), "{place}");
-        assert!(fault.to_string().starts_with(&format!("internal error at {place}: index")));
+        assert!(
+            fault
+                .to_string()
+                .starts_with(&format!("internal error at {place}: index"))
+        );
         assert_eq!(caught(|| entries[0]), Ok(1));
     }
 }

@@ -41,7 +41,11 @@ fn on_stand(change: &dyn Fn(&mut WheelDescription), heading: f64, lower: f64) ->
         (model, q)
     };
     let is_closed = |(model, q): &(Model, Configuration)| check_closed(model, q).is_ok();
-    let (model, q) = [heading, -heading].map(welded).into_iter().find(is_closed).unwrap();
+    let (model, q) = [heading, -heading]
+        .map(welded)
+        .into_iter()
+        .find(is_closed)
+        .unwrap();
     let v = vec![0.0; model.nv()];
     let ground = Arc::new(Plane::ground());
     let options = options(5e-3, Variant::Linearised);
@@ -77,7 +81,10 @@ fn step(run: &mut RoverSimulation, is_fast: bool) -> StepReport {
     } else {
         run.step_with(&MoreauJean, 1).unwrap()
     };
-    assert!(report.is_converged() && report.loop_gap < 1e-9, "{report:?}");
+    assert!(
+        report.is_converged() && report.loop_gap < 1e-9,
+        "{report:?}"
+    );
     report
 }
 
@@ -93,13 +100,19 @@ fn rigid_wheels_of_a_machine_on_a_stand_turn_freely_and_bear_nothing() {
                 assert_eq!(report.immovable_contacts, 4, "{heading} {lower}");
                 assert!(report.iterations <= 4, "{report:?}");
                 let forces = run.wheel_forces();
-                assert!(forces.as_flattened().iter().all(|f| f.abs() < 1e-9), "{forces:?}");
+                assert!(
+                    forces.as_flattened().iter().all(|f| f.abs() < 1e-9),
+                    "{forces:?}"
+                );
                 if k == 10 {
                     half = rates(&run);
                 }
             }
             for (rate, half) in rates(&run).iter().zip(half) {
-                assert!(half > 0.1 && (rate - 2.0 * half).abs() < 1e-9 * half, "{rate} {half}");
+                assert!(
+                    half > 0.1 && (rate - 2.0 * half).abs() < 1e-9 * half,
+                    "{rate} {half}"
+                );
             }
         }
     }
@@ -123,9 +136,17 @@ fn wheels_that_yield_on_a_stand_press_and_rub_by_their_springs() {
                 assert!((n - load).abs() < 0.02 * load, "{n} {load}");
                 assert!(b.abs() < 1e-9 * load, "{b}");
                 if holds {
-                    assert!(rate.abs() < 1e-9 && (t.abs() - torque / run.model().wheels()[0].radius).abs() < 1e-6 * load, "{rate} {t}");
+                    assert!(
+                        rate.abs() < 1e-9
+                            && (t.abs() - torque / run.model().wheels()[0].radius).abs()
+                                < 1e-6 * load,
+                        "{rate} {t}"
+                    );
                 } else {
-                    assert!(rate > 0.1 && (t.abs() - mu * n).abs() < 1e-9 * load, "{rate} {t}");
+                    assert!(
+                        rate > 0.1 && (t.abs() - mu * n).abs() < 1e-9 * load,
+                        "{rate} {t}"
+                    );
                 }
             }
         }

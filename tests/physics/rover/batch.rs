@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use rover_core::geometry::{Hit, Plane, Primitive, Ray, Rocks, Sphere, SphereField, Terrain};
 use rover_core::integrator::{StepError, StepOptions};
-use rover_core::nalgebra;
 use rover_core::multibody::{Configuration, Model};
+use rover_core::nalgebra;
 use rover_core::simulation::{
     Batch, BatchError, CommandError, ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation,
 };
@@ -306,12 +306,22 @@ impl Mined {
 }
 
 impl Terrain for Mined {
-    fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive)) {
+    fn visit_near(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
         Self::check(centre.x);
         self.0.visit_near(centre, reach, visit);
     }
 
-    fn visit_spheres(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Sphere)) {
+    fn visit_spheres(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Sphere),
+    ) {
         Self::check(centre.x);
         self.0.visit_spheres(centre, reach, visit);
     }
@@ -361,7 +371,9 @@ fn a_rover_whose_step_panics_is_reported_and_the_others_of_its_batch_go_on() {
         let mut rows = vec![0.0; n * batch.layout().size()];
         let (torques, set_points) = (vec![20.0; 6 * n], vec![0.0; 6 * n]);
         for _ in 0..4 {
-            batch.step(&torques, &set_points, 20, None, &mut rows).unwrap();
+            batch
+                .step(&torques, &set_points, 20, None, &mut rows)
+                .unwrap();
             for (i, own) in own.iter_mut().enumerate() {
                 own.set_wheel_torques(&[20.0; 6]).unwrap();
                 let (taken, found) = (own.step(20), &batch.rovers()[i]);

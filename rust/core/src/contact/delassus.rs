@@ -34,6 +34,10 @@ pub struct ContactSystem {
     unions: Vec<(usize, Triple<f64>)>,
     /// Directions in which closed loops let nothing move each contact; empty if there are none.
     held: Vec<[bool; 3]>,
+    /// Z over all velocities (n_c, nv), of a machine with loops, and entries of W's diagonal whose
+    /// rows are zero.
+    spread: Vec<Triple<f64>>,
+    closings: Vec<(usize, f64)>,
     /// One entry a velocity (nv), while a union is assembled.
     full: Vec<Triple<f64>>,
 }
@@ -51,6 +55,8 @@ impl ContactSystem {
             spans: Vec::new(),
             unions: Vec::new(),
             held: Vec::new(),
+            spread: Vec::new(),
+            closings: Vec::new(),
             full: Vec::new(),
         }
     }
@@ -119,36 +125,85 @@ impl ContactSystem {
         }
     }
 
-    /// Entries of a contact on W's diagonal, 1/kg.
-    pub(crate) fn diagonal(&self, c: usize) -> Triple<f64> {
-        let size = 3 * self.n_contacts();
-        [0, 1, 2].map(|k| self.W[(3 * c + k) * (size + 1)])
+    /// Begins with Z over all velocities, zero off each contact's path.
+    pub(crate) fn spread(&mut self, model: &Model) {
+        let nv = model.nv();
+        let mut spread = std::mem::take(&mut self.spread);
+        spread.clear();
+        spread.resize(self.n_contacts() * nv, [0.0; 3]);
+        for (c, rows) in spread.chunks_exact_mut(nv).enumerate() {
+            for (k, z) in self.entries(model, c) {
+                rows[k] = *z;
+            }
+        }
+        self.spread = spread;
     }
 
-    /// Makes the rows of H zero along directions in which nothing moves a contact. On their
-    /// diagonal W keeps its largest entry, so that it is regular and the impulses are zero.
-    pub(crate) fn hold(&mut self, model: &Model, c: usize, held: [bool; 3]) {
-        let (n, size) = (self.n_contacts(), 3 * self.n_contacts());
-        self.held.resize(n, [false; 3]);
-        self.held[c] = held;
-        let most = self.diagonal(c).into_iter().fold(0.0, f64::max);
+    /// The rows of a contact after [`Self::spread`] (nv).
+    pub(crate) fn spread_rows(&mut self, model: &Model, c: usize) -> &mut [Triple<f64>] {
+        &mut self.spread[c * model.nv()..][..model.nv()]
+    }
+
+    /// Squares of their lengths, 1/kg.
+    pub(crate) fn squares(&self, model: &Model, c: usize) -> Triple<f64> {
+        let rows = &self.spread[c * model.nv()..][..model.nv()];
+        [0, 1, 2].map(|k| rows.iter().map(|z| z[k] * z[k]).sum())
+    }
+
+    /// Makes the rows of H zero along directions in which nothing moves a contact. `free`: their
+    /// squares without loops, 1/kg. On its diagonal W has the largest of these there, so that it is
+    /// regular and the impulses are zero.
+    pub(crate) fn hold(&mut self, model: &Model, c: usize, free: &Triple<f64>, held: [bool; 3]) {
+        let (nv, size) = (model.nv(), 3 * self.n_contacts());
+        self.held.push(held);
+        for k in (0..3).filter(|k| held[*k] || free[*k] <= 0.0) {
+            let own = &mut self.W[(3 * c + k) * (size + 1)];
+            self.closings.push((
+                3 * c + k,
+                if held[k] {
+                    free[0].max(free[1]).max(free[2])
+                } else {
+                    *own
+                },
+            ));
+        }
+        if !held.contains(&true) {
+            return;
+        }
         let (union, path) = match self.spans.get(c) {
             Some(span) if !span.is_empty() => (span.clone(), 0),
             _ => (0..0, model.path(self.bodies[c]).len()),
         };
         let of_union = self.unions[union].iter_mut().map(|(_, z)| z);
         let rows = (self.Z[c * self.stride..][..path].iter_mut()).chain(of_union);
-        for z in rows {
+        for z in rows.chain(&mut self.spread[c * nv..][..nv]) {
             for k in 0..3 {
                 z[k] = if held[k] { 0.0 } else { z[k] };
             }
         }
-        for i in (0..3).filter(|k| held[*k]).map(|k| 3 * c + k) {
-            for j in 0..size {
-                (self.W[i * size + j], self.W[j * size + i]) = (0.0, 0.0);
+        for k in (0..3).filter(|k| held[*k]) {
+            self.u[3 * c + k] = 0.0;
+        }
+    }
+
+    /// W of the spread rows, once all have been given to [`Self::hold`].
+    pub(crate) fn multiply_spread(&mut self, model: &Model) {
+        let (nv, n) = (model.nv(), self.n_contacts());
+        let rows = |c: usize| &self.spread[c * nv..][..nv];
+        for c in 0..n {
+            for d in 0..=c {
+                let block = product(0.0, rows(c), rows(d));
+                for (i, row) in block.chunks_exact(3).enumerate() {
+                    for (j, w) in row.iter().enumerate() {
+                        let (i, j) = (3 * c + i, 3 * d + j);
+                        self.W[i * 3 * n + j] = *w;
+                        self.W[j * 3 * n + i] = *w;
+                    }
+                }
             }
-            self.W[i * (size + 1)] = most;
-            self.u[i] = 0.0;
+        }
+        for (i, own) in self.closings.drain(..) {
+            self.W[i * (3 * n + 1)] = own;
         }
     }
 

@@ -21,7 +21,7 @@ use crate::multibody::loops::Placed;
 use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
-use crate::system::loops::Loops;
+use crate::system::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
 
 /// What is read of a problem.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +74,10 @@ pub struct Rows<T: Lane> {
     pub(super) swept_loops: Vec<T>,
     /// The closed loops of the machine, which number the contacts by their slots.
     pub(super) loops: Option<Box<Loops<T>>>,
+    /// Z of each slot over all velocities without the motions that would open a loop
+    /// (n_slots, nv), of a machine that loops tie to the world. Several contacts of one body on a
+    /// stand are then dependent to the square of rounding, as W's entries are to rounding.
+    spread: Vec<Triple<T>>,
     /// Slots that they hold along any direction, and of each slot where they hold its normal.
     held: Vec<usize>,
     immovable: Vec<T::Mask>,
@@ -157,6 +161,11 @@ impl<T: Lane> Rows<T> {
             swept: vec![zero; machine.nv()],
             swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
             loops,
+            spread: if machine.holds_the_world {
+                vec![[zero; 3]; n_slots * machine.nv()]
+            } else {
+                Vec::new()
+            },
             held: Vec::new(),
             immovable: vec![T::mask(token, 0); n_slots],
             closing: vec![zero; n_slots],
@@ -316,7 +325,7 @@ impl<T: Lane> Rows<T> {
         if !is_friction(contacts, slot) {
             self.normal[slot] = zero;
         }
-        let held = loops.hold(slot, &free);
+        let held = self.find_held(loops, contacts, slot, &free);
         self.immovable[slot] = held[0];
         self.closing[slot] = zero;
         let any = (held[0] | held[1] | held[2]) & contacts.slot(slot).active;
@@ -324,9 +333,16 @@ impl<T: Lane> Rows<T> {
             return;
         }
         self.held.push(slot);
+        loops.hold(slot, held);
         self.closing[slot] = T::select(any, free[0].max(free[1]).max(free[2]), zero);
         let n = self.of(contacts, slot).1.len();
-        for z in &mut self.Z[self.starts[slot]..][..n] {
+        let nv = if self.spread.is_empty() {
+            0
+        } else {
+            self.velocities.len()
+        };
+        let rows = self.Z[self.starts[slot]..][..n].iter_mut();
+        for z in rows.chain(&mut self.spread[slot * nv..][..nv]) {
             for k in 0..3 {
                 z[k] = T::select(held[k], zero, z[k]);
             }
@@ -335,6 +351,52 @@ impl<T: Lane> Rows<T> {
             let u = &mut self.u_before[slot][k];
             *u = T::select(held[k], zero, *u);
         }
+    }
+
+    /// Where the loops let nothing move a slot; `free`: squares of its rows, 1/kg.
+    #[inline(always)]
+    fn find_held(
+        &mut self,
+        loops: &Loops<T>,
+        contacts: &Contacts<T>,
+        slot: usize,
+        free: &Triple<T>,
+    ) -> [T::Mask; 3] {
+        let zero = T::splat(self.token, 0.0);
+        if self.spread.is_empty() {
+            let mut left = *free;
+            for row in 0..loops.m() {
+                let b = loops.product(row, slot);
+                for k in 0..3 {
+                    left[k] -= b[k] * b[k];
+                }
+            }
+            return Loops::holds(free, &left, ROUNDED);
+        }
+        let nv = self.velocities.len();
+        let mut spread = std::mem::take(&mut self.spread);
+        let own = &mut spread[slot * nv..][..nv];
+        own.fill([zero; 3]);
+        let (path, rows) = self.of(contacts, slot);
+        for (k, z) in path.velocities().zip(rows) {
+            own[k] = *z;
+        }
+        loops.project_rows(slot, own);
+        let mut left = [zero; 3];
+        for z in &*own {
+            for k in 0..3 {
+                left[k] += z[k] * z[k];
+            }
+        }
+        self.spread = spread;
+        Loops::holds(free, &left, ROUNDED_SQUARE)
+    }
+
+    /// Rows of two slots over all velocities, where they are kept.
+    #[inline(always)]
+    fn spread_of(&self, slots: [usize; 2]) -> Option<[&[Triple<T>]; 2]> {
+        let nv = self.velocities.len();
+        (!self.spread.is_empty()).then(|| slots.map(|slot| &self.spread[slot * nv..][..nv]))
     }
 
     /// Makes W regular where its diagonal is zero, since loops let nothing move a contact: the
@@ -377,7 +439,8 @@ impl<T: Lane> Rows<T> {
 
     /// Number of contacts of a lane that nothing moves along their normals.
     pub(super) fn n_immovable(&self, contacts: &Contacts<T>, lane: usize) -> usize {
-        let here = |slot: &&usize| (self.immovable[**slot] & contacts.slot(**slot).active).get(lane);
+        let here =
+            |slot: &&usize| (self.immovable[**slot] & contacts.slot(**slot).active).get(lane);
         self.held.iter().filter(here).count()
     }
 
@@ -399,6 +462,11 @@ impl<T: Lane> Rows<T> {
             for (i, &row) in used.iter().enumerate() {
                 let a = contacts.part(row);
                 for &column in &used[..i] {
+                    if let Some([x, y]) = self.spread_of([row, column]) {
+                        self.W[at] = product(zero, x, y);
+                        at += 1;
+                        continue;
+                    }
                     let b = contacts.part(column);
                     let shared = self.common[a * n_parts + b];
                     let x = &self.Z[self.starts[row]..][..shared];
@@ -418,14 +486,20 @@ impl<T: Lane> Rows<T> {
     /// Block of W of a slot with itself.
     #[inline(always)]
     fn own_block(&self, contacts: &Contacts<T>, slot: usize) -> [T; 9] {
-        let (_, rows) = self.of(contacts, slot);
-        let mut own = square(T::splat(self.token, 0.0), rows);
-        if let Some((_, row)) = contacts.joint_row(slot) {
+        let zero = T::splat(self.token, 0.0);
+        let spread = self.spread_of([slot, slot]);
+        let mut own = match spread {
+            Some([rows, _]) => square(zero, rows),
+            None => square(zero, self.of(contacts, slot).1),
+        };
+        if is_friction(contacts, slot) {
+            (own[0], own[8]) = (self.normal[slot], self.normal[slot]);
+        } else if let Some((_, row)) = contacts.joint_row(slot) {
             row.close(&mut own);
         } else if self.has_rollers {
             rollers::close(&mut own);
         }
-        if let Some(loops) = &self.loops {
+        if let (Some(loops), None) = (&self.loops, spread) {
             loops.project_block([slot, slot], &mut own);
         }
         own

@@ -161,12 +161,7 @@ impl<T: Lane> Lanes<T> {
     /// After a panic in the blocks every rover takes the steps that it lacks alone, as it would
     /// have moved; that which panics has the error.
     #[cold]
-    fn part(
-        &mut self,
-        rovers: &mut [BatchRover<'_>],
-        n: usize,
-        go_on: &mut dyn FnMut() -> bool,
-    ) {
+    fn part(&mut self, rovers: &mut [BatchRover<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
         for (place, slot) in self.slots.iter().enumerate() {
             let Some(slot) = slot else {
                 continue;

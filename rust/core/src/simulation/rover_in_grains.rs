@@ -9,8 +9,8 @@ use super::active_contact::ActiveContact;
 use super::grains::GrainSimulation;
 use super::rover::RoverSimulation;
 use super::scene::{Scene, StepTaken};
-use crate::contact::Part;
 use crate::caught::caught;
+use crate::contact::Part;
 use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Sphere, SupportMap};
 use crate::integrator::{
@@ -114,11 +114,7 @@ impl RoverInGrains {
         Ok(Self::with_friction(friction, rover, bed))
     }
 
-    fn with_friction(
-        friction: f64,
-        rover: &RoverSimulation,
-        bed: &GrainSimulation<3>,
-    ) -> Self {
+    fn with_friction(friction: f64, rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Self {
         let q = (bed.q().clone(), rover.q().clone());
         let nv = bed.scene.nv() + rover.scene.nv();
         let room = bed.scene.contact_capacity() + rover.scene.contact_capacity();
@@ -221,18 +217,20 @@ impl RoverInGrains {
             friction: self.friction,
             parts: &mut self.parts,
         };
-        let taken = caught(|| options.variant.step(
-            &mut system,
-            options,
-            StateMut {
-                configuration: &mut q,
-                v: &mut v,
-                time: &mut time,
-            },
-            &mut self.warm_start,
-            &mut self.scratch,
-            &mut NoProbe,
-        ));
+        let taken = caught(|| {
+            options.variant.step(
+                &mut system,
+                options,
+                StateMut {
+                    configuration: &mut q,
+                    v: &mut v,
+                    time: &mut time,
+                },
+                &mut self.warm_start,
+                &mut self.scratch,
+                &mut NoProbe,
+            )
+        });
         (bed.state.configuration, rover.state.configuration) = q;
         let report = match taken {
             Ok(taken) => taken?,

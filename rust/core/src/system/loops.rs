@@ -31,7 +31,7 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::contact::ContactSystem;
-use crate::contact::rows::{Triple, along};
+use crate::contact::rows::{Triple, add_scaled, along};
 use crate::integrator::report::MOST_OPEN;
 use crate::multibody::error::StateError;
 use crate::multibody::loops::{Placed, widest, write_loops};
@@ -49,10 +49,12 @@ use crate::scalar::{Lane, LaneMask, Single};
 const DEPENDENT: f64 = 1e-5;
 
 /// Part of an entry on W's diagonal that the loops leave, relative to what it is without them, below
-/// which it is rounding.
+/// which it is rounding: of a difference `Z² − B²`, and of the square of a projected row.
 ///
-/// ROUNDED_MEASURED
-const ROUNDED: f64 = 1e-13;
+/// Over 1000 headings of the gallery's rovers on a stand the first is up to HEADINGS_FIRST and the
+/// second up to HEADINGS_SECOND where nothing moves.
+pub(crate) const ROUNDED: f64 = 1e-13;
+pub(crate) const ROUNDED_SQUARE: f64 = 1e-20;
 
 /// Gap below which a loop is closed, m or rad.
 const TIGHT: f64 = 1e-13;
@@ -349,30 +351,39 @@ impl<T: Lane> Loops<T> {
         }
     }
 
-    /// Sets the products of a contact to zero along the directions in which the loops let nothing
-    /// move it, and returns where. `free`: its part of W's diagonal without the loops, 1/kg.
+    /// Sets the products of a contact to zero in the lanes and along the directions of masks.
     #[inline(always)]
-    pub(crate) fn hold(&mut self, contact: usize, free: &Triple<T>) -> [T::Mask; 3] {
+    pub(crate) fn hold(&mut self, contact: usize, held: [T::Mask; 3]) {
         let (zero, n) = (T::splat(self.token, 0.0), self.n);
-        let mut taken = [zero; 3];
-        for b in self.B.iter().skip(contact).step_by(n) {
+        for b in self.B.iter_mut().skip(contact).step_by(n) {
             for k in 0..3 {
-                taken[k] += b[k] * b[k];
+                b[k] = T::select(held[k], zero, b[k]);
             }
         }
-        let rounded = |k: usize| {
-            let is_left = (zero.like(ROUNDED) * free[k]).lt(free[k] - taken[k]);
-            zero.lt(free[k]) & !is_left
-        };
-        let held = [rounded(0), rounded(1), rounded(2)];
-        if (held[0] | held[1] | held[2]).any() {
-            for b in self.B.iter_mut().skip(contact).step_by(n) {
-                for k in 0..3 {
-                    b[k] = T::select(held[k], zero, b[k]);
-                }
+    }
+
+    /// `Z − Qᵀ B` in place of a contact's Z over all velocities (nv).
+    #[inline(always)]
+    pub(crate) fn project_rows(&self, contact: usize, rows: &mut [Triple<T>]) {
+        for row in 0..self.m() {
+            let b = self.product(row, contact);
+            for (z, q) in rows.iter_mut().zip(self.q(row)) {
+                add_scaled(z, b, -*q);
             }
         }
-        held
+    }
+
+    /// Along which directions the loops let nothing move a contact: `free` and `left` are its part of
+    /// W's diagonal without them and with them, 1/kg.
+    #[inline(always)]
+    pub(crate) fn holds(free: &Triple<T>, left: &Triple<T>, rounded: f64) -> [T::Mask; 3] {
+        [0, 1, 2].map(
+            #[inline(always)]
+            |k| {
+                let zero = free[k].like(0.0);
+                zero.lt(free[k]) & !(zero.like(rounded) * free[k]).lt(left[k])
+            },
+        )
     }
 
     /// `y −= Qᵀ B p` in the lanes of a mask: what the loops make of impulses, given by contact and
@@ -593,29 +604,26 @@ impl Loops<f64> {
         Self::new(Single::best(), model.mechanism(), model.loops(), 0)
     }
 
-    /// Computes B, subtracts `Bᵀ B` from W, and takes out the rows of contacts that the loops hold.
+    /// Computes B, and W from the projected rows; those of contacts that the loops hold are zero.
     pub(super) fn project_operator(&mut self, model: &Model, system: &mut ContactSystem) {
         let n = system.n_contacts();
         self.set_size(n);
         if n == 0 {
             return;
         }
-        let size = 3 * n;
         for row in 0..self.m() {
             let b = self.B[row * n..][..n].as_flattened_mut();
             system.local(model, self.middle.q(row, model.nv()), b);
         }
+        system.spread(model);
         for c in 0..n {
-            let held = self.hold(c, &system.diagonal(c));
-            if held.contains(&true) {
-                system.hold(model, c, held);
-            }
+            let free = system.squares(model, c);
+            self.project_rows(c, system.spread_rows(model, c));
+            let held = Self::holds(&free, &system.squares(model, c), ROUNDED_SQUARE);
+            self.hold(c, held);
+            system.hold(model, c, &free, held);
         }
-        for b in self.B.chunks_exact(n) {
-            for (row, x) in system.W.chunks_exact_mut(size).zip(b.as_flattened()) {
-                add(row, b.as_flattened(), -x);
-            }
-        }
+        system.multiply_spread(model);
     }
 
     /// `out += Aᵀ λ` (nv) with the impulses of the last [`Self::close`] and the contacts'.
