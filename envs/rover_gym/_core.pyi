@@ -50,6 +50,7 @@ __all__: list[str] = [
     "GrainContacts",
     "GrainSimulation",
     "HeightField",
+    "InternalError",
     "Line",
     "Linearisation",
     "Machine",
@@ -136,6 +137,9 @@ class StepError(RoverGymError, RuntimeError):
 
 class BusyError(RoverGymError, RuntimeError):
     """An object was used while another call on it was still running. Nothing has changed."""
+
+class InternalError(RoverGymError, RuntimeError):
+    """A fault of rover-gym. Please report it, with what led to it and the message, which names the place."""
 
 @final
 class Motor:
@@ -1035,6 +1039,13 @@ class StepReport:
     @property
     def n_contacts(self) -> int:
         """Largest number of contacts in a step."""
+    @property
+    def immovable_contacts(self) -> int:
+        """Largest number of contacts in a step along whose normal closed loops let nothing move.
+
+        Example: the wheels of a machine that is welded to a stand. Such a contact bears no load,
+        unless its wheel is elastic, and an overlap there cannot be removed.
+        """
     @property
     def loop_gap(self) -> float:
         """Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from rover_gym.extras import require
 from rover_gym.mechanics import HeightField, TerrainError, TriangleMesh
-from rover_gym.validation import number, refuse
+from rover_gym.validation import number, refuse, regular_file
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,10 @@ class GroundFile:
         """The file at a path.
 
         Raises:
-            TerrainError: `path` is not a path.
+            TerrainError: `path` is not that of a regular file.
             OSError: There is no file, or it may not be read.
         """
-        try:
-            place = Path(path)  # type: ignore[arg-type]
-        except TypeError:
-            refuse(TerrainError, "path", path, "must be a path")
+        place = regular_file(path, error=TerrainError)
         with place.open("rb") as file:
             return cls(place, file.seek(0, 2))
 

@@ -20,7 +20,6 @@ from rover_gym.models.robot_tree import (
     IGNORABLE,
     RobotTree,
     check_kinds,
-    checked_path,
     drop_distant_limits,
     join_rigid_groups,
     move_limits_to_followed_joints,
@@ -28,7 +27,7 @@ from rover_gym.models.robot_tree import (
 )
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import number, refuse, regular_file, whole
 
 SOLID = re.compile(r"(solids|wheels|tags|loops)\[(\d+)\]")
 
@@ -62,7 +61,7 @@ def _read(
     **limits: float | None,
 ) -> tuple[RoverModel, ImportReport]:
     """Reads a file; `frames`: calls from here to the user's, whose line a warning names; `limits`: of wheels."""
-    place = checked_path(path)
+    place = regular_file(path, error=ModelError)
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
     P = axes_of(forward)

@@ -32,7 +32,7 @@ from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, move_ends
 from rover_gym.models.meshes import Mesh, load_mesh
 from rover_gym.rotations import turn_z_to
-from rover_gym.validation import refuse, shown
+from rover_gym.validation import refuse, regular_file, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
 MAX_LINKS = 2000
@@ -309,9 +309,10 @@ def is_urdf(path: Path) -> bool:
     """Whether a file is a URDF, judged by its beginning.
 
     Raises:
+        ModelError: It is no regular file.
         OSError: The file cannot be read.
     """
-    with path.open("rb") as file:
+    with regular_file(path, error=ModelError).open("rb") as file:
         start = file.read(1 << 16)
     place = start.find(b"<robot")
     return place >= 0 and b"<mujoco" not in start[:place]

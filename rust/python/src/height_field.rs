@@ -12,6 +12,7 @@ use crate::arguments::{Given, number, refused};
 use crate::arrays::{Array, check_size, one_or_two, two, vector};
 use crate::errors::{Kind, Result, Value};
 use crate::materials;
+use crate::shared::Release;
 use crate::terrain::Terrain;
 
 /// A height map as ground: two triangles in each cell, solid below. Immutable.
@@ -120,7 +121,7 @@ impl HeightField {
             Some(origin) => two(origin, Kind::Terrain, "origin")?,
             None => [middle(shape[1], spacing[0]), middle(shape[0], spacing[1])],
         };
-        let mut field = py.detach(|| CoreField::new(heights, shape, spacing, origin))?;
+        let mut field = py.release(|| CoreField::new(heights, shape, spacing, origin))??;
         if let Some(material) = material {
             field = field.with_material(&material);
         }

@@ -39,6 +39,12 @@ pub struct StepReport {
     /// Largest number of contacts in a step.
     #[pyo3(get)]
     n_contacts: usize,
+    /// Largest number of contacts in a step along whose normal closed loops let nothing move.
+    ///
+    /// Example: the wheels of a machine that is welded to a stand. Such a contact bears no load,
+    /// unless its wheel is elastic, and an overlap there cannot be removed.
+    #[pyo3(get)]
+    immovable_contacts: usize,
     /// Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.
     ///
     /// Above 1e-6 the status is "not_converged".
@@ -114,6 +120,7 @@ impl From<CoreReport> for StepReport {
             newton_iterations: inner.newton_iterations,
             residual: inner.residual,
             n_contacts: inner.n_contacts,
+            immovable_contacts: inner.immovable_contacts,
             loop_gap: inner.loop_gap,
             retaken: inner.retaken,
             fallbacks: inner.fallbacks,

@@ -106,7 +106,7 @@ impl Projection {
                 Some(law) if law.diagonal > 0.0 => law.unexplained,
                 _ => contact.gap() + options.theta * h * (u - ws.u_before[d * i]),
             };
-            let is_counted = gap >= 0.0 || gap + h * u < 0.0;
+            let is_counted = !system.is_immovable(i) && (gap >= 0.0 || gap + h * u < 0.0);
             displacement[d * i] += if is_counted { gap } else { 0.0 };
             counts.push(is_counted);
         }

@@ -349,6 +349,12 @@ pub trait MechanicalSystem {
     /// Builds H, Z and W of the contacts at the end pose, and `u = Hᵀ v` (d n_c), m/s.
     fn assemble(&mut self, contacts: &[Self::Contact], v: &[f64], u: &mut [f64]);
 
+    /// Whether closed loops let nothing move an assembled contact along its normal: it bears no
+    /// load, unless it yields, and its overlap cannot be removed. By default there is none.
+    fn is_immovable(&self, _contact: usize) -> bool {
+        false
+    }
+
     /// `out = Zᵀ y` (d n_c), m/s.
     fn local(&self, y: &[f64], out: &mut [f64]);
 

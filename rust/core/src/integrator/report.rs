@@ -41,6 +41,9 @@ pub struct StepReport {
     pub loop_gap: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,
+    /// Most contacts in a step that closed loops let nothing move along their normal, as under a
+    /// machine on a test stand. They bear no load, unless they yield, and an overlap there stays.
+    pub immovable_contacts: usize,
     /// Repeated steps: a motor changed its branch, the energy audit required it, or Newton's law of
     /// restitution had no solution.
     pub retaken: usize,
@@ -127,6 +130,7 @@ impl StepReport {
         self.residual = self.residual.max(later.residual);
         self.loop_gap = self.loop_gap.max(later.loop_gap);
         self.n_contacts = self.n_contacts.max(later.n_contacts);
+        self.immovable_contacts = self.immovable_contacts.max(later.immovable_contacts);
         self.retaken += later.retaken;
         self.fallbacks += later.fallbacks;
         self.energy_gain = self.energy_gain.max(later.energy_gain);

@@ -281,6 +281,7 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
     let n = ws.contacts.len();
     let mut report = StepReport {
         n_contacts: n,
+        immovable_contacts: (0..n).filter(|i| system.is_immovable(*i)).count(),
         ..StepReport::default()
     };
     system.close_velocity(options, v_begin, &ws.v, &mut ws.y);
@@ -375,7 +376,7 @@ pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: 
         contact.gap() + share * (u[0] - before[0])
     };
     ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
-    excuse_deflection(ws);
+    excuse_gaps(system, ws);
 }
 
 /// Closes the loops at the end of the step, `ws.end` and `ws.v`.
@@ -388,12 +389,17 @@ pub(super) fn close_end<S: MechanicalSystem>(
     report.enter_loops(gap);
 }
 
-/// Where contacts yield, leaves in `ws.gap_end` only the penetration that no elastic force
-/// explains.
-pub(super) fn excuse_deflection<Q, C>(ws: &mut Scratch<Q, C>) {
+/// Leaves in `ws.gap_end` only the penetration that can be removed: where contacts yield, what no
+/// elastic force explains, and nothing of contacts that cannot move.
+pub(super) fn excuse_gaps<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>) {
     for (gap, law) in ws.gap_end.iter_mut().zip(&ws.yielding) {
         if law.diagonal > 0.0 {
             *gap = law.unexplained;
+        }
+    }
+    for (i, gap) in ws.gap_end.iter_mut().enumerate() {
+        if system.is_immovable(i) {
+            *gap = 0.0;
         }
     }
 }

@@ -201,6 +201,16 @@ impl Scene for RoverScene {
         parts.gaps_to_grains.clear();
     }
 
+    fn recover(&self, parts: &mut RoverParts, memory: &mut RoverMemory) {
+        if let (Some(block), Some(sand)) = (&mut parts.quick.block, &mut memory.sand) {
+            block.recover_ruts(0, &mut sand.ruts);
+        }
+        *parts = RoverParts {
+            drive_work: std::mem::take(&mut parts.drive_work),
+            ..self.parts()
+        };
+    }
+
     /// Records torques and work of the drives.
     fn after_step(&self, taken: StepTaken<'_, Self>) {
         let drives = taken.parts.tree.drives();

@@ -71,6 +71,12 @@ pub trait Scene: Clone {
     /// default there are none.
     fn begin_call(&self, _parts: &mut Self::Parts) {}
 
+    /// Called after a step that panicked: makes the scratch anew and takes from it what belongs to
+    /// the memory. By default nothing does.
+    fn recover(&self, parts: &mut Self::Parts, _memory: &mut Self::Memory) {
+        *parts = self.parts();
+    }
+
     /// Whether [`Self::quick_step`] takes any.
     const HAS_FAST_STEP: bool = false;
 

@@ -5,6 +5,7 @@ use super::error::SnapshotError;
 use super::profile::Stopwatch;
 use super::scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
 use super::state::State;
+use crate::caught::caught;
 use crate::integrator::{
     Integrator, NoProbe, OptionsError, Probe, Scratch, StepError, StepOptions, StepReport,
     WarmStart,
@@ -262,7 +263,11 @@ impl<S: Scene> Simulation<S> {
     {
         let mut total = StepReport::default();
         for _ in 0..n {
-            let quick = may_be_quick.then(|| self.quick_step(probe)).flatten();
+            let quick = if may_be_quick {
+                self.quick_step(probe)?
+            } else {
+                None
+            };
             let report = match quick {
                 Some(report) => report,
                 None => StepReport {
@@ -282,8 +287,53 @@ impl<S: Scene> Simulation<S> {
         Ok(total)
     }
 
+    /// Takes the steps that are left of a call of `n`, after those of a report.
+    pub(super) fn resume(
+        &mut self,
+        before: &StepReport,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), StepError> {
+        if before.steps == 0 {
+            self.begin_call();
+        }
+        let (variant, left) = (self.options.variant, n.saturating_sub(before.steps));
+        let taken = self.steps(&variant, true, left, go_on, &mut NoProbe);
+        let mut total = *before;
+        total.merge(&taken.clone().unwrap_or_default());
+        let total = if taken.is_ok() {
+            total
+        } else {
+            StepReport::default()
+        };
+        self.end_call(total);
+        taken.map(|_| ())
+    }
+
+    /// Calls `step`, and where it panics makes all scratch anew. The state is then that before it.
+    fn guard<R>(&mut self, step: impl FnOnce(&mut Self) -> R) -> Result<R, StepError> {
+        let time = self.state.time;
+        caught(|| step(self)).map_err(|fault| {
+            self.scene.recover(&mut self.parts, &mut self.memory);
+            let (nv, n) = (self.scene.nv(), self.scene.contact_capacity());
+            let d = <S::Contact as LocatedContact>::Vector::N;
+            self.scratch = Scratch::new(&self.state.configuration, nv, n, d);
+            StepError::Internal { time, fault }
+        })
+    }
+
     /// The scene's own way to take a step, if it has one.
-    pub(super) fn quick_step(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
+    pub(super) fn quick_step(
+        &mut self,
+        probe: &mut dyn Probe,
+    ) -> Result<Option<StepReport>, StepError> {
+        if !S::HAS_FAST_STEP {
+            return Ok(None);
+        }
+        self.guard(|own| own.quick_step_of_scene(probe))
+    }
+
+    fn quick_step_of_scene(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
         let mut step = QuickStep {
             options: &self.options,
             state: &mut self.state,
@@ -297,6 +347,17 @@ impl<S: Scene> Simulation<S> {
 
     /// A step of any scene and integrator.
     pub(super) fn general_step<I>(
+        &mut self,
+        integrator: &I,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        self.guard(|own| own.general_step_of_scene(integrator, probe))?
+    }
+
+    fn general_step_of_scene<I>(
         &mut self,
         integrator: &I,
         probe: &mut dyn Probe,

@@ -535,11 +535,16 @@ impl MechanicalSystem for TreeSystem<'_> {
             contacts,
             v,
         );
-        u.copy_from_slice(&parts.system.u);
         parts.note_friction(contacts);
         if let Some(loops) = &mut parts.loops {
             loops.project_operator(self.model, &mut parts.system);
         }
+        u.copy_from_slice(&parts.system.u);
+    }
+
+    #[inline]
+    fn is_immovable(&self, contact: usize) -> bool {
+        self.parts.system.is_immovable(contact)
     }
 
     #[inline]

@@ -74,6 +74,7 @@ impl<T: Lane> Block<T> {
             let laws = &self.yields.laws;
             self.rows.soften(&self.contacts, |slot| laws[slot].diagonal);
         }
+        self.rows.close_held(&self.contacts);
         probe.end(Phase::Delassus);
         self.load();
         self.rows
@@ -153,6 +154,7 @@ impl<T: Lane> Block<T> {
             let mut report = StepReport {
                 steps: 1,
                 retaken: self.n_retaken[lane],
+                immovable_contacts: self.rows.n_immovable(&self.contacts, lane),
                 ..StepReport::default()
             };
             let mut is_solved = true;

@@ -36,7 +36,7 @@ impl<T: Lane> Block<T> {
         self.is_deep.any()
     }
 
-    /// Gap of a slot after the step, m; 0 where it is negative and opening.
+    /// Gap of a slot after the step, m; 0 where it is negative and opening, or nothing can open it.
     #[inline(always)]
     fn gap_at_end(&self, slot: usize, h: T, theta: T) -> T {
         let zero = h.like(0.0);
@@ -48,7 +48,7 @@ impl<T: Lane> Block<T> {
             gap = T::select(zero.lt(law.diagonal), law.unexplained, gap);
         }
         let parts = gap.lt(zero) & !(gap + h * u).lt(zero);
-        let gap = T::select(parts, zero, gap);
+        let gap = T::select(parts | self.rows.immovable(slot), zero, gap);
         T::select(own.active, gap, zero)
     }
 
