@@ -23,7 +23,6 @@
 use nalgebra::Vector3;
 
 use super::{NEAREST, PairPoint, dispatch, hull_sphere};
-use crate::geometry::shape::oriented_box::signs;
 use crate::geometry::{PlacedShape, Plane, Roller, SupportMap};
 
 /// Difference between a direction and a flat side's normal below which they are the same.
@@ -277,13 +276,8 @@ fn lines_along(shape: &PlacedShape<'_>, side: Option<usize>, n: &Vector3<f64>) -
 fn line(shape: &PlacedShape<'_>, number: usize) -> Option<(Vector3<f64>, Vector3<f64>, f64, f64)> {
     match shape {
         PlacedShape::Box(solid) if number < 12 => {
-            let (axis, mut corner) = (number / 4, solid.half_size);
-            corner.component_mul_assign(&Vector3::from_fn(|k, _| match (k + 3 - axis) % 3 {
-                0 => 0.0,
-                bit => signs(number % 4)[bit - 1],
-            }));
-            let middle = solid.centre + solid.R * corner;
-            Some((middle, solid.axis(axis), solid.half_size[axis], 0.0))
+            let (middle, along, half) = solid.edge(number);
+            Some((middle, along, half, 0.0))
         }
         PlacedShape::Hull(hull) => {
             let edge = hull.polytope.edges().get(number)?;
