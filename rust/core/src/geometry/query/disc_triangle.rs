@@ -20,17 +20,14 @@
 
 use nalgebra::Vector3;
 
+use super::chord::{self, LIES};
 use super::crossing::crossing;
 use super::disc_plane::{rim_point_over, rim_points};
 use super::{NEAREST, SurfacePoint, disc_sphere};
 use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
 use crate::geometry::{Disc, Sphere};
 
-/// Sine of the angle between a disc and an edge up to which it may lie on the edge: more than it
-/// turns in a step.
-const LIES: f64 = 0.1;
-
-/// The same up to which the ends of the chord are the only points. The lower one is then the point
+/// Sine of the angle between a disc and an edge up to which the ends of the chord are the only points. The lower one is then the point
 /// of the normal that separates most but for half the square of this, relative to the radius, and
 /// rounding does not swap the names of the ends.
 const FLAT: f64 = 1e-6;
@@ -96,7 +93,7 @@ pub(super) fn visit_chord(
 ) -> bool {
     let lean = disc.axle.dot(&edge.along).abs();
     if lean > LIES {
-        return false;
+        return false; // as most wheels that stand
     }
     let Some(ends) = chord_ends(disc, edge, &(edge.start - base)) else {
         return false;
@@ -116,35 +113,17 @@ pub(super) fn visit_chord(
 }
 
 /// The ends of the chord of a disc over the line of an edge, towards the edge's start and towards
-/// its end: points of the rim over the line, along the axle out of the ground. None if the line
-/// passes beside the disc, or is along the axle.
+/// its end: points of the rim over the line, along the axle out of the ground.
 fn chord_ends(disc: &Disc, edge: &Edge, start: &Vector3<f64>) -> Option<[SurfacePoint; 2]> {
-    let (s, e) = (&disc.axle, &edge.along);
-    let up = (edge.normals[0] + edge.normals[1]).dot(s);
-    let n = if up < 0.0 { -s } else { *s };
-    let flat = e - n * n.dot(e);
-    let cosine = flat.norm();
-    let along = flat / cosine;
-    let from = start - disc.centre;
-    let height = -n.dot(&from);
-    let across = from + n * height;
-    let place = across.dot(&along);
-    let beside = across - along * place;
-    let square = disc.radius * disc.radius - beside.norm_squared();
-    if !(square > 0.0) || cosine <= LIES {
-        return None;
-    }
-    let half = square.sqrt();
-    Some([-half, half].map(|x| {
-        // On the edge's line the place over which the rim is.
-        let rise = n.dot(e) * (x - place) / cosine;
-        SurfacePoint {
-            feature: if x < 0.0 { CHORD } else { CHORD + 1 },
-            point: disc.centre + beside + along * x,
-            n,
-            rolling: disc.spoke,
-            gap: height - rise,
-        }
+    let up = (edge.normals[0] + edge.normals[1]).dot(&disc.axle);
+    let n = if up < 0.0 { -disc.axle } else { disc.axle };
+    let ends = chord::ends(disc, &n, start, &edge.along)?;
+    Some([0, 1].map(|k| SurfacePoint {
+        feature: CHORD + k,
+        point: ends[k].point,
+        n,
+        rolling: disc.spoke,
+        gap: ends[k].height,
     }))
 }
 
