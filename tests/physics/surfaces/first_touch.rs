@@ -415,7 +415,10 @@ fn an_overlap_is_continuous_along_short_ways_near_the_ground() {
                         continue;
                     };
                     tried += 1;
-                    let mut short = Path { start: path.at(touch).position, ..path };
+                    let mut short = Path {
+                        start: path.at(touch).position,
+                        ..path
+                    };
                     short.attitude = path.at(touch).attitude;
                     (short.direction, short.turning) = (aside, 0.0);
                     let shallow = 1e-3 * path.part.bound(path.model);
@@ -424,7 +427,13 @@ fn an_overlap_is_continuous_along_short_ways_near_the_ground() {
                         let depth = short.depth(&*ground.terrain, STRIDE * f64::from(k));
                         let jump = (depth - before).abs() - 1.5 * STRIDE - shallow;
                         if jump > 0.0 {
-                            jumps.push((jump, format!("{round} {number} {k} {before} {depth} {:?}", short.shape(0.0))));
+                            jumps.push((
+                                jump,
+                                format!(
+                                    "{round} {number} {k} {before} {depth} {:?}",
+                                    short.shape(0.0)
+                                ),
+                            ));
                         }
                         before = depth;
                     }
@@ -433,7 +442,12 @@ fn an_overlap_is_continuous_along_short_ways_near_the_ground() {
         }
         jumps.sort_by(|a, b| b.0.total_cmp(&a.0));
         assert!(tried > 100, "{tried}");
-        assert!(jumps.is_empty(), "{} of {tried}: {:#?}", jumps.len(), &jumps[..jumps.len().min(12)]);
+        assert!(
+            jumps.is_empty(),
+            "{} of {tried}: {:#?}",
+            jumps.len(),
+            &jumps[..jumps.len().min(12)]
+        );
     }
 }
 

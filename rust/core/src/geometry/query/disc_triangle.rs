@@ -47,11 +47,21 @@ pub fn rim_points_over_face(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
+    let lies = may_lie(disc, face.plane.normal());
     rim_points(disc, &face.plane, base, reach, |point| {
-        if face.admits(&(base + point.point)) {
+        if (point.feature == NEAREST || lies) && face.admits(&(base + point.point)) {
             visit(point);
         }
     });
+}
+
+/// Whether a disc leans against a plane of normal n by so little that its points beside the lowest
+/// may support it. Of a disc that stands they are one and a half radii higher: where they are in
+/// reach the lowest one is as deep, as behind the side of a block on which the disc lies.
+#[inline]
+pub(super) fn may_lie(disc: &Disc, n: &Vector3<f64>) -> bool {
+    let along = disc.axle.dot(n);
+    along * along > 0.75
 }
 
 /// Visits the points at an edge whose gap is at most `reach`: the rim point over it, if its normal

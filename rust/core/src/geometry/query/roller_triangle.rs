@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use super::CIRCLE;
 use super::roller_plane::{rim_points, swept};
 use super::roller_sphere::Seen;
-use super::{SurfacePoint, disc_triangle, sphere_triangle};
+use super::{SurfacePoint, disc_triangle, is_lowest, sphere_triangle};
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{Roller, Sphere};
 
@@ -36,8 +36,9 @@ pub fn rim_points_over_face(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
+    let lies = disc_triangle::may_lie(&roller.core, face.plane.normal());
     rim_points(roller, &face.plane, base, reach, |point| {
-        if face.admits(&(base + point.point)) {
+        if (is_lowest(point.feature) || lies) && face.admits(&(base + point.point)) {
             visit(point);
         }
     });
