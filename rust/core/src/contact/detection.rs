@@ -7,7 +7,7 @@ use super::body_motion::{BodyMotion, Still};
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, ON_SURFACE, Opposite};
 use super::part::{Part, wheel_shape};
-use super::ways_out::{OverSurfaces, WaysOut};
+use super::ways_out::{OverSurfaces, TOUCH, WaysOut};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
     SurfacePoint, box_sphere, disc_sphere, dispatch, is_lowest, roller_sphere, sphere_sphere,
@@ -259,8 +259,8 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
             });
         }
         piece => {
-            let piece = (terrain, id, piece);
-            visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
+            let (piece, reach) = ((terrain, id, piece), gate.reach.max(TOUCH));
+            visit_on_surface(&placed.shape, piece, base, reach, |point| {
                 gate.ways.add(id, point, shallow);
                 gate.offer(&placed, &on_surface(point), id);
             });
@@ -311,7 +311,7 @@ pub(crate) fn visit_on_surface(
         }),
         Primitive::Vertex(vertex) => {
             let near = dispatch::point_at_vertex(shape, vertex, base);
-            let is_near = near.gap <= reach && vertex.admits(&near.n);
+            let is_near = near.gap <= reach && dispatch::pushes(vertex, shape, &near.n);
             let within = || vertex.place - vertex.inward() * near.gap;
             if is_near && (overlaps(&near) || terrain.is_inside(id, &within())) {
                 visit(&near);

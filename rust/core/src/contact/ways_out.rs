@@ -8,7 +8,8 @@
 //! their depth. The part is moved out along the normal of each that counts, by its depth; a deeper
 //! point that is then no longer in the ground was only in the way. The smallest overlap always
 //! counts. A part that has just touched has overlaps as large as its motion since then, and the
-//! points that count are no deeper.
+//! points that count are no deeper. A place that the part touches without an overlap is a way out
+//! like the others: rounding must not decide whether the part is free there.
 //!
 //! Up is a way out too, whatever the slopes. A point that is out of the ground when the part is
 //! raised by three quarters of the overlap is deep behind a piece that it does not touch, such as
@@ -25,6 +26,10 @@ const MOST: usize = 24;
 
 /// Depth, in bounding radii of the shape, up to which every point counts.
 pub(crate) const SHALLOW: f64 = 1e-3;
+
+/// Largest gap at which a part touches a surface, m: a point of a part that is no further above the
+/// ground may count as in it by rounding, and what the part touches there is the way out.
+pub(crate) const TOUCH: f64 = 2e-9;
 
 /// How far a part is moved out, in depths: where the other point is much deeper, so far that what
 /// the part overlaps beside the first point is left behind too.
@@ -161,7 +166,7 @@ impl SupportMap for Corners {
     }
 }
 
-/// The points at which one part overlaps surfaces.
+/// The points at which one part overlaps or touches surfaces.
 #[derive(Debug, Default)]
 pub(crate) struct WaysOut {
     /// With the numbers of their pieces, in the order of their depth.
@@ -180,7 +185,7 @@ impl WaysOut {
     /// Adds a point at a piece of a surface; `shallow` (m) of [`OverSurfaces::shallow`].
     #[inline]
     pub fn add(&mut self, id: u32, point: &SurfacePoint, shallow: f64) {
-        if point.gap < 0.0 {
+        if point.gap < TOUCH {
             self.has_deep |= point.gap < -shallow;
             self.insert(id, point);
         }

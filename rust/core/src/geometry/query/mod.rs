@@ -27,6 +27,7 @@ pub mod box_box;
 pub mod box_plane;
 pub mod box_sphere;
 pub mod box_triangle;
+mod chord;
 pub mod convex;
 mod crossing;
 pub mod disc_box;

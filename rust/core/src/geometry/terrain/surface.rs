@@ -108,6 +108,14 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// As [`Self::has`], with its ends `slack` (m) further out: where a line ends on the edge's end,
+    /// rounding leaves no gap between them.
+    #[inline]
+    #[must_use]
+    pub fn has_within(&self, place: f64, depth: f64, slack: f64) -> bool {
+        self.has(place + slack, depth) || self.has(place - slack, depth)
+    }
+
     /// Which of the normals through a point x, given from the start of the edge (m), leads away
     /// from the edge: positive beyond the face of the first, where n is that of the second.
     #[inline]
@@ -131,6 +139,24 @@ impl Edge {
     pub fn admits(&self, n: &Vector3<f64>) -> bool {
         let [first, second] = &self.normals;
         self.lean(first, n) < 0.0 && self.lean(second, n) > 0.0
+    }
+
+    /// Whether the edge may bear a flat side or a straight line that it crosses, along a unit normal
+    /// n across the edge: one between the faces' normals, or beyond them by a small share of the
+    /// angle between them.
+    ///
+    /// What lies flat on one of the faces rests on the edge where that face ends, and then n is the
+    /// face's normal but for rounding.
+    #[inline]
+    #[must_use]
+    pub fn bears(&self, n: &Vector3<f64>) -> bool {
+        let [first, second] = &self.normals;
+        let (low, high) = (self.lean(first, n), self.lean(second, n));
+        if low < 0.0 && high > 0.0 {
+            return true;
+        }
+        let slack = BEYOND * (first - second).norm();
+        low < slack && high > -slack
     }
 
     /// Where it ends, world, m.
@@ -166,6 +192,14 @@ pub const LEAN: f64 = 0.2;
 /// Cosine of the angle between the normals of a sharp edge.
 const SHARP: f64 = 0.2;
 
+/// Share of the size of an edge or a vertex, as an angle, by which a normal may leave its cone
+/// ([`Edge::bears`], [`Vertex::bears`]).
+///
+/// A part that comes down flat may turn by 0.07 rad in a step before the second edge of a wall is
+/// missed in it. A share, because a surface that is flat but for the rounding of its heights must
+/// not bear a part with each of its edges.
+pub(crate) const BEYOND: f64 = 0.05;
+
 /// Most edges that bound a vertex.
 pub const MAX_SPOKES: usize = 12;
 
@@ -195,6 +229,23 @@ impl Vertex {
         let spokes = self.spokes[..self.n].iter();
         let rises = spokes.map(|spoke| n.dot(spoke) / spoke.norm());
         rises.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Whether the vertex may bear a flat side or a straight line along a unit normal: whether the
+    /// surface lies below the plane with this normal on all sides, or above it by a small share of
+    /// its steepest descent. As [`Edge::bears`].
+    #[inline]
+    #[must_use]
+    pub fn bears(&self, n: &Vector3<f64>) -> bool {
+        if self.admits(n) {
+            return true;
+        }
+        let (mut lowest, mut highest) = (0.0_f64, f64::NEG_INFINITY);
+        for spoke in &self.spokes[..self.n] {
+            let rise = n.dot(spoke) / spoke.norm();
+            (lowest, highest) = (lowest.min(rise), highest.max(rise));
+        }
+        lowest < -OVERLAP && highest <= -BEYOND * lowest
     }
 
     /// Whether the surface lies below the plane with this unit normal on all sides, or in it but

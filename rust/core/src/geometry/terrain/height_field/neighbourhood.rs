@@ -225,7 +225,7 @@ mod tests {
             }
             Primitive::Vertex(vertex) => {
                 let near = dispatch::point_at_vertex(shape, vertex, base);
-                if near.gap <= reach && vertex.admits(&near.n) {
+                if near.gap <= reach && dispatch::pushes(vertex, shape, &near.n) {
                     gap = near.gap;
                 }
             }
