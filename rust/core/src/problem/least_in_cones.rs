@@ -314,4 +314,3 @@ pub(super) fn backward(L: &[f64], n: usize, x: &mut [f64]) {
         }
     }
 }
-

@@ -704,3 +704,182 @@ pub fn undetermined_loads(
     };
     (0..groups.len()).map(&mut count).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::Dimension;
+
+    const MU: f64 = 0.7;
+
+    /// Corners of a box below its centre, and two more places between them.
+    const PLACES: [[f64; 3]; 6] = [
+        [0.5, -0.3, 0.4],
+        [0.5, -0.3, -0.4],
+        [-0.5, -0.3, 0.4],
+        [-0.5, -0.3, -0.4],
+        [0.2, -0.3, 0.1],
+        [-0.5, -0.3, 0.0],
+    ];
+
+    /// Rows of `Hᵀ M^(-1/2)` of a body with a mass of 2 kg, n upwards.
+    fn rows(places: &[[f64; 3]]) -> Vec<[f64; 6]> {
+        let inertia = [0.1, 0.2, 0.15];
+        let row = |x: &[f64; 3], e: [f64; 3]| {
+            let turn = [
+                x[1] * e[2] - x[2] * e[1],
+                x[2] * e[0] - x[0] * e[2],
+                x[0] * e[1] - x[1] * e[0],
+            ];
+            let scaled = |k: usize| turn[k] / f64::sqrt(inertia[k]);
+            let push = e.map(|e| e / 2.0_f64.sqrt());
+            [push[0], push[1], push[2], scaled(0), scaled(1), scaled(2)]
+        };
+        let frame = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        (places.iter())
+            .flat_map(|x| frame.map(|e| row(x, e)))
+            .collect()
+    }
+
+    fn product(rows: &[[f64; 6]]) -> Vec<f64> {
+        let dot = |a: &[f64; 6], b: &[f64; 6]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        rows.iter()
+            .flat_map(|a| rows.iter().map(move |b| dot(a, b)))
+            .collect()
+    }
+
+    /// Settled impulses of the body at rest on a slope of `share`, from impulses with a squeeze.
+    fn settled(places: &[[f64; 3]], share: f64, squeeze: f64) -> Vec<f64> {
+        let rows = rows(places);
+        let W = product(&rows);
+        let n = rows.len();
+        // Weights of the corners by hand: the first four carry all of it.
+        let mut p = vec![0.0; n];
+        for k in 0..4 {
+            let along = share * 0.025;
+            p[3 * k] = 0.025 + 0.5 * 0.3 * share * 0.1 * places[k][0].signum();
+            p[3 * k + 1] = -along;
+        }
+        p[2] += squeeze;
+        p[5] -= squeeze;
+        let mut q = vec![0.0; n];
+        for i in 0..n {
+            q[i] = -(0..n).map(|j| W[i * n + j] * p[j]).sum::<f64>();
+        }
+        let mu = vec![MU; n / 3];
+        let problem = FrictionContactProblem::from_assembled(Dimension::Three, &W, &q, &mu);
+        let mut u = vec![0.0; n];
+        problem.operator().multiply_add(&p, &q, &mut u);
+        assert_eq!(undetermined_loads(&problem, 1e-12, &p), n / 3);
+        let mut redundancy = Redundancy::default();
+        let found = redundancy.settle_problem(&problem, (1e-12, 0.0), &mut p, &mut u);
+        assert!(found.is_some() && norm(&u) < 1e-14, "{u:?}");
+        p
+    }
+
+    #[test]
+    fn corners_share_the_weight_of_a_box_like_equal_springs() {
+        for squeeze in [0.0, 0.01, -0.005] {
+            let p = settled(&PLACES[..4], 0.0, squeeze);
+            for own in p.chunks_exact(3) {
+                assert!((own[0] - 0.025).abs() < 1e-15, "{p:?}");
+                assert!(own[1].abs().max(own[2].abs()) < 1e-15, "{p:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_least_impulses_stay_within_the_cones_and_do_not_depend_on_the_start_or_the_order() {
+        for share in [0.3, 0.55, 0.6, 0.69, 0.6999] {
+            let p = settled(&PLACES, share, 0.0);
+            let largest = p.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let mut tightest = f64::INFINITY;
+            for own in p.chunks_exact(3) {
+                let room = MU * own[0] - own[1].hypot(own[2]);
+                tightest = tightest.min(room);
+                assert!(room > -1e-12 * largest, "{share}: {p:?}");
+            }
+            assert_eq!(
+                tightest < 1e-12 * largest,
+                share > 0.5,
+                "{share}: {tightest}"
+            );
+            let again = settled(&PLACES, share, 1e-3);
+            let mut order = PLACES;
+            order.swap(0, 1);
+            order.swap(2, 3);
+            let mirrored = settled(&order, share, 0.0);
+            for i in 0..6 {
+                let other = [1, 0, 3, 2, 4, 5][i];
+                for k in 0..3 {
+                    let own = p[3 * i + k];
+                    assert!((again[3 * i + k] - own).abs() < 1e-12 * largest, "{share}");
+                    assert!(
+                        (mirrored[3 * other + k] - own).abs() < 1e-12 * largest,
+                        "{share}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_impulses_in_the_cones_with_the_same_motion_are_less() {
+        let p = settled(&PLACES, 0.65, 0.0);
+        // A minimum over a convex set: no other point of it lies nearer to zero than its plane.
+        for squeeze in [1e-3, -1e-3] {
+            let mut other = p.clone();
+            let scale = 1e-4;
+            other[2] += scale * squeeze;
+            other[5] -= scale * squeeze;
+            let inside =
+                |p: &[f64]| (p.chunks_exact(3)).all(|own| MU * own[0] >= own[1].hypot(own[2]));
+            assert!(!inside(&other) || norm(&other) >= norm(&p) - 1e-15);
+        }
+    }
+
+    #[test]
+    fn supports_that_yield_are_determined() {
+        let rows = rows(&PLACES[..4]);
+        let mut W = product(&rows);
+        for i in 0..12 {
+            W[13 * i] += 1e-3;
+        }
+        let p = [[0.025, 0.0, 0.0]; 4].as_flattened().to_vec();
+        let q: Vec<f64> = (W.chunks_exact(12))
+            .map(|row| -row.iter().zip(&p).map(|(w, p)| w * p).sum::<f64>())
+            .collect();
+        let problem = FrictionContactProblem::from_assembled(Dimension::Three, &W, &q, &[MU; 4]);
+        assert_eq!(undetermined_loads(&problem, 1e-12, &p), 0);
+    }
+
+    #[test]
+    fn a_sliding_box_has_only_its_loads_open() {
+        let rows = rows(&PLACES[..4]);
+        let W = product(&rows);
+        let p = [[0.03, -MU * 0.03, 0.0], [0.02, -MU * 0.02, 0.0]];
+        let p = [p[0], p[1], p[1], p[0]].as_flattened().to_vec();
+        let mut q: Vec<f64> = (W.chunks_exact(12))
+            .map(|row| -row.iter().zip(&p).map(|(w, p)| w * p).sum::<f64>())
+            .collect();
+        for q in q.chunks_exact_mut(3) {
+            q[1] += 0.5;
+        }
+        let problem = FrictionContactProblem::from_assembled(Dimension::Three, &W, &q, &[MU; 4]);
+        assert_eq!(undetermined_loads(&problem, 1e-12, &p), 4);
+        let (mut own, mut u) = (p.clone(), vec![0.0; 12]);
+        problem.operator().multiply_add(&p, &q, &mut u);
+        let found = Redundancy::default().settle_problem(&problem, (1e-12, 0.0), &mut own, &mut u);
+        assert!(found.is_some());
+        for own in own.chunks_exact(3) {
+            assert!((own[0] - 0.025).abs() < 1e-15, "{own:?}");
+            assert!((own[1] + MU * own[0]).abs() < 1e-15, "{own:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_that_bears_no_load_is_open() {
+        let problem = FrictionContactProblem::from_assembled(Dimension::Three, &[], &[], &[]);
+        assert_eq!(undetermined_loads(&problem, 1e-12, &[]), 0);
+    }
+}
