@@ -1103,12 +1103,14 @@ class StepReport:
         """
     @property
     def undetermined_loads(self) -> int:
-        """Degree of static indeterminacy of the wheel loads in the last step.
+        """Number of contacts whose impulses the motion of the last step does not determine.
 
-        0 means that equilibrium determines the loads. Otherwise many distributions of loads satisfy
-        equilibrium, and micrometres of height decide between them: a rigid chassis on four rigid
-        wheels has degree 1. Wheels with a `stiffness` always have 0. Friction is not considered. 0
-        for machines other than rovers.
+        0 means that the motion determines the impulses of all contacts. Otherwise other impulses
+        cause the same motion, and the step returns those of least norm within the cones of friction:
+        four corners of a box share its weight like four equal springs. Friction counts: six rigid
+        wheels that drive straight could push sideways against each other, so the number is 6.
+        Contacts that yield, such as wheels with a `stiffness`, have determined impulses. Always 0 for
+        grains. In a group of more than 32 rigid contacts the solver chooses among the impulses.
         """
     def followed_by(self, later: StepReport) -> StepReport:
         """Combines this report with that of the following steps.

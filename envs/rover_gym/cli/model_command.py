@@ -165,8 +165,8 @@ def check(
         results.show(table)
         if statics.undetermined_loads:
             results.show(
-                "these loads are one answer of many, and micrometres decide which: more rigid wheels than the chassis "
-                "needs; give them a stiffness"
+                "these loads are those of equal springs, one answer of many, and micrometres change them: more rigid "
+                "wheels than the chassis needs; give them a stiffness"
             )
         for line in _statics(statics):
             results.show(line)

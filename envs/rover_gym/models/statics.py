@@ -48,8 +48,9 @@ class Statics:
 
     Attributes:
         loads: Normal force of the ground on each wheel, (n_wheels,).
-        undetermined_loads: Degree of static indeterminacy, see `StepReport.undetermined_loads`. If it is not 0, the
-            loads are one of many possible distributions.
+        undetermined_loads: Degree of static indeterminacy: number of independent sets of normal forces that balance one
+            another. 0 means that equilibrium determines the loads. Otherwise they are those of equal springs, and
+            micrometres of height change them. Friction is not considered.
         rest_speed: Largest remaining velocity when the loads were read, m/s and rad/s.
         attitude: Roll and pitch at rest.
         wheelbase: Distance between the foremost and the hindmost axle.
@@ -77,6 +78,13 @@ class Statics:
     friction: float
 
 
+def _indeterminacy(sim: Simulation) -> int:
+    """Number of independent sets of normal forces of the pressed contacts that balance one another."""
+    pressed = 3 * np.flatnonzero(sim.contacts.impulses[:, 0] > 0.0)
+    normal = sim.last_problem()[0][np.ix_(pressed, pressed)]
+    return len(pressed) - int(np.linalg.matrix_rank(normal, tol=1e-9 * normal.max(initial=0.0), hermitian=True))
+
+
 def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     """Sets a rover on level ground, brakes and steering held, and reads loads and geometry.
 
@@ -94,7 +102,7 @@ def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     sim = Simulation(model, friction=friction)
     sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
     while sim.time < PATIENCE:
-        report = sim.step(100)
+        sim.step(100)
         if float(np.abs(sim.v).max()) < AT_REST:
             break
     q = sim.q
@@ -116,7 +124,7 @@ def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     height, is_wall = _step(model, loads, front, friction)
     return Statics(
         loads,
-        report.undetermined_loads,
+        _indeterminacy(sim),
         float(np.abs(sim.v).max()),
         (float(q[3]), float(q[5])),
         float(np.ptp(x)),

@@ -437,6 +437,16 @@ pub trait MechanicalSystem {
         self.solve(q, mu, options, p, u, workspace)
     }
 
+    /// The step's problem, if its impulses are settled where the motion leaves some open: that of
+    /// few contacts with a dense W. By default they stay as the solver finds them.
+    fn open_problem<'a>(
+        &'a self,
+        _q: &'a [f64],
+        _mu: &'a [f64],
+    ) -> Option<FrictionContactProblem<'a>> {
+        None
+    }
+
     /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.
     fn add_moments(&self, _y: &mut [f64]) {}
 

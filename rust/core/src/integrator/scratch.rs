@@ -2,6 +2,7 @@
 
 use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, UnilateralContact};
 use crate::law::compliance::Yielding;
+use crate::problem::Redundancy;
 use crate::solver::{SolverOptions, SolverWorkspace};
 
 /// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it
@@ -43,6 +44,7 @@ pub struct Scratch<Q, C> {
     pub(super) p_position: Vec<f64>,
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
+    pub(super) redundancy: Redundancy,
     pub(super) audited: Audited<Q>,
     /// Work of the step's solves so far, in the solver's unit.
     pub(super) work_spent: u64,
@@ -160,6 +162,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             p_position: room(),
             u_position: room(),
             solver: SolverWorkspace::default(),
+            redundancy: Redundancy::default(),
             audited: Audited::new(q.clone(), nv),
             work_spent: 0,
             whole: Whole::new(),

@@ -346,14 +346,15 @@ fn add_shifts<S: MechanicalSystem>(
     }
 }
 
-/// Solves the assembled problem from `ws.p` and charges the step's budget.
+/// Solves the assembled problem from `ws.p` and charges the step's budget. Impulses that the motion
+/// leaves open are those of least norm.
 fn solve_problem<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     ws: &mut ScratchOf<S>,
 ) -> SolveReport {
     let solver_options = ws.solver_options(&options.solver);
-    let solved = system.solve_step(
+    let mut solved = system.solve_step(
         (&ws.v, &ws.y),
         (&ws.q_free, &ws.mu),
         &solver_options,
@@ -362,6 +363,15 @@ fn solve_problem<S: MechanicalSystem>(
         &mut ws.solver,
     );
     ws.work_spent += solved.work;
+    if solved.is_converged()
+        && let Some(problem) = system.open_problem(&ws.q_free, &ws.mu)
+    {
+        let residuals = (options.solver.tolerance, solved.residual);
+        let settled = (ws.redundancy).settle_problem(&problem, residuals, &mut ws.p, &mut ws.u);
+        if let Some(residual) = settled {
+            (solved.residual, solved.velocity_error) = (residual.relative, residual.velocity);
+        }
+    }
     solved
 }
 

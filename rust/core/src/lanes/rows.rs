@@ -659,6 +659,7 @@ impl<T: Lane> Rows<T> {
                     problem.n_dry = contacts.n_dry(index);
                     problem.make_room();
                     problem.has_start = false;
+                    problem.asks_least = true;
                     if problem.n_contacts > 0 && contacts.is_factored(index) {
                         problem.factored.adopt(self.pattern_of(contacts, index));
                         problem.factored.slots = 0;

@@ -11,7 +11,7 @@ use crate::integrator::{
     WarmStart,
 };
 use crate::multibody::Energy;
-use crate::problem::undetermined_loads;
+use crate::problem::{Dimension, FrictionContactProblem, undetermined_loads};
 
 /// Steps of a copy that a profile takes before it measures.
 const WARM_UP: usize = 10;
@@ -452,11 +452,20 @@ where
         )
     }
 
-    /// Independent sets of normal forces that balance one another in the last step; see
-    /// [`undetermined_loads`].
+    /// Contacts whose impulses the motion of the last step leaves open; see [`undetermined_loads`].
     #[must_use]
     pub fn undetermined_loads(&self) -> usize {
-        let d = <S::Contact as LocatedContact>::Vector::N;
-        undetermined_loads(d, self.parts.operator(), self.scratch.impulses_of_problem())
+        let dimension = match <S::Contact as LocatedContact>::Vector::N {
+            2 => Dimension::Two,
+            _ => Dimension::Three,
+        };
+        let (W, q, mu) = self.last_problem();
+        let p = self.scratch.impulses_of_problem();
+        if W.len() != q.len() * q.len() || p.len() != q.len() {
+            return 0; // no contact, or no step yet
+        }
+        let problem = FrictionContactProblem::from_assembled(dimension, W, q, mu);
+        let tolerance = self.options.solver.tolerance;
+        undetermined_loads(&problem, tolerance, p)
     }
 }

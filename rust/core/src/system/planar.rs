@@ -435,6 +435,14 @@ impl MechanicalSystem for PlanarSystem<'_> {
         FrictionContactProblem::from_assembled(Dimension::Two, &self.parts.W, q, mu)
     }
 
+    fn open_problem<'a>(
+        &'a self,
+        q: &'a [f64],
+        mu: &'a [f64],
+    ) -> Option<FrictionContactProblem<'a>> {
+        Some(self.problem(q, mu))
+    }
+
     fn displacement(&self, y: &[f64]) -> f64 {
         self.machine.displacement(y)
     }

@@ -611,6 +611,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
     }
 
+    fn open_problem<'a>(
+        &'a self,
+        q: &'a [f64],
+        mu: &'a [f64],
+    ) -> Option<FrictionContactProblem<'a>> {
+        Some(self.problem(q, mu))
+    }
+
     fn displacement(&self, y: &[f64]) -> f64 {
         displacement(0.0, self.model.mechanism(), y)
     }

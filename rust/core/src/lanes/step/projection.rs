@@ -69,6 +69,7 @@ impl<T: Lane> Block<T> {
                         problem.n_contacts = 0;
                     }
                     let n = problem.n_unknowns();
+                    problem.asks_least = false;
                     problem.q[..n].fill(0.0);
                     problem.p[..n].fill(0.0);
                 }
