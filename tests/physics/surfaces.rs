@@ -10,3 +10,4 @@ mod first_touch;
 mod flat;
 mod maps;
 mod meshes;
+mod seams;
