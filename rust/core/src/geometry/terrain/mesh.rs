@@ -452,8 +452,8 @@ impl Terrain for TriangleMesh {
         self.vertex(id as usize - 4 * self.triangles.len())
     }
 
-    /// Whether no border and no edge where it turns under crosses the rectangle, and there is
-    /// ground at its middle.
+    /// Known if no border and no edge where it turns under crosses the rectangle, and there is
+    /// ground at its middle. What is closed, such as a rock, does not end the ground.
     fn covers(&self, area: &Area, is_joined: &dyn Fn(u32) -> bool) -> Coverage {
         let m = narrow(self.triangles.len());
         let mut coverage = Coverage::Silent;
@@ -474,7 +474,11 @@ impl Terrain for TriangleMesh {
                 let own = 3 * narrow(t) + narrow(k);
                 let is_crossed = || area.is_crossed(&self.ends(t, k).map(|p| [p.x, p.z]));
                 if ends_here && is_crossed() && !is_joined(m + own.min(self.same_edge(t, k))) {
-                    coverage = Coverage::Unknown([x, z]);
+                    coverage = if self.is_closed {
+                        Coverage::Silent
+                    } else {
+                        Coverage::Unknown([x, z])
+                    };
                 }
             }
         });

@@ -26,6 +26,9 @@ const SINGLE: f64 = 1e-7;
 /// Sine of the angle between two parts below which they meet flat.
 const FLAT: f64 = 1e-5;
 
+/// Difference of two unit directions that count as one.
+const SAME_WAY: f64 = 1e-4;
+
 /// Cosine between the normals of two faces below which they lie back to back.
 const BACK: f64 = -0.9;
 
@@ -85,10 +88,18 @@ struct Replaced {
     stretches: Vec<[f64; 2]>,
 }
 
-/// A direction along a rim, and how near others must come.
+/// A face at a vertex, and the direction away from it.
+struct Corner {
+    face: u32,
+    normal: Vector3<f64>,
+    outward: Vector3<f64>,
+}
+
+/// A direction along a rim, that away from its face, and how near others must come.
 struct Line<'a> {
     rim: &'a Rim,
     along: Vector3<f64>,
+    outward: Vector3<f64>,
     length: f64,
     tolerance: f64,
 }
@@ -102,7 +113,7 @@ impl Seams {
             return seams;
         }
         let mut replaced: BTreeMap<u32, Replaced> = BTreeMap::new();
-        let mut corners: BTreeMap<(usize, u32), (u32, Vector3<f64>)> = BTreeMap::new();
+        let mut corners: BTreeMap<(usize, u32), Corner> = BTreeMap::new();
         let mut least = f64::INFINITY;
         for (a, part) in parts.iter().enumerate() {
             let others = || {
@@ -118,6 +129,7 @@ impl Seams {
                 for other in others() {
                     line.find_stretches(other, &mut stretches);
                 }
+                let stretches = line.bounding(&stretches);
                 if stretches.is_empty() {
                     return;
                 }
@@ -127,7 +139,11 @@ impl Seams {
                         _ => s.to >= line.length - line.tolerance,
                     };
                     if stretches.iter().any(touches) {
-                        corners.entry((a, corner)).or_insert((rim.face, rim.normal));
+                        corners.entry((a, corner)).or_insert(Corner {
+                            face: rim.face,
+                            normal: rim.normal,
+                            outward: line.outward,
+                        });
                     }
                 }
                 seams.join(&line, (&**part, first[a]), &stretches);
@@ -157,13 +173,14 @@ impl Seams {
         for (piece, own) in replaced {
             seams.replace(piece, own);
         }
-        for ((a, corner), face) in corners {
-            let others = parts
-                .iter()
-                .enumerate()
-                .filter(|(b, other)| *b != a && has_faces(other));
-            let others: Vec<&dyn Terrain> = others.map(|(_, other)| &**other).collect();
-            seams.place_vertex((&*parts[a], first[a]), corner, face, &others);
+        for ((a, corner), at) in corners {
+            let mut others: Vec<&dyn Terrain> = Vec::new();
+            for (b, other) in parts.iter().enumerate() {
+                if b != a && has_faces(other) {
+                    others.push(&**other);
+                }
+            }
+            seams.place_vertex((&*parts[a], first[a]), (corner, &at), &others);
         }
         let balls: Vec<Sphere> = seams
             .pieces
@@ -271,13 +288,12 @@ impl Seams {
         }
     }
 
-    /// Replaces a vertex of a part by that of the union, if it is none in the middle of a flat or
-    /// folded surface. `face`: number and normal of a face at it.
+    /// Replaces a vertex of a part by that of the union, if it is none in the middle of a flat
+    /// surface.
     fn place_vertex(
         &mut self,
         (part, first): (&dyn Terrain, u32),
-        corner: u32,
-        (face, normal): (u32, Vector3<f64>),
+        (corner, at): (u32, &Corner),
         others: &[&dyn Terrain],
     ) {
         self.hidden.insert(first + corner);
@@ -292,10 +308,8 @@ impl Seams {
         for other in others {
             other.visit_near(&place, 2.0 * tolerance, &mut |_, piece| match piece {
                 Primitive::Face(face) => {
-                    let is_over = face
-                        .walls
-                        .iter()
-                        .all(|wall| wall.beyond(&place) <= tolerance);
+                    let mut walls = face.walls.iter();
+                    let is_over = walls.all(|wall| wall.beyond(&place) <= tolerance);
                     if is_over && face.plane.distance(&place).abs() <= tolerance {
                         beside.extend(face.corners(&place).map(|x| x - place));
                     }
@@ -309,22 +323,27 @@ impl Seams {
             });
         }
         beside.retain(|x: &Vector3<f64>| x.norm() > 2.0 * tolerance);
-        let is_along =
-            |x: &Vector3<f64>, y: &Vector3<f64>| (x.normalize() - y.normalize()).norm() < 1e-4;
-        let is_shared = |x: &Vector3<f64>, all: &[Vector3<f64>]| all.iter().any(|y| is_along(x, y));
-        let is_flat = |x: &Vector3<f64>| normal.dot(x).abs() <= FLAT * x.norm();
-        let own_are_flat = spokes.iter().all(|x| is_shared(x, &beside) || is_flat(x));
-        let others_are_flat = beside.iter().all(|x| is_shared(x, &spokes) || is_flat(x));
-        if own_are_flat && others_are_flat {
+        // What lies in the ground of the other side is no edge of the union.
+        let is_flat = |x: &Vector3<f64>| at.normal.dot(x).abs() <= FLAT * x.norm();
+        let (aside, within) = (at.outward * (4.0 * tolerance), 10.0 * tolerance);
+        let on_way = |x: &Vector3<f64>| place + x * 0.5;
+        spokes.retain(|x| {
+            let inside = on_way(x) + aside;
+            is_flat(x) || !others.iter().any(|other| other.buries(&inside, within))
+        });
+        beside.retain(|x| is_flat(x) || !part.buries(&(on_way(x) - aside), within));
+        if spokes.iter().chain(&beside).all(is_flat) {
             return;
         }
         for x in beside {
-            if !is_shared(&x, &spokes) {
+            let is_along = |y: &Vector3<f64>| (x.normalize() - y.normalize()).norm() < SAME_WAY;
+            if !spokes.iter().any(is_along) {
                 spokes.push(x);
             }
         }
-        let vertex = Vertex::among(place, spokes.iter().copied(), &normal);
-        self.pieces.push((Primitive::Vertex(vertex), first + face));
+        let vertex = Vertex::among(place, spokes.iter().copied(), &at.normal);
+        self.pieces
+            .push((Primitive::Vertex(vertex), first + at.face));
     }
 }
 
@@ -335,6 +354,7 @@ impl<'a> Line<'a> {
         Self {
             rim,
             along: way / length,
+            outward: way.cross(&rim.normal) / length,
             length,
             tolerance: tolerance_of(&rim.start, &rim.end),
         }
@@ -347,14 +367,56 @@ impl<'a> Line<'a> {
     /// Its edge as the part has it.
     fn replaced(&self, first: u32) -> Replaced {
         let rim = self.rim;
-        let outward = || self.along.cross(&rim.normal).normalize();
         Replaced {
             start: rim.start,
             end: rim.end,
-            normals: [rim.normal, rim.beyond.unwrap_or_else(outward)],
+            normals: [rim.normal, rim.beyond.unwrap_or(self.outward)],
             face: first + rim.face,
             stretches: Vec::new(),
         }
+    }
+
+    /// How far a face with the unit normal n beyond the rim rises over the rim's: the sine of the
+    /// angle, continued beyond a right angle.
+    fn rise(&self, n: &Vector3<f64>) -> f64 {
+        let way = self.along.cross(n);
+        let [up, out] = [way.dot(&self.rim.normal), way.dot(&self.outward)];
+        if out >= 0.0 {
+            up
+        } else {
+            (2.0 - up.abs()).copysign(up)
+        }
+    }
+
+    /// Of stretches, those parts that bound the free space: of several faces the highest, if it is
+    /// higher than the face that the part itself has there.
+    fn bounding(&self, all: &[Stretch]) -> Vec<Stretch> {
+        let own = self
+            .rim
+            .beyond
+            .map_or(f64::NEG_INFINITY, |n| self.rise(&n) + FLAT);
+        let mut places: Vec<f64> = all.iter().flat_map(|s| [s.from, s.to]).collect();
+        places.sort_by(f64::total_cmp);
+        let mut out: Vec<Stretch> = Vec::new();
+        for pair in places.windows(2) {
+            let [from, to] = [pair[0], pair[1]];
+            if to - from <= self.tolerance {
+                continue;
+            }
+            let here = all.iter().filter(|s| s.from <= from && s.to >= to);
+            let risen = here.map(|s| (self.rise(&s.normal), s.normal));
+            let highest = risen.max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, normal)) = highest.filter(|(rise, _)| *rise > own) else {
+                continue;
+            };
+            match out.last_mut() {
+                Some(last) if from - last.to <= self.tolerance && last.normal == normal => {
+                    last.to = to;
+                }
+                _ => out.push(Stretch { from, to, normal }),
+            }
+        }
+        out
     }
 
     /// Adds the stretches beyond which a face of another part goes on.

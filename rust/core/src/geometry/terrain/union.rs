@@ -136,18 +136,19 @@ impl Union {
     fn knows(&self, area: &Area) -> bool {
         let areas = self.parts.iter().filter_map(|part| part.known_within());
         area.cut(areas).all(|cell| {
-            let mut is_known = false;
+            // Meshes beside each other know it together: those with a border in it not at all.
+            let (mut is_known, mut ends) = (false, false);
             for (part, &first) in self.parts.iter().zip(&self.first) {
                 let is_joined = |id: u32| self.seams.is_joined(first + id);
                 let is_bounded = part.known_within().is_some();
                 match part.covers(&cell, &is_joined) {
                     Coverage::Known if is_bounded => return true,
                     Coverage::Known => is_known = true,
-                    Coverage::Unknown(_) if !is_bounded => return false,
-                    Coverage::Silent | Coverage::Unknown(_) => {}
+                    Coverage::Unknown(_) => ends |= !is_bounded,
+                    Coverage::Silent => {}
                 }
             }
-            is_known
+            is_known && !ends
         })
     }
 
