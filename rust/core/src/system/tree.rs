@@ -195,10 +195,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
-        let places = |body: usize| self.parts.kinematics.r(body);
-        let fastest = self.model.fastest_approach(places, v);
-        activation.margin = activation.lead.abs() * fastest;
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Contact>) {
         self.parts.unknown_ground = detect(
             self.model,
             &self.parts.kinematics,

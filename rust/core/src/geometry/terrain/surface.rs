@@ -12,6 +12,7 @@
 use nalgebra::Vector3;
 
 use super::plane::Plane;
+use crate::scalar::elementary::sin_cos;
 
 /// Sine of the angle between two faces below which their edge is flat.
 const FLAT: f64 = 1e-12;
@@ -215,6 +216,35 @@ pub struct Vertex {
 }
 
 impl Vertex {
+    /// Of its neighbours, given from it, m. Of more than it can keep it keeps those around the unit
+    /// normal n.
+    #[must_use]
+    pub fn among(
+        place: Vector3<f64>,
+        all: impl ExactSizeIterator<Item = Vector3<f64>> + Clone,
+        n: &Vector3<f64>,
+    ) -> Self {
+        let mut spokes = [Vector3::zeros(); MAX_SPOKES];
+        if all.len() <= MAX_SPOKES {
+            let n = all.len();
+            for (own, spoke) in spokes.iter_mut().zip(all) {
+                *own = spoke;
+            }
+            return Self { place, spokes, n };
+        }
+        let right = crate::geometry::query::any_tangent(n);
+        let ahead = n.cross(&right);
+        for (k, spoke) in spokes.iter_mut().enumerate() {
+            let (sine, cosine) = sin_cos(std::f64::consts::TAU * k as f64 / MAX_SPOKES as f64);
+            let direction = right * cosine + ahead * sine;
+            let along = |x: &Vector3<f64>| x.normalize().dot(&direction);
+            let best = all.clone().max_by(|a, b| along(a).total_cmp(&along(b)));
+            *spoke = best.unwrap_or(-n);
+        }
+        let n = MAX_SPOKES;
+        Self { place, spokes, n }
+    }
+
     /// Unit direction into the ground, away from all faces alike: the mean of its edges'.
     #[must_use]
     pub fn inward(&self) -> Vector3<f64> {

@@ -18,8 +18,6 @@ mod tree;
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
-
 pub use body::Body;
 pub use closed_loop::{Loop, LoopGap};
 pub use edit::Changes;
@@ -124,39 +122,6 @@ impl Model {
     #[must_use]
     pub fn inertias(&self) -> &Inertias<f64> {
         &self.inertias
-    }
-
-    /// Upper bound on the speed at which two trees approach each other, m/s, or of all points of a
-    /// single one; `place`: origin of a body's frame, m.
-    #[inline]
-    pub(crate) fn fastest_approach(&self, place: impl Fn(usize) -> Vector3<f64>, v: &[f64]) -> f64 {
-        let (mut fastest, mut next) = (0.0_f64, 0.0_f64);
-        for tree in self.trees() {
-            let speed = self.fastest_point(tree, &place, v);
-            (fastest, next) = (fastest.max(speed), next.max(fastest.min(speed)));
-        }
-        fastest + next
-    }
-
-    /// Upper bound on the speed of all points of a tree, m/s.
-    fn fastest_point(&self, tree: &Tree, place: impl Fn(usize) -> Vector3<f64>, v: &[f64]) -> f64 {
-        let v = &v[tree.velocities.clone()];
-        let linear = match v {
-            [x, y, z, ..] if tree.is_free => (x * x + y * y + z * z).sqrt(),
-            _ => 0.0,
-        };
-        let half = tree.lead() / 2;
-        // A translation counts as a rotation at an arm of more than one metre.
-        let turning: f64 = v[half..].iter().map(|w| w.abs()).sum();
-        let mut reach = tree.reach + 1.0;
-        if self.has_slides() {
-            let first = place(tree.bodies.start);
-            let farthest = tree.bodies.clone().map(|body| (place(body) - first).norm());
-            reach = farthest.fold(reach, f64::max);
-        }
-        let couplings = (self.mechanism.links.iter()).filter_map(|link| link.joint.coupling());
-        let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
-        linear + turning * reach * (1.0 + coupled)
     }
 
     /// Indices of the joints with dry friction, ascending.

@@ -61,6 +61,10 @@ impl HeightField {
         let Some([columns, rows]) = self.cells_within(&part.centre, ends) else {
             return;
         };
+        let floor = part.centre.y - around(&Vector3::y());
+        if self.tiles.highest_of(columns, rows) < floor {
+            return;
+        }
         T::vectorize(
             token,
             #[inline(always)]
