@@ -1034,8 +1034,18 @@ class StepReport:
     def energy_removed(self) -> float:
         """Spurious energy gain of the scheme that the audit removed, summed over the steps, J."""
     @property
+    def energy_supplied(self) -> float:
+        """Work of torques, motors and wrenches, summed over the steps, J."""
+    @property
+    def energy_of_set_points(self) -> float:
+        """Energy that commands since the last call have added to held joints, J.
+
+        `Simulation.energy` contains it from the command on, so it is not part of the change over
+        the call. 0 in the first call after the state was set or restored.
+        """
+    @property
     def energy_dissipated(self) -> float:
-        """Energy dissipated by friction and impacts, summed over the steps, J.
+        """Energy dissipated by friction, impacts, dampers and sand, summed over the steps, J.
 
         It can be negative with Newton's law of restitution and friction. A new contact counts as an
         impact if it closes faster than gravity explains.
@@ -1044,15 +1054,17 @@ class StepReport:
     def energy_lost(self) -> float:
         """Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
 
-        The change of the energy is the work of the actuators minus `energy_dissipated`,
-        `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
+        The change of the energy over the call is `energy_supplied` plus `energy_lifted` and
+        `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
         `energy_lost` therefore contains the errors of the time stepping and the work of reactions
         in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
         0 for grains and planar soils, whose energy is not audited.
         """
     @property
     def energy_lifted(self) -> float:
-        """Energy gained by removing penetration, less the actuators' work, sum of the steps, J."""
+        """Energy gained against gravity and springs by removing penetration, less the actuators' work,
+        summed over the steps, J.
+        """
     @property
     def energy_released(self) -> float:
         """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -1339,7 +1351,9 @@ class Energy:
         """Kinetic energy, J."""
     @property
     def potential(self) -> float:
-        """Potential energy in gravity, J, zero at the world's origin."""
+        """Potential energy, J: in gravity, zero at the world's origin, in springs, and in the stiffness
+        of held joints.
+        """
     @property
     def total(self) -> float:
         """Sum of both, J."""

@@ -28,7 +28,7 @@
 //!
 //! Source: Moreau 1988; Jean 1999; Acary and Brogliato 2008, ch. 10.
 
-use super::energy_audit::{Audit, GAIN, Verdict, count_lift, energy_before};
+use super::energy_audit::{Audit, GAIN, Verdict, carry_velocity, energy_before};
 use super::error::StepError;
 use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
 use super::options::StepOptions;
@@ -358,6 +358,7 @@ pub(super) fn finish<S: MechanicalSystem>(
         time,
     } = state;
     let d = S::DIMENSION.components();
+    let stored = system.stored(&ws.end);
     if position_projection::project(system, options, ws, &mut report) {
         close_end(system, ws, &mut report);
         system.normalise(&mut ws.end);
@@ -365,7 +366,7 @@ pub(super) fn finish<S: MechanicalSystem>(
             configuration: &*configuration,
             v: &*v,
         };
-        count_lift(system, options, start, ws, &mut report);
+        carry_velocity(system, options, start, stored, ws, &mut report);
     }
     probe.end(Phase::Projection);
     let is_finite = system.is_finite(&ws.end) && ws.v.iter().chain(&ws.p).all(|x| x.is_finite());
