@@ -205,7 +205,10 @@ fn the_entries_of_a_report_add_up_to_the_change_of_the_energy() {
                 let size = energy.kinetic + energy.potential.abs() + report.energy_supplied.abs();
                 if let Some(before) = before.filter(|_| error.is_none()) {
                     let unexplained = energy.total() - before - explained(report);
-                    assert!(unexplained.abs() < 1e-9 * size, "{seed}: {unexplained} {report:?}");
+                    assert!(
+                        unexplained.abs() < 1e-9 * size,
+                        "{seed}: {unexplained} {report:?}"
+                    );
                 }
                 lifted += report.energy_lifted;
                 *before = Some(energy.total());

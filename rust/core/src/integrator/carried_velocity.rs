@@ -70,3 +70,44 @@ impl<T: Lane> Carried<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MASSES: [f64; 2] = [1.0, 100.0];
+
+    fn moving(velocities: &[Vec3<f64>; 2]) -> Moving<f64> {
+        let both = || MASSES.iter().zip(velocities);
+        let kinetic = both().map(|(m, v)| 0.5 * m * v.dot(*v)).sum();
+        let momentum = both().map(|(m, v)| *v * *m);
+        Moving {
+            kinetic,
+            momentum: momentum.fold(Vec3::new(0.0, 0.0, 0.0), |sum, p| sum + p),
+        }
+    }
+
+    #[test]
+    fn the_kinetic_energy_is_kept_and_alone_the_momentum_too() {
+        let before = moving(&[Vec3::new(1.0, -2.0, 0.5), Vec3::new(0.1, 0.3, -0.2)]);
+        let moved = [Vec3::new(3.0, -1.0, 0.0), Vec3::new(0.2, 0.2, -0.1)];
+        for is_alone in [false, true] {
+            let carried = Carried::new(before, moving(&moved), 101.0, is_alone);
+            let after = moving(&moved.map(|v| carried.common + v * carried.share));
+            assert!((after.kinetic - before.kinetic).abs() < 1e-14);
+            let change = after.momentum - before.momentum;
+            assert_eq!(change.norm() < 1e-13, is_alone);
+        }
+    }
+
+    #[test]
+    fn what_rests_stays_at_rest_and_no_velocity_is_raised_by_much() {
+        let rest = moving(&[Vec3::new(0.0, 0.0, 0.0); 2]);
+        let slow = moving(&[Vec3::new(1e-9, 0.0, 0.0); 2]);
+        let fast = moving(&[Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.0, 0.0)]);
+        for is_alone in [false, true] {
+            assert!(Carried::new(rest, rest, 101.0, is_alone).share.is_finite());
+            assert!(Carried::new(fast, slow, 101.0, is_alone).share < 1.5);
+        }
+    }
+}

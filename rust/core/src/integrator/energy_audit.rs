@@ -264,7 +264,9 @@ pub(super) fn carry_velocity<S: MechanicalSystem>(
     let carried = Carried::new(before.moving(), moved.moving(), moved.mass, is_alone);
     let Vec3 { x, y, z } = carried.common;
     for (k, v) in ws.v.iter_mut().enumerate() {
-        let common = system.translation_axis(k).map_or(0.0, |axis| [x, y, z][axis]);
+        let common = system
+            .translation_axis(k)
+            .map_or(0.0, |axis| [x, y, z][axis]);
         *v = common + carried.share * *v;
     }
     for u in &mut ws.u {

@@ -5,6 +5,7 @@
 //! ```text
 //! Δ(K + V_g + V) = supplied + released − dissipated − lost − removed + lifted
 //! ```
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::report::StepReport;
 use crate::scalar::Lane;

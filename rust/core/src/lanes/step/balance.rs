@@ -69,12 +69,7 @@ impl<T: Lane> Balance<T> {
     ///
     /// `released`: by wheels that yield, J.
     #[inline(always)]
-    pub fn audit(
-        &mut self,
-        released: T,
-        conditions: &Conditions<T>,
-        going: T::Mask,
-    ) -> T::Mask {
+    pub fn audit(&mut self, released: T, conditions: &Conditions<T>, going: T::Mask) -> T::Mask {
         let work = self.work.total();
         let (zero, gain) = (work.like(0.0), work.like(GAIN));
         let Conditions {

@@ -460,7 +460,9 @@ impl<T: Lane> Tangent<T> {
             scratch,
         );
         let places = &self.start.joints;
-        let mut work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]).total();
+        let mut work = (self.drives)
+            .work(mechanism, step, places, [&self.v, &self.v_end])
+            .total();
         let (h, theta) = step;
         for (force, (v, end)) in self.applied.iter().zip(self.v.iter().zip(&self.v_end)) {
             work += h * *force * (theta * *end + (h.like(1.0) - theta) * *v);
