@@ -1062,8 +1062,9 @@ class StepReport:
         """
     @property
     def energy_lifted(self) -> float:
-        """Energy gained against gravity and springs by removing penetration, less the actuators' work,
-        summed over the steps, J.
+        """Work against gravity and springs by removing penetration, summed over the steps, J.
+
+        The work of the actuators on the way is part of `energy_supplied`.
         """
     @property
     def energy_released(self) -> float:
@@ -1351,8 +1352,9 @@ class Energy:
         """Kinetic energy, J."""
     @property
     def potential(self) -> float:
-        """Potential energy, J: in gravity, zero at the world's origin, in springs, and in the stiffness
-        of held joints.
+        """Potential energy in gravity, springs and the stiffness of held joints, J.
+
+        That in gravity is zero with all mass centres at the world's origin.
         """
     @property
     def total(self) -> float:

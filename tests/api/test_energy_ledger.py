@@ -1,9 +1,10 @@
-"""The report explains every change of the energy: work, springs, dampers, friction, projection, errors of the scheme."""
+"""The report explains every change of the energy: work, springs, dampers, friction, projection, the scheme."""
 
 from typing import Any, Literal
 
 import numpy as np
 import pytest
+
 from rover_gym import HeightField, Plane, RoverModel, Simulation
 from rover_gym.mechanics import StepReport
 

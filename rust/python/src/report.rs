@@ -86,8 +86,9 @@ pub struct StepReport {
     /// 0 for grains and planar soils, whose energy is not audited.
     #[pyo3(get)]
     energy_lost: f64,
-    /// Energy gained against gravity and springs by removing penetration, less the actuators' work,
-    /// summed over the steps, J.
+    /// Work against gravity and springs by removing penetration, summed over the steps, J.
+    ///
+    /// The work of the actuators on the way is part of `energy_supplied`.
     #[pyo3(get)]
     energy_lifted: f64,
     /// Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -176,8 +177,9 @@ impl StepReport {
 pub struct Energy {
     /// Kinetic energy, J.
     kinetic: f64,
-    /// Potential energy, J: in gravity, zero at the world's origin, in springs, and in the stiffness
-    /// of held joints.
+    /// Potential energy in gravity, springs and the stiffness of held joints, J.
+    ///
+    /// That in gravity is zero with all mass centres at the world's origin.
     potential: f64,
     /// Sum of both, J.
     total: f64,
