@@ -1078,8 +1078,18 @@ class StepReport:
     def energy_removed(self) -> float:
         """Spurious energy gain of the scheme that the audit removed, summed over the steps, J."""
     @property
+    def energy_supplied(self) -> float:
+        """Work of torques, motors and wrenches, summed over the steps, J."""
+    @property
+    def energy_of_set_points(self) -> float:
+        """Energy that commands since the last call have added to held joints, J.
+
+        `Simulation.energy` contains it from the command on, so it is not part of the change over
+        the call. 0 in the first call after the state was set or restored.
+        """
+    @property
     def energy_dissipated(self) -> float:
-        """Energy dissipated by friction and impacts, summed over the steps, J.
+        """Energy dissipated by friction, impacts, dampers and sand, summed over the steps, J.
 
         It can be negative with Newton's law of restitution and friction. A new contact counts as an
         impact if it closes faster than gravity explains.
@@ -1088,15 +1098,18 @@ class StepReport:
     def energy_lost(self) -> float:
         """Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
 
-        The change of the energy is the work of the actuators minus `energy_dissipated`,
-        `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
+        The change of the energy over the call is `energy_supplied` plus `energy_lifted` and
+        `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
         `energy_lost` therefore contains the errors of the time stepping and the work of reactions
         in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
         0 for grains and planar soils, whose energy is not audited.
         """
     @property
     def energy_lifted(self) -> float:
-        """Energy gained by removing penetration, less the actuators' work, sum of the steps, J."""
+        """Work against gravity and springs by removing penetration, summed over the steps, J.
+
+        The work of the actuators on the way is part of `energy_supplied`.
+        """
     @property
     def energy_released(self) -> float:
         """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -1385,7 +1398,10 @@ class Energy:
         """Kinetic energy, J."""
     @property
     def potential(self) -> float:
-        """Potential energy in gravity, J, zero at the world's origin."""
+        """Potential energy in gravity, springs and the stiffness of held joints, J.
+
+        That in gravity is zero with all mass centres at the world's origin.
+        """
     @property
     def total(self) -> float:
         """Sum of both, J."""

@@ -68,7 +68,16 @@ pub struct StepReport {
     /// Spurious energy gain of the scheme that the audit removed, summed over the steps, J.
     #[pyo3(get)]
     energy_removed: f64,
-    /// Energy dissipated by friction and impacts, summed over the steps, J.
+    /// Work of torques, motors and wrenches, summed over the steps, J.
+    #[pyo3(get)]
+    energy_supplied: f64,
+    /// Energy that commands since the last call have added to held joints, J.
+    ///
+    /// `Simulation.energy` contains it from the command on, so it is not part of the change over
+    /// the call. 0 in the first call after the state was set or restored.
+    #[pyo3(get)]
+    energy_of_set_points: f64,
+    /// Energy dissipated by friction, impacts, dampers and sand, summed over the steps, J.
     ///
     /// It can be negative with Newton's law of restitution and friction. A new contact counts as an
     /// impact if it closes faster than gravity explains.
@@ -76,14 +85,16 @@ pub struct StepReport {
     energy_dissipated: f64,
     /// Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
     ///
-    /// The change of the energy is the work of the actuators minus `energy_dissipated`,
-    /// `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
+    /// The change of the energy over the call is `energy_supplied` plus `energy_lifted` and
+    /// `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
     /// `energy_lost` therefore contains the errors of the time stepping and the work of reactions
     /// in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
     /// 0 for grains and planar soils, whose energy is not audited.
     #[pyo3(get)]
     energy_lost: f64,
-    /// Energy gained by removing penetration, less the actuators' work, sum of the steps, J.
+    /// Work against gravity and springs by removing penetration, summed over the steps, J.
+    ///
+    /// The work of the actuators on the way is part of `energy_supplied`.
     #[pyo3(get)]
     energy_lifted: f64,
     /// Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -128,6 +139,8 @@ impl From<CoreReport> for StepReport {
             fallbacks: inner.fallbacks,
             energy_gain: inner.energy_gain,
             energy_removed: inner.energy_removed,
+            energy_supplied: inner.energy_supplied,
+            energy_of_set_points: inner.energy_of_set_points,
             energy_dissipated: inner.energy_dissipated,
             energy_lost: inner.energy_lost,
             energy_lifted: inner.energy_lifted,
@@ -173,7 +186,9 @@ impl StepReport {
 pub struct Energy {
     /// Kinetic energy, J.
     kinetic: f64,
-    /// Potential energy in gravity, J, zero at the world's origin.
+    /// Potential energy in gravity, springs and the stiffness of held joints, J.
+    ///
+    /// That in gravity is zero with all mass centres at the world's origin.
     potential: f64,
     /// Sum of both, J.
     total: f64,

@@ -4,7 +4,7 @@
 //! excess = (K + V)(q⁺, v⁺) − (K + V)(q, v) − W
 //! ```
 //!
-//! W is the work of torques, motors and held joints. Inelastic contact with friction only
+//! W is the work of torques, motors, held joints, springs and dampers. Inelastic contact with friction only
 //! dissipates, so a positive excess is an error of the scheme. Its sources are the linearisation
 //! (third order in the step), a solver that stopped early, and Newton's law of restitution, which
 //! creates energy in some impacts with friction (Kane's paradox).
@@ -21,17 +21,15 @@
 //!   within the step.
 //!
 //! The correction is of the order of the excess, so the scheme keeps its order. Position projection
-//! follows the audit, and its energy is counted separately.
+//! follows the audit; it keeps the kinetic energy ([`super::carried_velocity`]), and its work is
+//! counted separately.
 //!
-//! What the scheme itself takes from the motion or adds to it is the rest of the balance, with the
-//! work of friction and impacts by their law (`step_contacts::contact_work`) and what contacts that
-//! yield release (`law::compliance`):
-//!
-//! ```text
-//! Δ(K + V) = W + released − dissipated − lost − removed + lifted
-//! ```
+//! What the scheme itself takes from the motion or adds to it is the rest of the balance
+//! ([`super::work`]), with the work of friction and impacts by their law
+//! (`step_contacts::contact_work`) and what contacts that yield release (`law::compliance`).
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+use super::carried_velocity::Carried;
 use super::mechanical_system::{
     KeyOf, MechanicalEnergy, MechanicalSystem, Start, UnilateralContact,
 };
@@ -40,6 +38,7 @@ use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
 use super::step_contacts::{contact_work, place};
 use super::warm_start::WarmStart;
+use super::work::{Ledger, Work};
 use crate::scalar::{Lane, Vec3};
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
@@ -121,11 +120,11 @@ impl Audit {
             return Verdict::Sound;
         };
         ws.audited.energy = None;
-        let dissipated = -contact_work::<S>(options, start.v, warm_start, ws);
+        let contact_work = contact_work::<S>(options, start.v, warm_start, ws);
         let Balance {
             after,
             excess,
-            work,
+            mut work,
             released,
         } = if self.is_last {
             shortened_balance(system, options, start, ws, &before)
@@ -144,7 +143,15 @@ impl Audit {
         let is_free = ws.contacts.is_empty() && options.theta <= 0.5;
         if excess.is_balanced(is_free, [self.gain, self.drift]) {
             report.energy_gain = report.energy_gain.max(excess.relative());
-            report.enter_balance(dissipated, 0.0, released, gained);
+            let ledger = Ledger {
+                work,
+                stored: system.stored(&ws.end) - system.stored(start.configuration),
+                contact_work,
+                released,
+                removed: 0.0,
+                change: after.above(&before),
+            };
+            report.enter_energies(ledger.entries());
             ws.audited.is(&ws.end, &ws.v, after);
             return Verdict::Sound;
         }
@@ -166,14 +173,19 @@ impl Audit {
                 shorten(ws, share);
             }
             if excess.is_left(self.gain) {
-                self.hold_back(system, options, start, ws);
+                work = self.hold_back(system, options, start, ws).unwrap_or(work);
             }
         }
         if let Some(corrected) = system.energy(options, &ws.end, &ws.v) {
-            let change =
-                (corrected.kinetic - before.kinetic) + (corrected.potential - before.potential);
-            let left = change - work - released;
-            report.enter_balance(dissipated, gained.max(0.0), released, left);
+            let ledger = Ledger {
+                work,
+                stored: system.stored(&ws.end) - system.stored(start.configuration),
+                contact_work,
+                released,
+                removed: gained.max(0.0),
+                change: corrected.above(&before),
+            };
+            report.enter_energies(ledger.entries());
             ws.audited.is(&ws.end, &ws.v, corrected);
         }
         Verdict::Sound
@@ -185,17 +197,16 @@ impl Audit {
     ///
     /// Something stopped such a step before its end: the machine jammed while the actuators' work
     /// was counted to the end, or a contact closed on its way up. The largest fraction σ of the
-    /// displacement that the energy allows is kept; σ = 0 is always allowed.
+    /// displacement that the energy allows is kept; σ = 0 is always allowed. Returns the work over
+    /// it.
     fn hold_back<S: MechanicalSystem>(
         &self,
         system: &mut S,
         options: &StepOptions,
         start: Start<'_, S::Configuration>,
         ws: &mut ScratchOf<S>,
-    ) {
-        let Some(before) = self.before else {
-            return;
-        };
+    ) -> Option<Work> {
+        let before = self.before?;
         let (h, theta) = (options.time_step, options.theta);
         let d = S::DIMENSION.components();
         for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
@@ -205,8 +216,7 @@ impl Audit {
         let mut share = 1.0;
         for k in 0..MOST_SHORTENINGS {
             let after = system.energy(options, &ws.end, &ws.v).unwrap_or(before);
-            let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential)
-                - share * work;
+            let excess = after.above(&before) - share * work.total();
             if excess <= 0.0 {
                 break;
             }
@@ -228,26 +238,43 @@ impl Audit {
             system.close_end(&ws.p, &mut ws.end, &mut ws.v);
             system.normalise(&mut ws.end);
         }
+        Some(work.times(share))
     }
 }
 
-/// Counts the energy that a projection of `ws.end` by `ws.dv` added, beyond the actuators' work on
-/// the way.
-pub(super) fn count_lift<S: MechanicalSystem>(
+/// Carries the velocity `ws.v` to the position `ws.end` that a projection displaced by `ws.dv`, see
+/// [`super::carried_velocity`]. Counts the energy that this added beyond the actuators' work on the
+/// way. `stored`: in springs and position controls before it, J.
+pub(super) fn carry_velocity<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
+    stored: f64,
     ws: &mut ScratchOf<S>,
     report: &mut StepReport,
 ) {
     let Some(before) = ws.audited.energy else {
         return;
     };
-    let Some(after) = system.energy(options, &ws.end, &ws.v) else {
+    let work = system.work_of_displacement(options, start, &ws.v, &ws.dv);
+    let Some(moved) = system.energy(options, &ws.end, &ws.v) else {
         return;
     };
-    let work = system.work_of_displacement(options, start, &ws.v, &ws.dv);
-    let lifted = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
+    let is_alone = ws.contacts.iter().all(UnilateralContact::is_internal);
+    let carried = Carried::new(before.moving(), moved.moving(), moved.mass, is_alone);
+    let Vec3 { x, y, z } = carried.common;
+    for (k, v) in ws.v.iter_mut().enumerate() {
+        let common = system
+            .translation_axis(k)
+            .map_or(0.0, |axis| [x, y, z][axis]);
+        *v = common + carried.share * *v;
+    }
+    for u in &mut ws.u {
+        *u *= carried.share;
+    }
+    let after = system.energy(options, &ws.end, &ws.v).unwrap_or(moved);
+    let lifted = after.above(&before) + (system.stored(&ws.end) - stored) - work;
+    report.energy_supplied += work;
     report.energy_lifted += lifted.max(0.0);
     report.energy_lost += (-lifted).max(0.0);
     ws.audited.is(&ws.end, &ws.v, after);
@@ -258,7 +285,7 @@ pub(super) fn count_lift<S: MechanicalSystem>(
 struct Balance {
     after: MechanicalEnergy,
     excess: Excess<f64>,
-    work: f64,
+    work: Work,
     released: f64,
 }
 
@@ -368,7 +395,7 @@ fn balance<S: MechanicalSystem>(
     let (before, ends) = (both(before), both(&after));
     Balance {
         after,
-        excess: Excess::new(before, ends, [work, released], (after.mass, fall)),
+        excess: Excess::new(before, ends, [work.total(), released], (after.mass, fall)),
         work,
         released,
     }

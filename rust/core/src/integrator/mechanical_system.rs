@@ -23,7 +23,9 @@
 
 use nalgebra::Vector3;
 
+use super::carried_velocity::Moving;
 use super::options::StepOptions;
+use super::work::Work;
 use crate::contact::Activation;
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
@@ -83,6 +85,21 @@ pub struct MechanicalEnergy {
     pub momentum: Vector3<f64>,
     /// kg.
     pub mass: f64,
+}
+
+impl MechanicalEnergy {
+    /// By how much it exceeds that of another state, J.
+    pub(crate) fn above(&self, other: &Self) -> f64 {
+        (self.kinetic - other.kinetic) + (self.potential - other.potential)
+    }
+
+    /// What of it a change of the velocity changes.
+    pub(crate) fn moving(&self) -> Moving<f64> {
+        Moving {
+            kinetic: self.kinetic,
+            momentum: self.momentum.into(),
+        }
+    }
 }
 
 /// A system with unilateral contacts, see the page above.
@@ -252,18 +269,24 @@ pub trait MechanicalSystem {
         false
     }
 
-    /// Work of the actuators over a step that ends with `v_end`, J.
+    /// Work of its own forces but gravity over a step that ends with `v_end`.
     fn work(
         &mut self,
         _options: &StepOptions,
         _start: Start<'_, Self::Configuration>,
         _v_end: &[f64],
-    ) -> f64 {
+    ) -> Work {
+        Work::default()
+    }
+
+    /// Energy that springs and position controls store in a configuration, J, but for a constant.
+    /// By default there are none.
+    fn stored(&self, _q: &Self::Configuration) -> f64 {
         0.0
     }
 
-    /// Work of the actuators of such a step, as they are at its end, over a `displacement` (nv)
-    /// that is added to it, J.
+    /// Work that the torques, motors and wrenches of such a step, as they are at its end, supply
+    /// over a `displacement` (nv) that is added to it, J.
     fn work_of_displacement(
         &mut self,
         _options: &StepOptions,

@@ -30,7 +30,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use super::energy_audit::{Audit, GAIN, Verdict, count_lift, energy_before};
+use super::energy_audit::{Audit, GAIN, Verdict, carry_velocity, energy_before};
 use super::error::StepError;
 use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
 use super::options::StepOptions;
@@ -362,6 +362,7 @@ pub(super) fn finish<S: MechanicalSystem>(
         time,
     } = state;
     let d = S::DIMENSION.components();
+    let stored = system.stored(&ws.end);
     if position_projection::project(system, options, ws, &mut report) {
         close_end(system, ws, &mut report);
         system.normalise(&mut ws.end);
@@ -369,7 +370,7 @@ pub(super) fn finish<S: MechanicalSystem>(
             configuration: &*configuration,
             v: &*v,
         };
-        count_lift(system, options, start, ws, &mut report);
+        carry_velocity(system, options, start, stored, ws, &mut report);
     }
     probe.end(Phase::Projection);
     let is_finite = system.is_finite(&ws.end) && ws.v.iter().chain(&ws.p).all(|x| x.is_finite());

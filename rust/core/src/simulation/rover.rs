@@ -246,11 +246,23 @@ impl Scene for RoverScene {
         }
     }
 
-    fn energy(&self, options: &StepOptions, state: &State<Configuration>) -> Energy {
+    /// With springs and position controls.
+    fn energy(
+        &self,
+        options: &StepOptions,
+        state: &State<Configuration>,
+        command: &RoverCommand,
+    ) -> Energy {
         let kinematics = Kinematics::of(&self.model, &state.configuration);
         let mut energy = kinematics.energy(&self.model, &state.v, &options.gravity);
-        energy.potential += self.model.spring_energy(&state.configuration.joints);
+        let joints = &state.configuration.joints;
+        energy.potential += self.model.spring_energy(joints);
+        energy.potential += self.stored(state, command);
         energy
+    }
+
+    fn stored(&self, state: &State<Configuration>, command: &RoverCommand) -> f64 {
+        command.actuators.stored(&state.configuration.joints)
     }
 
     fn fingerprint(&self) -> u64 {

@@ -30,6 +30,10 @@ pub struct Simulation<S: Scene> {
     pub(super) scratch: SceneScratch<S>,
     pub(super) active: Vec<ActiveContact<S::Contact>>,
     last_report: StepReport,
+    /// Energy in position controls at the end of the last call, J; none if the state was set since.
+    stored: Option<f64>,
+    /// What the commands since then have changed of it, J.
+    set: f64,
 }
 
 impl<S: Scene> Simulation<S> {
@@ -54,6 +58,8 @@ impl<S: Scene> Simulation<S> {
             warm_start: WarmStart::with_capacity(n, nv),
             active: Vec::with_capacity(n),
             last_report: StepReport::default(),
+            stored: None,
+            set: 0.0,
             scene,
             options,
         })
@@ -123,7 +129,7 @@ impl<S: Scene> Simulation<S> {
     /// Current kinetic and potential energy, J.
     #[must_use]
     pub fn energy(&self) -> Energy {
-        self.scene.energy(&self.options, &self.state)
+        (self.scene).energy(&self.options, &self.state, &self.command)
     }
 
     /// Sets configuration and velocity; time 0, warm start and memory forgotten, the command kept.
@@ -148,6 +154,7 @@ impl<S: Scene> Simulation<S> {
 
     /// Clears the results of the last call of [`Self::step`].
     pub(super) fn forget_last_call(&mut self) {
+        self.stored = None;
         self.active.clear();
         self.scene.begin_call(&mut self.parts);
         self.last_report = StepReport::default();
@@ -235,7 +242,7 @@ impl<S: Scene> Simulation<S> {
         self.begin_call();
         let result = self.steps(integrator, may_be_quick, n, go_on, probe);
         self.end_call(result.clone().unwrap_or_default());
-        result
+        result.map(|_| self.last_report)
     }
 
     /// Resets what counts over a call.
@@ -243,11 +250,17 @@ impl<S: Scene> Simulation<S> {
         self.scene.begin_call(&mut self.parts);
         self.last_report = StepReport::default();
         self.active.clear();
+        let stored = self.scene.stored(&self.state, &self.command);
+        self.set = self.stored.map_or(0.0, |before| stored - before);
     }
 
     /// Keeps the report of a call.
     pub(super) fn end_call(&mut self, report: StepReport) {
         self.last_report = report;
+        if report.steps > 0 {
+            self.last_report.energy_of_set_points = self.set;
+            self.stored = Some(self.scene.stored(&self.state, &self.command));
+        }
     }
 
     fn steps<I>(

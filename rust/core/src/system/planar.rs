@@ -8,7 +8,7 @@ use super::fitted_theta::implicit_weight;
 use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
-    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::multibody::MotorLine;
 use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
@@ -352,7 +352,7 @@ impl MechanicalSystem for PlanarSystem<'_> {
         sum_of_products(&self.parts.driving, displacement)
     }
 
-    fn work(&mut self, options: &StepOptions, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> f64 {
+    fn work(&mut self, options: &StepOptions, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> Work {
         self.set_driving(start.v, v_end);
         let parts = &*self.parts;
         let (h, theta) = (options.time_step, options.theta);
@@ -366,7 +366,10 @@ impl MechanicalSystem for PlanarSystem<'_> {
             let surplus = torque * turned - own.line.work(torque, turned);
             work -= own.motor.gain.abs() * surplus;
         }
-        work
+        Work {
+            supplied: work,
+            ..Work::default()
+        }
     }
 
     fn half_solve(&self, y: &mut [f64]) {

@@ -20,7 +20,7 @@ use crate::contact::{
 use crate::geometry::Terrain;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{
-    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
@@ -446,7 +446,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         options: &StepOptions,
         start: Start<'_, Configuration>,
         v_end: &[f64],
-    ) -> f64 {
+    ) -> Work {
         let of_sand = (self.sand()).map_or(0.0, |(sand, scene, _)| {
             sand.work(&scene.layers, start.v, v_end)
         });
@@ -456,8 +456,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         let power = applied
             .map(|(force, (v, end))| force * (options.theta * end + (1.0 - options.theta) * v));
         let of_wrenches = options.time_step * power.sum::<f64>();
-        let of_drives = (self.parts.drives).work(mechanism, step(options), places, velocities);
-        of_sand + of_wrenches + of_drives
+        let mut work = (self.parts.drives).work(mechanism, step(options), places, velocities);
+        work.supplied += of_wrenches;
+        work.damped -= of_sand;
+        work
+    }
+
+    fn stored(&self, q: &Configuration) -> f64 {
+        self.parts.drives.stored(0.0, &q.joints)
     }
 
     fn work_of_displacement(

@@ -2,6 +2,7 @@
 
 use crate::integrator::StepReport;
 use crate::integrator::energy_audit::{Excess, GAIN};
+use crate::integrator::work::{Ledger, Work};
 use crate::multibody::mechanism::TreeSpan;
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
@@ -24,9 +25,11 @@ pub(super) struct Balance<T: Lane> {
     pub after: [T; 2],
     /// Linear momentum at the end of the step, kg m/s.
     pub momentum: Vec3<T>,
-    /// Work of the actuators and of wheels that yield; the latter's alone.
-    pub supplied: T,
-    pub released: T,
+    /// Work of the machine's own forces, and change of the energy that its springs store.
+    pub work: Work<T>,
+    pub stored: T,
+    /// By wheels that yield.
+    released: T,
     /// Work of the contacts by their law.
     pub contact_work: T,
     /// Energy beyond what was supplied; what the audit removed of it; what is left of it, as a
@@ -46,7 +49,12 @@ impl<T: Lane> Balance<T> {
             before: [zero; 2],
             after: [zero; 2],
             momentum: Vec3::splat(token, [0.0; 3]),
-            supplied: zero,
+            work: Work {
+                supplied: zero,
+                damped: zero,
+                of_springs: zero,
+            },
+            stored: zero,
             released: zero,
             contact_work: zero,
             excess: None,
@@ -59,14 +67,10 @@ impl<T: Lane> Balance<T> {
     /// Measures the excess of energy. Returns the lanes whose step must be taken otherwise; of the
     /// others, those with too much are [to be corrected](Self::correct).
     ///
-    /// `work`: the actuators'; `released`: by wheels that yield, J.
+    /// `released`: by wheels that yield, J.
     #[inline(always)]
-    pub fn audit(
-        &mut self,
-        (work, released): (T, T),
-        conditions: &Conditions<T>,
-        going: T::Mask,
-    ) -> T::Mask {
+    pub fn audit(&mut self, released: T, conditions: &Conditions<T>, going: T::Mask) -> T::Mask {
+        let work = self.work.total();
         let (zero, gain) = (work.like(0.0), work.like(GAIN));
         let Conditions {
             mass,
@@ -75,7 +79,6 @@ impl<T: Lane> Balance<T> {
             ..
         } = *conditions;
         self.released = released;
-        self.supplied = work + released;
         let excess = Excess::new(self.before, self.after, [work, released], (mass, fall));
         let is_balanced = excess.is_balanced(is_free, [gain, zero]);
         let is_lost = excess.is_coarse(is_free, gain) & !is_balanced;
@@ -125,25 +128,22 @@ impl<T: Lane> Balance<T> {
     #[inline(always)]
     pub fn report(&self, reports: &mut [StepReport; MAX_LANES]) {
         let [kinetic, potential] = self.before;
-        let change = (self.after[0] - kinetic) + (self.after[1] - potential);
-        let lost = self.contact_work - (change - self.supplied) - self.removed;
-        let mut entries = [[0.0; MAX_LANES]; 5];
-        let balance = [
-            self.gain,
-            self.removed,
-            self.contact_work,
-            lost,
-            self.released,
-        ];
-        for (entry, x) in entries.iter_mut().zip(balance) {
+        let ledger = Ledger {
+            work: self.work,
+            stored: self.stored,
+            contact_work: self.contact_work,
+            released: self.released,
+            removed: self.removed,
+            change: (self.after[0] - kinetic) + (self.after[1] - potential),
+        };
+        let (mut gain, mut entries) = ([0.0; MAX_LANES], [[0.0; MAX_LANES]; 5]);
+        self.gain.store(&mut gain[..T::LANES]);
+        for (entry, x) in entries.iter_mut().zip(ledger.entries()) {
             x.store(&mut entry[..T::LANES]);
         }
         for (lane, report) in reports[..T::LANES].iter_mut().enumerate() {
-            report.energy_gain = entries[0][lane];
-            report.energy_removed = entries[1][lane];
-            report.energy_dissipated = -entries[2][lane];
-            report.energy_lost = entries[3][lane];
-            report.energy_released = entries[4][lane];
+            report.energy_gain = gain[lane];
+            report.enter_energies(entries.map(|entry| entry[lane]));
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::integrator::{Phase, Probe, StepReport};
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
-use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::extent::Turning;
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
@@ -185,11 +185,7 @@ impl<T: Lane> Block<T> {
         }
         let (after, momentum) = self.energy(State::End);
         self.balance.after = after.kinetic_and_potential();
-        self.balance.momentum = if self.machine.holds_the_world {
-            Vec3::splat(token, [0.0; 3])
-        } else {
-            momentum
-        };
+        self.balance.momentum = self.own_momentum(momentum);
         let of_sand = self.work_of_sand();
         T::vectorize(
             token,
@@ -276,9 +272,13 @@ impl<T: Lane> Block<T> {
     fn audit(&mut self, of_sand: T) {
         let (h, theta) = self.time_step();
         let places = &self.start.joints;
-        let of_drives =
+        let mut work =
             (self.drives).work(&self.machine, (h, theta), places, [&self.v, &self.v_end]);
-        let work = of_sand + of_drives;
+        work.damped -= of_sand;
+        self.balance.work = work;
+        let zero = h.like(0.0);
+        let stored = |places: &[T]| self.drives.stored(zero, places);
+        self.balance.stored = stored(&self.end.joints) - stored(places);
         let mut released = h.like(0.0);
         if !self.yields.is_empty() {
             let (contacts, before) = (&self.contacts, &self.rows.u_before);
@@ -292,7 +292,7 @@ impl<T: Lane> Block<T> {
             untouched: !self.on_ground(),
             is_free: if conserves { !self.in_touch() } else { nobody },
         };
-        let is_lost = (self.balance).audit((work, released), &conditions, self.going);
+        let is_lost = (self.balance).audit(released, &conditions, self.going);
         self.fall_back(Fallback::Energy, is_lost);
         if self.balance.is_corrected.any() {
             let trees = &self.machine.trees;
@@ -307,8 +307,9 @@ impl<T: Lane> Block<T> {
 
     /// Energy of the lanes whose velocity was corrected.
     fn weigh_again(&mut self) {
-        let after = self.energy(State::End).0.kinetic_and_potential();
-        let balance = &mut self.balance;
+        let (after, momentum) = self.energy(State::End);
+        self.balance.momentum = self.own_momentum(momentum);
+        let (balance, after) = (&mut self.balance, after.kinetic_and_potential());
         balance.after = select_both(balance.is_corrected, after, balance.after);
     }
 

@@ -3,11 +3,12 @@
 use super::balance::select_both;
 use super::{Block, Fallback, State};
 use crate::integrator::Stabilisation;
+use crate::integrator::carried_velocity::{Carried, Moving};
 use crate::integrator::position_projection::FARTHEST;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::system::extent::displacement;
 
 /// Sweeps before pivoting, of machines with many contacts: a problem of six cylinders on hills with
@@ -110,29 +111,77 @@ impl<T: Lane> Block<T> {
             }
         }
         self.fall_back(Fallback::Projection, T::mask(token, unsolved));
+        let stored = self.drives.stored(self.number(0.0), &self.end.joints);
         T::vectorize(
             token,
             #[inline(always)]
             || self.displace(problems),
         );
         self.close_end(self.is_deep & self.going);
-        let lifted = self.energy(State::End).0.kinetic_and_potential();
+        self.carry_velocity(stored);
+    }
+
+    /// Carries the velocity to the projected position, and counts the energy that this added, as
+    /// [`crate::integrator::energy_audit`] does. `stored`: in springs before it, J.
+    fn carry_velocity(&mut self, stored: T) {
         let is_moved = self.is_deep & self.going;
-        let [kinetic, potential] = self.balance.after;
+        if !is_moved.any() {
+            return;
+        }
         let work = self.drives.work_of_displacement(
             &self.machine,
             self.time_step(),
             &self.start.joints,
             [&self.v, &self.v_end, &self.y],
         );
-        let gained = (lifted[0] - kinetic) + (lifted[1] - potential) - work;
+        let (moved, momentum) = self.energy(State::End);
+        let after = Moving {
+            kinetic: moved.kinetic,
+            momentum: self.own_momentum(momentum),
+        };
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.scale_carried(after, is_moved),
+        );
+        let after = self.energy(State::End).0.kinetic_and_potential();
+        let [kinetic, potential] = self.balance.after;
+        let stored = self.drives.stored(self.number(0.0), &self.end.joints) - stored;
+        let gained = (after[0] - kinetic) + (after[1] - potential) + stored - work;
         for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
             if is_moved.get(lane) {
+                report.energy_supplied += work.get(lane);
                 report.energy_lifted = gained.get(lane).max(0.0);
                 report.energy_lost += (-gained.get(lane)).max(0.0);
             }
         }
-        self.balance.after = select_both(is_moved, lifted, self.balance.after);
+        self.balance.after = select_both(is_moved, after, self.balance.after);
+    }
+
+    #[inline(always)]
+    fn scale_carried(&mut self, after: Moving<T>, lanes: T::Mask) {
+        let before = Moving {
+            kinetic: self.balance.after[0],
+            momentum: self.balance.momentum,
+        };
+        let is_alone = !self.on_ground();
+        let carried = Carried::new(before, after, self.inertias.mass, is_alone);
+        let Vec3 { x, y, z } = carried.common;
+        for tree in &self.machine.trees {
+            let axes = if tree.is_free { 3 } else { 0 };
+            for (k, v) in self.v_end[tree.velocities.clone()].iter_mut().enumerate() {
+                let mut own = carried.share * *v;
+                if k < axes {
+                    own = [x, y, z][k] + own;
+                }
+                *v = T::select(lanes, own, *v);
+            }
+        }
+        for &slot in self.contacts.used() {
+            for u in &mut self.u[slot] {
+                *u = T::select(lanes, *u * carried.share, *u);
+            }
+        }
     }
 
     #[inline(always)]

@@ -4,7 +4,7 @@ use super::contact::{CompositeContact, GrainTouch};
 use super::parts::CompositeScratch;
 use super::touches;
 use crate::contact::{Activation, Contact, generalized_impulse};
-use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
+use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact, Work};
 use crate::multibody::Configuration;
 use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
@@ -285,7 +285,7 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.tree.turning(self.halves(v).1)
     }
 
-    fn work(&mut self, options: &StepOptions, start: Start<'_, Both>, v_end: &[f64]) -> f64 {
+    fn work(&mut self, options: &StepOptions, start: Start<'_, Both>, v_end: &[f64]) -> Work {
         let (_, start) = self.starts(start);
         let (_, v_end) = self.halves(v_end);
         self.tree.work(options, start, v_end)

@@ -4,12 +4,20 @@ use super::direction::Direction;
 use super::held_tree::TangentScene;
 use super::scratch::{Correction, Tangent};
 use super::varying_sand::VaryingSand;
+use crate::integrator::UnilateralContact;
+use crate::integrator::carried_velocity::{Carried, Moving};
 use crate::integrator::held_step::SAME;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::multibody::Configuration;
 use crate::multibody::bias::bias;
 use crate::multibody::energy::energy;
 use crate::scalar::{Dual, Lane, Vec3};
+
+/// Positions at the end of a step: before and after the projection.
+enum Place {
+    End,
+    Reached,
+}
 
 /// Relative difference of velocities that is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -372,21 +380,66 @@ impl<T: Lane> Tangent<T> {
         if self.correction != Correction::None {
             self.correct(scene);
         }
+        if scene.held.step.projection.is_none() {
+            self.reached.clone_from(&self.end);
+            return;
+        }
+        let before = self.moving(scene, Place::End);
         T::vectorize(
             token,
             #[inline(always)]
             || {
-                if scene.held.step.projection.is_some() {
-                    let mechanism = scene.model.mechanism();
-                    (self.reached).set_moved(mechanism, &self.end, &self.displacement, 1.0);
-                } else {
-                    self.reached.clone_from(&self.end);
-                }
+                let mechanism = scene.model.mechanism();
+                (self.reached).set_moved(mechanism, &self.end, &self.displacement, 1.0);
             },
         );
-        if scene.held.step.projection.is_some() {
-            self.close_end(scene, true);
-            self.reached.normalise();
+        self.close_end(scene, true);
+        self.reached.normalise();
+        self.carry_velocity(scene, before);
+    }
+
+    /// Kinetic energy and momentum of the velocity at the end, before or after the projection.
+    fn moving(&mut self, scene: &TangentScene<'_>, place: Place) -> Moving<Dual<T>> {
+        let q = match place {
+            Place::End => &self.end,
+            Place::Reached => &self.reached,
+        };
+        let (mechanism, scratch) = (scene.model.mechanism(), &mut self.energy_scratch);
+        let gravity = Vec3::splat(self.token, scene.options.gravity.into());
+        let (energy, momentum) =
+            energy(mechanism, &self.inertias, q, &self.v_end, gravity, scratch);
+        let is_free = scene.model.is_free() && !scene.model.holds_the_world();
+        Moving {
+            kinetic: energy.kinetic,
+            momentum: if is_free {
+                momentum
+            } else {
+                Vec3::splat(self.token, [0.0; 3])
+            },
+        }
+    }
+
+    /// The velocity at the projected position, see [`crate::integrator::carried_velocity`].
+    fn carry_velocity(&mut self, scene: &TangentScene<'_>, before: Moving<Dual<T>>) {
+        let after = self.moving(scene, Place::Reached);
+        let is_alone = (scene.held.step.contacts.iter()).all(UnilateralContact::is_internal);
+        let lanes = if is_alone {
+            u32::MAX >> (32 - T::LANES)
+        } else {
+            0
+        };
+        let is_alone = T::mask(self.token, lanes);
+        let carried = Carried::new(before, after, self.inertias.mass, is_alone);
+        for v in &mut self.v_end {
+            *v *= carried.share;
+        }
+        let Vec3 { x, y, z } = carried.common;
+        let trees = &scene.model.mechanism().trees;
+        for tree in trees.iter().filter(|tree| tree.is_free) {
+            let translation = &mut self.v_end[tree.velocities.start..];
+            for (v, common) in translation.iter_mut().zip([x, y, z]) {
+                *v += common;
+            }
         }
     }
 
@@ -407,7 +460,9 @@ impl<T: Lane> Tangent<T> {
             scratch,
         );
         let places = &self.start.joints;
-        let mut work = (self.drives).work(mechanism, step, places, [&self.v, &self.v_end]);
+        let mut work = (self.drives)
+            .work(mechanism, step, places, [&self.v, &self.v_end])
+            .total();
         let (h, theta) = step;
         for (force, (v, end)) in self.applied.iter().zip(self.v.iter().zip(&self.v_end)) {
             work += h * *force * (theta * *end + (h.like(1.0) - theta) * *v);
