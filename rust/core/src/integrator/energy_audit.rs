@@ -21,7 +21,7 @@
 //!   within the step.
 //!
 //! The correction is of the order of the excess, so the scheme keeps its order. Position projection
-//! follows the audit; it keeps the kinetic energy ([`super::carried_velocity`]), and its work is
+//! follows the audit; it keeps the kinetic energy (`carried_velocity`), and its work is
 //! counted separately.
 //!
 //! What the scheme itself takes from the motion or adds to it is the rest of the balance
