@@ -4,10 +4,10 @@
 //! excess = (K + V)(q⁺, v⁺) − (K + V)(q, v) − W
 //! ```
 //!
-//! W is the work of torques, motors, held joints, springs and dampers. Inelastic contact with friction only
-//! dissipates, so a positive excess is an error of the scheme. Its sources are the linearisation
-//! (third order in the step), a solver that stopped early, and Newton's law of restitution, which
-//! creates energy in some impacts with friction (Kane's paradox).
+//! W is the work of torques, motors, held joints, springs and dampers. Inelastic contact with
+//! friction only dissipates, so a positive excess is an error of the scheme. Its sources are the
+//! linearisation (third order in the step), a solver that stopped early, and Newton's law of
+//! restitution, which creates energy in some impacts with friction (Kane's paradox).
 //!
 //! - After a coarse excess the step is repeated, with implicit gyroscopic terms and then in halves.
 //! - The remaining excess is removed by scaling the velocity, `v⁺ ← s v⁺`. Signorini's condition at
@@ -21,7 +21,7 @@
 //!   within the step.
 //!
 //! The correction is of the order of the excess, so the scheme keeps its order. Position projection
-//! follows the audit; it keeps the kinetic energy ([`super::carried_velocity`]), and its work is
+//! follows the audit; it keeps the kinetic energy (`carried_velocity`), and its work is
 //! counted separately.
 //!
 //! What the scheme itself takes from the motion or adds to it is the rest of the balance
@@ -145,14 +145,11 @@ impl Audit {
             report.energy_gain = report.energy_gain.max(excess.relative());
             let ledger = Ledger {
                 work,
-                stored: system.stored(&ws.end) - system.stored(start.configuration),
                 contact_work,
                 released,
-                removed: 0.0,
-                change: after.above(&before),
+                ..Ledger::default()
             };
-            report.enter_energies(ledger.entries());
-            ws.audited.is(&ws.end, &ws.v, after);
+            enter(system, start, ws, [&before, &after], ledger, report);
             return Verdict::Sound;
         }
         if excess.is_coarse(is_free, self.gain) && !self.is_last {
@@ -179,14 +176,12 @@ impl Audit {
         if let Some(corrected) = system.energy(options, &ws.end, &ws.v) {
             let ledger = Ledger {
                 work,
-                stored: system.stored(&ws.end) - system.stored(start.configuration),
                 contact_work,
                 released,
                 removed: gained.max(0.0),
-                change: corrected.above(&before),
+                ..Ledger::default()
             };
-            report.enter_energies(ledger.entries());
-            ws.audited.is(&ws.end, &ws.v, corrected);
+            enter(system, start, ws, [&before, &corrected], ledger, report);
         }
         Verdict::Sound
     }
@@ -240,6 +235,25 @@ impl Audit {
         }
         Some(work.times(share))
     }
+}
+
+/// Enters the `ledger` of a step between two energies into the report, with what the springs
+/// stored.
+fn enter<S: MechanicalSystem>(
+    system: &S,
+    start: Start<'_, S::Configuration>,
+    ws: &mut ScratchOf<S>,
+    [before, after]: [&MechanicalEnergy; 2],
+    ledger: Ledger,
+    report: &mut StepReport,
+) {
+    let ledger = Ledger {
+        stored: system.stored(&ws.end) - system.stored(start.configuration),
+        change: after.above(before),
+        ..ledger
+    };
+    report.enter_energies(ledger.entries());
+    ws.audited.is(&ws.end, &ws.v, *after);
 }
 
 /// Carries the velocity `ws.v` to the position `ws.end` that a projection displaced by `ws.dv`, see

@@ -6,9 +6,9 @@
 //! | Moreau–Jean, Newton on the end-of-step forces | [`moreau_jean_newton`] | 2 | 1 |
 //!
 //! Both schemes treat impacts and persistent contact by the same law at velocity level and locate
-//! no events. [`position_projection`] removes the penetration that the velocity law leaves.
-//! It keeps the kinetic energy (`carried_velocity`). [`energy_audit`] checks the energy of every step. `held_step` differentiates a step while the
-//! modes of its contacts ([`contact_modes`]) hold.
+//! no events. [`position_projection`] removes the penetration that the velocity law leaves, and
+//! keeps the kinetic energy (`carried_velocity`). [`energy_audit`] checks the energy of every step.
+//! `held_step` differentiates a step while the modes of its contacts ([`contact_modes`]) hold.
 //!
 //! Each scheme is an [`Integrator`], written once, for any [`MechanicalSystem`]: the multibody tree
 //! and the planar systems ([`crate::system`], [`crate::planar`]) step through the same code. The

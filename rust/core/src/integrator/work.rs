@@ -41,7 +41,7 @@ impl<T: Lane> Work<T> {
 }
 
 /// What the report of a step says of its energy, J.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ledger<T = f64> {
     pub work: Work<T>,
     /// Change of the energy stored in springs and position controls.

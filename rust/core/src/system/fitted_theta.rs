@@ -22,8 +22,8 @@ pub fn fitted_theta<T: Lane>(z: T) -> T {
     T::select(z.lt(z.like(1e-2)), series, exact)
 }
 
-/// Largest h ω of a spring whose oscillation a step resolves: the midpoint rule takes four steps for
-/// a period. It then keeps the spring's energy.
+/// Largest h ω of a spring whose oscillation a step resolves: the midpoint rule takes four steps
+/// for a period. It then keeps the spring's energy.
 ///
 /// Measured on the response of one joint for h ω up to 100 and damping ratios of 0 to 5: with half
 /// the stiffness counted as damping below this limit too, the error of damped joints is the same

@@ -320,8 +320,8 @@ impl<T: Lane> Block<T> {
         )
     }
 
-    /// The linear momentum that only contacts with the ground change; 0 of a machine that is tied to
-    /// the world.
+    /// The linear momentum that only contacts with the ground change; 0 of a machine that is tied
+    /// to the world.
     fn own_momentum(&self, momentum: Vec3<T>) -> Vec3<T> {
         if self.machine.holds_the_world {
             Vec3::splat(self.token, [0.0; 3])

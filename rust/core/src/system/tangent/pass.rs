@@ -14,6 +14,7 @@ use crate::multibody::energy::energy;
 use crate::scalar::{Dual, Lane, Vec3};
 
 /// Positions at the end of a step: before and after the projection.
+#[derive(Clone, Copy, Debug)]
 enum Place {
     End,
     Reached,
