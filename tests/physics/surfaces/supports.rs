@@ -227,8 +227,9 @@ fn every_flat_shape_rests_on_an_edge_two_walls_a_slot_a_corner_and_spikes() {
             for (kind, ground) in ["mesh", "map"].iter().zip(&grounds) {
                 for &[x, z] in support.places() {
                     for lifted in [0.0, 1e-3] {
-                        // Nothing brakes what rolls.
-                        if is_round && lifted > 0.0 {
+                        // Nothing brakes what rolls, and what is all but half over tips over.
+                        let is_close = (-0.01..0.0).contains(&x);
+                        if (is_round || is_close) && lifted > 0.0 {
                             continue;
                         }
                         let place = Vector3::new(x, TOP + half, z);

@@ -47,6 +47,10 @@ const ROUNDING: f64 = 1e-8;
 /// deep as the part must rise may be the only one that holds it.
 const FAR_UP: f64 = 0.75;
 
+/// Places behind an edge that are looked at for unbroken ground: on spiky maps of single cells the
+/// way behind a steep edge leaves the ground again within a cell or two.
+const PLACES: usize = 12;
+
 /// Bisections for the height by which a part must rise: to 1e-9 of its overlap.
 const BISECTIONS: usize = 30;
 
@@ -70,6 +74,30 @@ impl OverSurfaces<'_> {
         point: &SurfacePoint,
         shift: &Vector3<f64>,
     ) -> bool {
+        let behind = || self.behind((id, piece), point);
+        self.overlaps_after((id, piece), point, shift, behind)
+    }
+
+    /// The furthest place behind an edge, up to the depth of a point there, to which the ground is
+    /// unbroken. Beyond the far side of a steep ridge there may be a valley, with the part in it, and
+    /// then ground again.
+    fn behind(&self, (id, piece): (u32, &Primitive), point: &SurfacePoint) -> Vector3<f64> {
+        let Primitive::Edge(edge) = piece else {
+            return Vector3::zeros();
+        };
+        let [top, deepest] = edge.behind(&point.n, &(self.base + point.point));
+        let places = (1..=PLACES).map(|k| top + (deepest - top) * (k as f64 / PLACES as f64));
+        let inside = places.take_while(|x| self.terrain.is_inside(id, x));
+        inside.last().unwrap_or(edge.start)
+    }
+
+    fn overlaps_after(
+        &self,
+        (id, piece): (u32, &Primitive),
+        point: &SurfacePoint,
+        shift: &Vector3<f64>,
+        behind: impl FnOnce() -> Vector3<f64>,
+    ) -> bool {
         let origin = self.base + shift;
         let is_inside = |x: &Vector3<f64>| self.terrain.is_inside(id, x);
         let is_in_ground = || is_inside(&(origin + point.point));
@@ -80,15 +108,7 @@ impl OverSurfaces<'_> {
         match (piece, self.shape) {
             (Primitive::Face(face), _) => is_in_ground() || meets(face.corners(&origin)),
             (Primitive::Edge(edge), _) => {
-                is_in_ground() || {
-                    let behind = edge.behind(&point.n, &(self.base + point.point));
-                    let last = if is_inside(&behind) {
-                        behind
-                    } else {
-                        edge.start
-                    };
-                    meets([edge.start, edge.end(), last])
-                }
+                is_in_ground() || meets([edge.start, edge.end(), behind()])
             }
             (Primitive::Vertex(_), PlacedShape::Disc(_)) => is_in_ground(),
             (Primitive::Vertex(vertex), solid) => solid.holds(&(vertex.place - origin)),
@@ -108,7 +128,9 @@ impl OverSurfaces<'_> {
 
     #[cold]
     fn excess_of_deep(&self, piece: (u32, &Primitive), point: &SurfacePoint) -> f64 {
-        let overlaps_at = |rise: f64| self.overlaps(piece, point, &(Vector3::y() * rise));
+        let behind = self.behind(piece, point);
+        let overlaps_at =
+            |rise: f64| self.overlaps_after(piece, point, &(Vector3::y() * rise), || behind);
         let shallow = Self::shallow(self.shape);
         if !overlaps_at(0.0) {
             // The place just behind a tip is in the ground. It pierces a disc no deeper than that.

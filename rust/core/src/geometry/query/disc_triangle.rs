@@ -23,7 +23,7 @@ use nalgebra::Vector3;
 use super::chord::{self, LIES};
 use super::crossing::crossing;
 use super::disc_plane::{rim_point_over, rim_points};
-use super::{NEAREST, SurfacePoint, disc_sphere};
+use super::{CHORD, NEAREST, SurfacePoint, disc_sphere};
 use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
 use crate::geometry::{Disc, Sphere};
 
@@ -31,9 +31,6 @@ use crate::geometry::{Disc, Sphere};
 /// of the normal that separates most but for half the square of this, relative to the radius, and
 /// rounding does not swap the names of the ends.
 const FLAT: f64 = 1e-6;
-
-/// Feature of the first end of a chord.
-const CHORD: usize = 3;
 
 /// Fraction of the radius by which the end of a chord may lie beyond the edge.
 const ENDS: f64 = 1e-9;

@@ -166,14 +166,15 @@ impl Edge {
         self.start + self.along * self.length
     }
 
-    /// The place midway between its faces' planes that is as far behind the edge, along an
-    /// admissible unit normal n, as the point x; world, m.
+    /// The place of the edge beside a point x, and the one midway between its faces' planes that is
+    /// as far behind the edge, along an admissible unit normal n, as x; world, m.
     #[must_use]
-    pub fn behind(&self, n: &Vector3<f64>, x: &Vector3<f64>) -> Vector3<f64> {
+    pub fn behind(&self, n: &Vector3<f64>, x: &Vector3<f64>) -> [Vector3<f64>; 2] {
         let from = x - self.start;
         let place = from.dot(&self.along).clamp(0.0, self.length);
         let outward = self.normals[0] + self.normals[1];
-        self.start + self.along * place + outward * (n.dot(&from) / n.dot(&outward))
+        let top = self.start + self.along * place;
+        [top, top + outward * (n.dot(&from) / n.dot(&outward))]
     }
 
     /// Whether a place along the edge (m from its start) belongs to it, for a part that is `depth`
