@@ -369,7 +369,8 @@ class RoverCommandEnv(DriveByCommand):
     ## Action
 
     `Box(-1, 1, (3,), float32)`, held for `repeat` control periods, or until the episode ends. Entries outside the box
-    are clipped, and `info["clipped_actions"]` counts them. If a number is not finite, a `CommandError` is raised and nothing changes.
+    are clipped, and `info["clipped_actions"]` counts them. If a number is not finite, a `CommandError` is raised and
+    nothing changes.
 
     | index | meaning                                        | one stands for | unit |
     |-------|------------------------------------------------|----------------|------|
