@@ -917,8 +917,9 @@ class HeightField(Terrain):
         """Corners x_min, z_min, x_max, z_max of the map, m."""
     @property
     def map_frame(self) -> tuple[float, float, float, float] | None:
-        """Easting and northing of the world's origin on the map, and their change per metre along x
-        and along z, (4,); None without map coordinates.
+        """Easting and northing of the world's origin, and their change per metre; None without a map.
+
+        Four numbers: the last two are the changes of easting along x and of northing along z.
         """
     def place_of(self, easting: float, northing: float) -> tuple[float, float]:
         """Place (x, z), m, of a point in map coordinates.

@@ -37,8 +37,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Action
 
-    `Box(-1, 1, (12,), float32)`. An action that is outside the box or not finite is refused with
-    `CommandError`, and nothing changes.
+    `Box(-1, 1, (12,), float32)`. A finite action is clipped to the box, as MuJoCo's environments do, and
+    `info["clipped_actions"]` counts the entries that were. One that is not finite is refused with `CommandError`, and
+    nothing changes.
 
     | index | meaning                                             | range   | one stands for      | unit |
     |-------|-----------------------------------------------------|---------|---------------------|------|
@@ -422,8 +423,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """Applies an action for one control period.
 
         Raises:
-            CommandError: The action has a wrong shape or an entry that is not finite or outside
-                [-1, 1]; nothing has changed.
+            CommandError: The action has a wrong shape or an entry that is not finite; nothing has
+                changed. Finite entries outside [-1, 1] are clipped.
             OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: The environment has not been reset.
         """

@@ -129,8 +129,9 @@ impl HeightField {
         Ok(Self::placed(Arc::new(field), map_frame))
     }
 
-    /// Easting and northing of the world's origin on the map, and their change per metre along x
-    /// and along z, (4,); None without map coordinates.
+    /// Easting and northing of the world's origin, and their change per metre; None without a map.
+    ///
+    /// Four numbers: the last two are the changes of easting along x and of northing along z.
     #[getter]
     fn map_frame(&self) -> Option<(f64, f64, f64, f64)> {
         self.map_frame.map(Into::into)
