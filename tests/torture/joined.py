@@ -13,7 +13,9 @@ from torture.ledger import Bounds, Ledger, Regime
 Random = np.random.Generator
 
 #: Wheels of a cart in the trunk's frame, m; a cart has the first three to eight.
-WHEELS = [(f"{row}{side}", x, z) for row, x in enumerate((0.6, -0.6, 0.2, -0.2)) for side, z in (("L", -0.3), ("R", 0.3))]
+WHEELS = [
+    (f"{row}{side}", x, z) for row, x in enumerate((0.6, -0.6, 0.2, -0.2)) for side, z in (("L", -0.3), ("R", 0.3))
+]
 #: Fewest rovers of a batch, and more than the most.
 BATCH = (5, 9)
 
@@ -72,7 +74,9 @@ def _hitch(models: dict[str, RoverModel], qs: list[Any], pair: tuple[int, int]) 
 
 
 def _scene(random: Random) -> Simulation:
-    ground: Any = Plane() if random.uniform() < 0.4 else HeightField.fractal(60.0, 0.2, 0.1, seed=int(random.integers(9)))
+    ground: Any = (
+        Plane() if random.uniform() < 0.4 else HeightField.fractal(60.0, 0.2, 0.1, seed=int(random.integers(9)))
+    )
     models = {f"m{i}": _machine(random) for i in range(int(random.integers(2, 5)))}
     qs, x = [], 0.0
     for model in models.values():
@@ -85,7 +89,7 @@ def _scene(random: Random) -> Simulation:
             if model.nq >= 6 and model.dof_names[0].endswith("x"):
                 q[:6] = place[0], float(ground.heights([place])[0]) + random.uniform(0.2, 1.0), place[1], 0.0, 0.0, 0.0
         qs.append(q)
-        x -= random.uniform(0.8, 2.6)
+        x -= random.uniform(2.4, 3.0)  # apart, so that they do not start in each other
     free = [i for i, model in enumerate(models.values()) if model.wheel_names]
     pairs = zip(free, free[1:], strict=False) if random.uniform() < 0.5 else ()
     joined = RoverModel.join(models, loops=[_hitch(models, qs, pair) for pair in pairs])
