@@ -1,10 +1,11 @@
 """Machines of different shapes in one model: side by side, hitched, in any order, alone and in a batch."""
 
+import itertools
 from typing import Any
 
 import numpy as np
-
 from machines import machine
+
 from rover_gym import HeightField, Plane, RoverModel, Simulation, StepError
 from rover_gym.mechanics import SimulationBatch
 from torture.drives import log_uniform
@@ -91,7 +92,7 @@ def _scene(random: Random) -> Simulation:
         qs.append(q)
         x -= random.uniform(2.4, 3.0)  # apart, so that they do not start in each other
     free = [i for i, model in enumerate(models.values()) if model.wheel_names]
-    pairs = zip(free, free[1:], strict=False) if random.uniform() < 0.5 else ()
+    pairs = itertools.pairwise(free) if random.uniform() < 0.5 else ()
     joined = RoverModel.join(models, loops=[_hitch(models, qs, pair) for pair in pairs])
     sim = Simulation(
         joined,
