@@ -1,10 +1,11 @@
 """Machines of different shapes in one model: side by side, hitched, in any order, alone and in a batch."""
 
+import itertools
 from typing import Any
 
 import numpy as np
-
 from machines import machine
+
 from rover_gym import HeightField, Plane, RoverModel, Simulation, StepError
 from rover_gym.mechanics import SimulationBatch
 from torture.drives import log_uniform
@@ -13,7 +14,9 @@ from torture.ledger import Bounds, Ledger, Regime
 Random = np.random.Generator
 
 #: Wheels of a cart in the trunk's frame, m; a cart has the first three to eight.
-WHEELS = [(f"{row}{side}", x, z) for row, x in enumerate((0.6, -0.6, 0.2, -0.2)) for side, z in (("L", -0.3), ("R", 0.3))]
+WHEELS = [
+    (f"{row}{side}", x, z) for row, x in enumerate((0.6, -0.6, 0.2, -0.2)) for side, z in (("L", -0.3), ("R", 0.3))
+]
 #: Fewest rovers of a batch, and more than the most.
 BATCH = (5, 9)
 
@@ -33,6 +36,8 @@ def _solid(name: str, random: Random, joint: str = "free", *, collides: bool = T
 def _bodies(random: Random) -> RoverModel:
     """A chain of one to three solids under a free or a fixed root, with or without colliders."""
     root = _solid("root", random, str(random.choice(["free", "free", "fixed"])), collides=random.uniform() < 0.6)
+    if root["joint"] == "fixed":
+        root["position"] = [0.0, 1.0, 0.0]
     solids = [root]
     for k in range(int(random.integers(3))):
         own = _solid(f"link {k}", random, str(random.choice(["revolute", "prismatic", "spherical"])))
@@ -70,7 +75,9 @@ def _hitch(models: dict[str, RoverModel], qs: list[Any], pair: tuple[int, int]) 
 
 
 def _scene(random: Random) -> Simulation:
-    ground: Any = Plane() if random.uniform() < 0.4 else HeightField.fractal(60.0, 0.2, 0.1, seed=int(random.integers(9)))
+    ground: Any = (
+        Plane() if random.uniform() < 0.4 else HeightField.fractal(60.0, 0.2, 0.1, seed=int(random.integers(9)))
+    )
     models = {f"m{i}": _machine(random) for i in range(int(random.integers(2, 5)))}
     qs, x = [], 0.0
     for model in models.values():
@@ -83,9 +90,9 @@ def _scene(random: Random) -> Simulation:
             if model.nq >= 6 and model.dof_names[0].endswith("x"):
                 q[:6] = place[0], float(ground.heights([place])[0]) + random.uniform(0.2, 1.0), place[1], 0.0, 0.0, 0.0
         qs.append(q)
-        x -= random.uniform(0.8, 2.6)
+        x -= random.uniform(2.4, 3.0)  # apart, so that they do not start in each other
     free = [i for i, model in enumerate(models.values()) if model.wheel_names]
-    pairs = zip(free, free[1:], strict=False) if random.uniform() < 0.5 else ()
+    pairs = itertools.pairwise(free) if random.uniform() < 0.5 else ()
     joined = RoverModel.join(models, loops=[_hitch(models, qs, pair) for pair in pairs])
     sim = Simulation(
         joined,
@@ -101,7 +108,7 @@ def _scene(random: Random) -> Simulation:
 def together(random: Random, ledger: Ledger) -> None:
     """Two to four machines of any shape and order, half of them hitched: driven alone, then in a batch, to the bit."""
     sim = _scene(random)
-    n_rovers, steps = int(random.integers(*BATCH)), 12
+    n_rovers, steps = int(random.integers(*BATCH)), 8
     limits = np.array(sim.model.wheel_torque_limits)
     starts = []
     for _ in range(n_rovers):
@@ -148,4 +155,4 @@ def _go(sim: Simulation, steps: int, ledger: Ledger) -> bool:
     return True
 
 
-REGIMES = [Regime("joined machines", together, 60, Bounds(not_converged=1e-2, slowest=4.0))]
+REGIMES = [Regime("joined machines", together, 40, Bounds(not_converged=1e-2, slowest=4.0))]
