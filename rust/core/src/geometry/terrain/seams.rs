@@ -29,6 +29,10 @@ const FLAT: f64 = 1e-5;
 /// Difference of two unit directions that count as one.
 const SAME_WAY: f64 = 1e-4;
 
+/// How far below the surface of the other side an edge is buried, in its rise: less than half, as
+/// its middle is looked at, and more than edges along the seam.
+const DEEP: f64 = 0.1;
+
 /// Cosine between the normals of two faces below which they lie back to back.
 const BACK: f64 = -0.9;
 
@@ -326,7 +330,7 @@ impl Seams {
         // What lies in the ground of the other side is no edge of the union.
         let is_flat = |x: &Vector3<f64>| at.normal.dot(x).abs() <= FLAT * x.norm();
         let (aside, within) = (at.outward * (4.0 * tolerance), 10.0 * tolerance);
-        let on_way = |x: &Vector3<f64>| place + x * 0.5;
+        let on_way = |x: &Vector3<f64>| place + x * 0.5 + Vector3::y() * (DEEP * x.y.abs());
         spokes.retain(|x| {
             let inside = on_way(x) + aside;
             is_flat(x) || !others.iter().any(|other| other.buries(&inside, within))
