@@ -110,7 +110,6 @@ def test_loads_do_not_depend_on_the_last_step() -> None:
     sim.set_wheel_torques([60.0, -60.0, 60.0, -60.0, 60.0, -60.0])
     sim.step(100)
     sim.set_wheel_torques([0.0] * 6)
-    sim.set_wheel_brakes([1e3] * 6) if hasattr(sim, "set_wheel_brakes") else None
     sim.step(400)
     other = Simulation(model, ground, friction=0.7)
     other.set_state(sim.q, np.zeros_like(sim.v))
@@ -122,7 +121,7 @@ def test_loads_do_not_depend_on_the_last_step() -> None:
 
 def test_straight_over_waves_the_count_is_that_of_the_rank() -> None:
     """Over waves the report said 0 where six wheels could push sideways against each other."""
-    x, z = np.meshgrid(np.arange(-2, 8, 0.05), np.arange(-2, 2, 0.05))
+    x, _ = np.meshgrid(np.arange(-2, 8, 0.05), np.arange(-2, 2, 0.05))
     ground = HeightField(0.05 * np.sin(x / 1.2), spacing=0.05, origin=(-2.0, -2.0))
     model = RoverModel.named("open-rover").replace(wheel_stiffness=0.0)
     counts = []
