@@ -90,7 +90,7 @@ def rigid_on_slope(solver: str = "auto", **options: Any) -> tuple[Simulation, An
 
 
 def test_every_solver_finds_the_same_loads_of_wheels_parked_across() -> None:
-    """The lateral forces of six rigid wheels were those at which the solver happened to stop, hundreds of newtons apart."""
+    """The lateral forces of six rigid wheels depended on the solver, by hundreds of newtons."""
     weight = 9.81 * RoverModel().mass
     first, report = rigid_on_slope()
     assert report.undetermined_loads == 6
