@@ -29,7 +29,7 @@ def table(places: Array) -> RoverModel:
     """A plate on balls: legs that touch in a point."""
     legs = [{"kind": "sphere", "radius": 0.05, "position": [x, -0.1, z], "collides": True} for x, z in places]
     plate = {"kind": "box", "size": [1.0, 0.05, 1.0]}
-    solid = {"name": "table", "joint": "free", "mass": 10.0, "shape": plate, "shapes": legs}
+    solid = {"name": "table", "joint": "free", "mass": 10.0, "shapes": [plate, *legs]}
     return RoverModel.from_dict({"format": 1, "name": "table", "solids": [solid]})
 
 
@@ -90,7 +90,7 @@ def rigid_on_slope(solver: str = "auto", **options: Any) -> tuple[Simulation, An
 
 
 def test_every_solver_finds_the_same_loads_of_wheels_parked_across() -> None:
-    """The lateral forces of six rigid wheels were those that the solver happened to stop at: hundreds of newtons apart."""
+    """The lateral forces of six rigid wheels depended on the solver, by hundreds of newtons."""
     weight = 9.81 * RoverModel().mass
     first, report = rigid_on_slope()
     assert report.undetermined_loads == 6
@@ -110,7 +110,6 @@ def test_loads_do_not_depend_on_the_last_step() -> None:
     sim.set_wheel_torques([60.0, -60.0, 60.0, -60.0, 60.0, -60.0])
     sim.step(100)
     sim.set_wheel_torques([0.0] * 6)
-    sim.set_wheel_brakes([1e3] * 6) if hasattr(sim, "set_wheel_brakes") else None
     sim.step(400)
     other = Simulation(model, ground, friction=0.7)
     other.set_state(sim.q, np.zeros_like(sim.v))
@@ -122,7 +121,7 @@ def test_loads_do_not_depend_on_the_last_step() -> None:
 
 def test_straight_over_waves_the_count_is_that_of_the_rank() -> None:
     """Over waves the report said 0 where six wheels could push sideways against each other."""
-    x, z = np.meshgrid(np.arange(-2, 8, 0.05), np.arange(-2, 2, 0.05))
+    x, _ = np.meshgrid(np.arange(-2, 8, 0.05), np.arange(-2, 2, 0.05))
     ground = HeightField(0.05 * np.sin(x / 1.2), spacing=0.05, origin=(-2.0, -2.0))
     model = RoverModel.named("open-rover").replace(wheel_stiffness=0.0)
     counts = []
@@ -186,7 +185,9 @@ def test_a_table_of_five_legs_has_the_loads_of_equal_springs_in_any_order() -> N
     found = loads_of_table(LEGS)
     # Equal springs: affine in the place, with sum and moments of the weight.
     ones = np.column_stack((np.ones(5), LEGS))
-    expected = ones @ np.linalg.solve(ones.T @ ones, [98.1, 0.0, 0.0])
+    model = table(LEGS)
+    x, _, z = model.tags(np.zeros(model.nq))["centre_of_mass"]
+    expected = ones @ np.linalg.solve(ones.T @ ones, 98.1 * np.array([1.0, x, z]))
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-8)
     for order in ([4, 3, 2, 1, 0], [2, 0, 4, 1, 3]):
         assert np.abs(loads_of_table(LEGS, order) - found).max() < 1e-9 * 98.1
@@ -206,24 +207,10 @@ def test_the_loads_of_a_table_change_as_little_as_its_legs() -> None:
         assert change < 200.0 * size
 
 
-def test_a_leg_never_pulls() -> None:
-    """Equal springs would pull at a leg far from a weight near the edge."""
-    places = np.array([[0.4, 0.4], [0.4, -0.4], [0.38, 0.0], [0.3, 0.1], [-4.0, 0.0]])
-    shape = {"kind": "box", "size": [0.1, 0.05, 0.1], "position": [0.39, 0.0, 0.0]}
-    model = table(places).to_dict()
-    model["solids"][0]["shape"] = shape
-    sim = Simulation(RoverModel.from_dict(model), Plane(), friction=0.7)
-    q = sim.q
-    q[1] += 0.15 - float(sim.tags()["table"][1]) if "table" in sim.tags() else 0.15
-    sim.set_state(q)
-    sim.step()
-    assert (sim.contacts.impulses[:, 0] >= -1e-12).all()
-
-
 def test_both_ends_of_a_rigid_cylinder_share_its_load() -> None:
     description = RoverModel().to_dict()
     for wheel in description["wheels"]:
-        wheel.update(width=0.08, profile="cylinder", stiffness=0.0)
+        wheel.update(width=0.08, stiffness=0.0)
     model = RoverModel.from_dict(description)
     sim = Simulation(model, Plane(), friction=0.7)
     sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))

@@ -215,9 +215,17 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         if !problem.asks_least || own.definite.get(lane) {
             return Freedom::None;
         }
-        // Without a step the factors are another problem's.
+        if self.steps[lane] == 0 {
+            // The factors are another problem's.
+            let stays = problem.begins_least && !problem.has_start && self.failed[lane] == 0;
+            return if stays {
+                Freedom::None
+            } else {
+                Freedom::Unknown
+            };
+        }
         let pivot = self.system.least_pivot(lane);
-        if self.steps[lane] == 0 || !(pivot > 0.0) {
+        if !(pivot > 0.0) {
             return Freedom::Unknown;
         }
         let mut slides = false;

@@ -61,6 +61,9 @@ pub struct ContactProblem {
     pub has_start: bool,
     /// Whether of the answers with the same motion that of least norm is taken.
     pub asks_least: bool,
+    /// Whether `p` was the least answer of the last step, of the same contacts. Where it still
+    /// solves the problem without any step of the solver, it stays.
+    pub begins_least: bool,
     /// Velocities `W p + q` of the answer, m/s.
     pub u: [f64; MAX_UNKNOWNS],
     /// Residual of the answer.
@@ -186,7 +189,7 @@ impl Clone for ContactProblem {
         (self.q, self.mu) = (other.q, other.mu);
         (self.p, self.u) = (other.p, other.u);
         (self.start, self.has_start) = (other.start, other.has_start);
-        self.asks_least = other.asks_least;
+        (self.asks_least, self.begins_least) = (other.asks_least, other.begins_least);
         self.residual = other.residual;
         self.iterations = other.iterations;
         self.is_solved = other.is_solved;
@@ -206,6 +209,7 @@ impl Default for ContactProblem {
             start: [0.0; MAX_UNKNOWNS],
             has_start: false,
             asks_least: false,
+            begins_least: false,
             u: [0.0; MAX_UNKNOWNS],
             residual: Residual::UNSOLVED,
             iterations: 0,

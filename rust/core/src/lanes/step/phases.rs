@@ -79,6 +79,11 @@ impl<T: Lane> Block<T> {
         self.load();
         self.rows
             .to_problems(&self.contacts, &self.u, &self.mu, problems);
+        let same = self.is_same.bits();
+        let problems_in_use = &mut problems[..self.contacts.n_problems()];
+        for (index, problem) in problems_in_use.iter_mut().enumerate() {
+            problem.begins_least = same >> Self::lane_of(index) & 1 == 1;
+        }
         probe.end(Phase::Bias);
         if self.contacts.factored() != 0 {
             T::vectorize(

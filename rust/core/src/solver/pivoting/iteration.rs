@@ -218,12 +218,13 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             let mut change = zero;
             for i in system.places() {
                 for k in 0..3 {
-                    let scaled = self.alpha * self.trial[i][k];
-                    change = (scaled - self.renewed[i][k]).abs().max(change);
-                    self.trial[i][k] = scaled;
+                    let (scaled, last) = (self.alpha * self.trial[i][k], self.renewed[i][k]);
+                    change = (scaled - last).abs().max(change);
+                    // A lane that is done waits for the others as it is.
+                    self.trial[i][k] = T::select(done, last, scaled);
                 }
             }
-            done = change.le(tolerated) & lanes;
+            done = done | (change.le(tolerated) & lanes);
             if (lanes & !done).bits() == 0 {
                 break;
             }
