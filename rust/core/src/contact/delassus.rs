@@ -103,13 +103,11 @@ impl ContactSystem {
         self.W[3 * c * (size + 1)]
     }
 
-    /// Adds a number for each contact (n_c), 1/kg, to the three entries on W's diagonal.
-    pub fn soften(&mut self, diagonal: impl Iterator<Item = f64>) {
+    /// Adds numbers along n, t, b of each contact (n_c), 1/kg, to W's diagonal.
+    pub fn soften(&mut self, diagonal: impl Iterator<Item = [f64; 3]>) {
         let size = 3 * self.n_contacts();
-        for (c, term) in diagonal.enumerate() {
-            for i in 3 * c..3 * (c + 1) {
-                self.W[i * (size + 1)] += term;
-            }
+        for (i, term) in diagonal.flatten().enumerate() {
+            self.W[i * (size + 1)] += term;
         }
     }
 

@@ -12,32 +12,74 @@
 //! Compliance is thus a term on the diagonal of W and a shift of the free velocity. Its limit for
 //! k → ∞ is Signorini's law, and it is stable for every k and every step.
 //!
-//! Along the surface the contact yields by the same k and d to changes of friction, and what slips
-//! is the rest: Coulomb's law holds between p_T and `u_T + (p_T − p_T⁻) / (h (h k + d))`, with the
-//! impulse p_T⁻ of the step before. In steady rolling and at rest the two impulses are equal, so
-//! nothing creeps. The term is the same as that along the normal: W has a positive diagonal, and a
-//! machine on more contacts than it needs has one set of loads.
+//! Along the surface a spring k_T acts between the wheel and the tread that touches, and what slips
+//! is the rest. Tread that enters the contact is not deflected yet: a wheel that travels at V over
+//! its tread loses its deflection y over the relaxation length σ, `ẏ = u_T − V y/σ` as long as
+//! nothing slips. With `f_T = −k_T y` at the end of the step and the impulse p_T⁻ of the step
+//! before, Coulomb's law holds between p_T and
 //!
-//! Source: Anitescu and Potra 2002, *A time-stepping method for stiff multibody dynamics with
-//! contact and friction*, IJNME 55, 753–784.
+//! ```text
+//! u_T + ((1 + h V/σ) p_T − p_T⁻) / (h² k_T)
+//! ```
+//!
+//! In steady rolling `u_T/V = −f_T/(k_T σ)`: a side force needs a slip angle, and k_T σ is the
+//! cornering stiffness. A parked wheel has V = 0 and does not creep. Where the last step is not
+//! known, the contact is taken in steady rolling, `p_T⁻ = p_T`. The limit for k → ∞ is the rigid
+//! wheel. Along the surface there is no damper: relaxation and the implicit step take its place.
+//! W has a positive diagonal, and a machine on more contacts than it needs has one set of loads.
+//!
+//! Sources: Anitescu and Potra 2002, *A time-stepping method for stiff multibody dynamics with
+//! contact and friction*, IJNME 55, 753–784; for the relaxation Pacejka 2012, *Tire and Vehicle
+//! Dynamics*, ch. 7.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::scalar::Lane;
 
-/// Spring and damper of a contact, the same along the normal and along the surface.
+/// Tread of a wheel that yields: what its description says of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tread {
+    /// Normal stiffness k, N/m.
+    pub stiffness: f64,
+    /// Normal damping d, N s/m.
+    pub damping: f64,
+    /// Stiffness along the surface relative to the normal one, k_T/k.
+    pub tangential_ratio: f64,
+    /// Relaxation length σ, m.
+    pub relaxation_length: f64,
+}
+
+impl Tread {
+    /// The contact of a wheel that travels at a speed V (m/s) over its tread.
+    #[inline(always)]
+    #[must_use]
+    pub fn rolling<T: Lane>(&self, travel: T) -> Compliance<T> {
+        Compliance {
+            stiffness: travel.like(self.stiffness),
+            damping: travel.like(self.damping),
+            tangential: travel.like(self.tangential_ratio * self.stiffness),
+            fading: travel * travel.like(1.0 / self.relaxation_length),
+        }
+    }
+}
+
+/// Springs and damper of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compliance<T = f64> {
     /// k, N/m.
     pub stiffness: T,
     /// d, N s/m.
     pub damping: T,
+    /// k_T, N/m.
+    pub tangential: T,
+    /// V/σ, 1/s.
+    pub fading: T,
 }
 
 /// Law of one contact over a step: Coulomb's law between impulse p and `u + diagonal p + shift`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Yielding<T = f64> {
-    /// Term on the diagonal of W, 1/kg; 0 for a rigid contact.
-    pub diagonal: T,
+    /// Terms on the diagonal of W along n, t, b, 1/kg; 0 for a rigid contact.
+    pub diagonal: [T; 3],
     /// Shift of the free velocity along n, t, b, m/s.
     pub shift: [T; 3],
     /// Gap that the law knows, m.
@@ -46,6 +88,8 @@ pub struct Yielding<T = f64> {
     pub unexplained: T,
     /// k, N/m.
     stiffness: T,
+    /// 1/(h² k_T), 1/kg; 0 where the last step is not known.
+    tangential: T,
     /// Tangential impulse at the start, N s.
     friction: [T; 2],
 }
@@ -53,46 +97,76 @@ pub struct Yielding<T = f64> {
 /// Deflection that counts as elastic whatever the forces, m.
 const SLACK: f64 = 1e-6;
 
-impl Compliance {
+impl<T: Lane> Compliance<T> {
     /// Of two sides in series, of which a rigid one is `None`.
+    #[inline(always)]
     #[must_use]
     pub fn in_series(first: Option<Self>, second: Option<Self>) -> Option<Self> {
         match (first, second) {
             (Some(a), Some(b)) => {
+                let one = a.stiffness.like(1.0);
                 let share = b.stiffness / (a.stiffness + b.stiffness);
+                let rest = one - share;
+                let along = b.tangential / (a.tangential + b.tangential);
                 Some(Self {
                     stiffness: a.stiffness * share,
                     // Both deflect in proportion to their springs.
-                    damping: a.damping * share * share + b.damping * (1.0 - share) * (1.0 - share),
+                    damping: a.damping * share * share + b.damping * rest * rest,
+                    tangential: a.tangential * along,
+                    fading: a.fading * along + b.fading * (one - along),
                 })
             }
             (one, other) => one.or(other),
         }
     }
-}
 
-impl<T: Lane> Compliance<T> {
+    /// The other one where the mask is true.
+    #[inline(always)]
+    #[must_use]
+    pub fn or(self, here: T::Mask, other: &Self) -> Self {
+        let both = |own: T, other: T| T::select(here, other, own);
+        Self {
+            stiffness: both(self.stiffness, other.stiffness),
+            damping: both(self.damping, other.damping),
+            tangential: both(self.tangential, other.tangential),
+            fading: both(self.fading, other.fading),
+        }
+    }
+
     /// The law over a step of `h`, s, with the scheme's `theta`.
     ///
     /// - `gap`, `u_N`: gap (m) and normal velocity (m/s) at the pose that the step reaches without
     ///   impulses. The law begins with the gap less θ h u_N: a stiff contact then comes to rest
     ///   within a step.
-    /// - `before`: impulse of the last step, N s, in the contact's frame. Where none is remembered
-    ///   it is the machine's weight times h along the normal.
+    /// - `before`: impulse of the last step, N s, in the contact's frame.
+    /// - `unknown`: where no last step is remembered, and the normal impulse that a contact may
+    ///   have had there: the machine's weight times h.
     ///
     /// A body that strikes a stiff contact penetrates it within the step by more than any spring
     /// would allow. That part is not elastic and is not given back: it is `unexplained`, and
     /// position projection removes it. A deflection that the impulse before explains is elastic.
     #[inline(always)]
     #[must_use]
-    pub fn over(&self, (h, theta): (T, T), gap: T, u_N: T, before: [T; 3]) -> Yielding<T> {
-        let Self { stiffness, damping } = *self;
+    pub fn over(
+        &self,
+        (h, theta): (T, T),
+        gap: T,
+        u_N: T,
+        before: [T; 3],
+        (unknown, weight): (T::Mask, T),
+    ) -> Yielding<T> {
+        let Self {
+            stiffness,
+            damping,
+            tangential,
+            fading,
+        } = *self;
         let (zero, one) = (h.like(0.0), h.like(1.0));
         let moved = h * u_N;
         let deflection = (moved - gap).max(zero);
         let gap = gap - theta * moved;
         // The damper bore a part of the force while the deflection grew.
-        let force = before[0] / h;
+        let force = T::select(unknown, weight, before[0]) / h;
         let by_force = (force + damping * u_N).max(zero).min(force) / stiffness;
         let elastic = (h.like(2.0) * deflection).min(by_force);
         let known = gap.max(-(elastic + h.like(SLACK)));
@@ -103,12 +177,20 @@ impl<T: Lane> Compliance<T> {
         // Of an impact's friction only what the deflection holds is elastic.
         let held = (deflection / by_force.max(h.like(f64::MIN_POSITIVE))).min(one);
         let friction = [held * before[1], held * before[2]];
+        let steady = fading / (h * tangential);
+        let tangential = T::select(unknown, zero, one / (h * h * tangential));
+        let along = tangential + steady;
         Yielding {
-            diagonal,
-            shift: [approach, -diagonal * friction[0], -diagonal * friction[1]],
+            diagonal: [diagonal, along, along],
+            shift: [
+                approach,
+                -tangential * friction[0],
+                -tangential * friction[1],
+            ],
             gap: known,
             unexplained: gap - known,
             stiffness,
+            tangential,
             friction,
         }
     }
@@ -119,13 +201,21 @@ impl<T: Lane> Yielding<T> {
     #[must_use]
     pub fn none(zero: T) -> Self {
         Self {
-            diagonal: zero,
+            diagonal: [zero; 3],
             shift: [zero; 3],
             gap: zero,
             unexplained: zero,
             stiffness: zero,
+            tangential: zero,
             friction: [zero; 2],
         }
+    }
+
+    /// Where the contact yields.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_soft(&self) -> T::Mask {
+        self.stiffness.like(0.0).lt(self.stiffness)
     }
 
     /// The law where the mask is true, that of a rigid contact elsewhere.
@@ -134,13 +224,32 @@ impl<T: Lane> Yielding<T> {
     pub fn only(&self, here: T::Mask) -> Self {
         let only = |x: T| T::select(here, x, x.like(0.0));
         Self {
-            diagonal: only(self.diagonal),
+            diagonal: self.diagonal.map(only),
             shift: self.shift.map(only),
             gap: only(self.gap),
             unexplained: only(self.unexplained),
             stiffness: only(self.stiffness),
+            tangential: only(self.tangential),
             friction: self.friction.map(only),
         }
+    }
+
+    /// What the problem's velocity has more than the contact's at the impulse `p`, m/s.
+    #[inline(always)]
+    #[must_use]
+    pub fn yielded(&self, p: [T; 3]) -> [T; 3] {
+        [0, 1, 2].map(|k| self.shift[k] + self.diagonal[k] * p[k])
+    }
+
+    /// Work of the tangential impulse of `p` that neither moves the machine nor is stored, J,
+    /// negative: slip, and the deflection that leaves the contact with the tread. `u`: velocities
+    /// after the step.
+    #[inline(always)]
+    #[must_use]
+    pub fn slip_work(&self, u: [T; 3], p: [T; 3]) -> T {
+        let more = self.yielded(p);
+        let slip = p[1] * (u[1] + more[1]) + p[2] * (u[2] + more[2]);
+        slip - (self.diagonal[1] - self.tangential) * (p[1] * p[1] + p[2] * p[2])
     }
 
     /// Energy that a step of `h` may gain by the contact, J. `u_N`: normal velocities before and
@@ -148,7 +257,7 @@ impl<T: Lane> Yielding<T> {
     ///
     /// It is what the springs give off, negative where they store energy. The normal force is that
     /// at the end of the step and acts over all of it: where it does more work, `p_N (u_N + u_N⁺) /
-    /// 2`, that counts.
+    /// 2`, that counts. What leaves the contact with the tread is not given off.
     #[inline(always)]
     #[must_use]
     pub fn supplied(&self, h: T, u_N: [T; 2], p: [T; 3]) -> T {
@@ -159,6 +268,6 @@ impl<T: Lane> Yielding<T> {
         let work = half * p[0] * (u_N[0] + u_N[1]);
         let [t, b] = self.friction;
         let sheared = (t * t + b * b) - (p[1] * p[1] + p[2] * p[2]);
-        released.max(work) + half * self.diagonal * sheared
+        released.max(work) + half * self.tangential * sheared
     }
 }
