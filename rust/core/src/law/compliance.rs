@@ -271,3 +271,113 @@ impl<T: Lane> Yielding<T> {
         released.max(work) + half * self.tangential * sheared
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const TREAD: Tread = Tread {
+        stiffness: 2e5,
+        damping: 900.0,
+        tangential_ratio: 0.7,
+        relaxation_length: 0.012,
+    };
+
+    /// Law of a contact at rest on its spring, with a tangential impulse before.
+    fn law(travel: f64, h: f64, before: [f64; 2]) -> Yielding {
+        let load = 50.0;
+        let gap = -load / TREAD.stiffness;
+        let before = [load * h, before[0], before[1]];
+        TREAD
+            .rolling(travel)
+            .over((h, 0.5), gap, 0.0, before, (false, 0.0))
+    }
+
+    /// The tangential impulse that lets nothing slip at a velocity `u`.
+    fn sticking(law: &Yielding, u: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| -(u[k] + law.shift[k + 1]) / law.diagonal[k + 1])
+    }
+
+    #[test]
+    fn a_rolling_wheel_comes_to_its_cornering_stiffness_at_every_step() {
+        let (travel, u) = (0.8, [1e-3, -2e-3]);
+        for h in [1e-4, 1e-3, 5e-3, 2e-2] {
+            let mut p = [0.0; 2];
+            for _ in 0..5000 {
+                p = sticking(&law(travel, h, p), u);
+            }
+            let stiffness = TREAD.stiffness * TREAD.tangential_ratio * TREAD.relaxation_length;
+            for k in 0..2 {
+                let expected = -stiffness * u[k] / travel;
+                assert!((p[k] / h / expected - 1.0).abs() < 1e-9, "{h}: {p:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_deflection_fades_over_the_relaxation_length() {
+        // 2400 steps are a way of the relaxation length.
+        let (travel, h) = (0.5, 1e-5);
+        let mut p = [1e-4, 0.0];
+        let start = p[0];
+        for _ in 0..2400 {
+            p = sticking(&law(travel, h, p), [0.0; 2]);
+        }
+        assert!((p[0] / start - (-1.0_f64).exp()).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_parked_wheel_keeps_its_force_and_does_not_creep() {
+        let before = [0.03, -0.01];
+        let law = law(0.0, 5e-3, before);
+        let slip = law.yielded([0.25, before[0], before[1]]);
+        assert!(slip[1].abs() < 1e-16 && slip[2].abs() < 1e-16, "{slip:?}");
+    }
+
+    #[test]
+    fn without_a_last_step_a_wheel_is_in_steady_rolling() {
+        let (travel, h, u) = (0.8, 5e-3, [1e-3, 0.0]);
+        let spring = TREAD.rolling(travel);
+        let law = spring.over((h, 0.5), -2e-4, 0.0, [0.0; 3], (true, 1.0));
+        let stiffness = TREAD.stiffness * TREAD.tangential_ratio * TREAD.relaxation_length;
+        let p = sticking(&law, u);
+        assert!((p[0] / h / (-stiffness * u[0] / travel) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_equal_sides_yield_twice_as_much() {
+        let own: Compliance = TREAD.rolling(0.3);
+        let both = Compliance::in_series(Some(own), Some(own)).unwrap();
+        assert!((both.stiffness / own.stiffness - 0.5).abs() < 1e-15);
+        assert!((both.tangential / own.tangential - 0.5).abs() < 1e-15);
+        assert!((both.damping / own.damping - 0.5).abs() < 1e-15);
+        assert!((both.fading / own.fading - 1.0).abs() < 1e-15);
+        assert_eq!(Compliance::in_series(Some(own), None), Some(own));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
+
+        /// The contact took more from the machine than it stored, and what left with the tread was
+        /// neither stored nor booked.
+        #[test]
+        fn what_the_contact_takes_is_stored_or_booked_and_never_created(
+            before in prop::array::uniform2(-0.1..0.1f64),
+            u in prop::array::uniform2(-0.1..0.1f64),
+            travel in 0.0..3.0f64,
+            h in 1e-4..0.02f64,
+        ) {
+            let law = law(travel, h, before);
+            let [t, b] = sticking(&law, u);
+            let p = [0.0, t, b];
+            let taken = -(t * u[0] + b * u[1]);
+            let stored = -law.supplied(h, [0.0, 0.0], p);
+            let booked = -law.slip_work([0.0, u[0], u[1]], p);
+            let size = taken.abs() + stored.abs() + booked.abs();
+            prop_assert!(booked >= -1e-12 * size);
+            // The rest is what the implicit step takes.
+            prop_assert!(taken - stored - booked >= -1e-9 * size);
+        }
+    }
+}
