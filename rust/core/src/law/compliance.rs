@@ -24,7 +24,7 @@
 //!
 //! In steady rolling `u_T/V = −f_T/(k_T σ)`: a side force needs a slip angle, and k_T σ is the
 //! cornering stiffness. A parked wheel has V = 0 and does not creep. Where the last step is not
-//! known, the contact is taken in steady rolling, `p_T⁻ = p_T`. The limit for k → ∞ is the rigid
+//! known, the contact is taken in steady rolling, `p_T⁻ = p_T`, up to `UNKNOWN`. The limit for k → ∞ is the rigid
 //! wheel. Along the surface there is no damper: relaxation and the implicit step take its place.
 //! W has a positive diagonal, and a machine on more contacts than it needs has one set of loads.
 //!
@@ -96,6 +96,10 @@ pub struct Yielding<T = f64> {
 
 /// Deflection that counts as elastic whatever the forces, m.
 const SLACK: f64 = 1e-6;
+
+/// Share of the spring along the surface that acts where the last step is not known. It makes loads
+/// unique; a rover parked across a slope of 10 degrees creeps by 0.1 mm/s if no step is remembered.
+const UNKNOWN: f64 = 0.01;
 
 impl<T: Lane> Compliance<T> {
     /// Of two sides in series, of which a rigid one is `None`.
@@ -177,9 +181,10 @@ impl<T: Lane> Compliance<T> {
         // Of an impact's friction only what the deflection holds is elastic.
         let held = (deflection / by_force.max(h.like(f64::MIN_POSITIVE))).min(one);
         let friction = [held * before[1], held * before[2]];
+        let spring = one / (h * h * tangential);
         let steady = fading / (h * tangential);
-        let tangential = T::select(unknown, zero, one / (h * h * tangential));
-        let along = tangential + steady;
+        let along = steady + T::select(unknown, spring * h.like(UNKNOWN), spring);
+        let tangential = T::select(unknown, zero, spring);
         Yielding {
             diagonal: [diagonal, along, along],
             shift: [
@@ -342,7 +347,7 @@ mod tests {
         let law = spring.over((h, 0.5), -2e-4, 0.0, [0.0; 3], (true, 1.0));
         let stiffness = TREAD.stiffness * TREAD.tangential_ratio * TREAD.relaxation_length;
         let p = sticking(&law, u);
-        assert!((p[0] / h / (-stiffness * u[0] / travel) - 1.0).abs() < 1e-12);
+        assert!((p[0] / h / (-stiffness * u[0] / travel) - 1.0).abs() < 0.05);
     }
 
     #[test]

@@ -349,7 +349,7 @@ impl ModelDescription {
     pub fn rover() -> Self {
         let mut rover = Self::gallery_rover();
         for wheel in &mut rover.wheels {
-            wheel.make_rigid();
+            wheel.forget_tread();
         }
         rover
     }

@@ -13,9 +13,9 @@ const DEFLECTION: f64 = 3e-5;
 const GRAVITY: f64 = 9.81;
 
 impl WheelDescription {
-    /// Takes its tread away.
-    pub(in crate::multibody) fn make_rigid(&mut self) {
-        self.stiffness = Some(0.0);
+    /// Leaves out what is stated of its tread.
+    pub(in crate::multibody) fn forget_tread(&mut self) {
+        self.stiffness = None;
         self.damping = None;
         self.tangential_ratio = None;
         self.relaxation_length = None;

@@ -42,10 +42,9 @@ impl Changes {
             wheel.torque_limit = self.wheel_torque_limit.unwrap_or(wheel.torque_limit);
             if let Some(stiffness) = self.wheel_stiffness {
                 if stiffness == 0.0 {
-                    wheel.make_rigid();
-                } else {
-                    wheel.stiffness = Some(stiffness);
+                    wheel.forget_tread();
                 }
+                wheel.stiffness = Some(stiffness);
             }
             wheel.damping = self.wheel_damping.or(wheel.damping);
             wheel.tangential_ratio = self.wheel_tangential_ratio.or(wheel.tangential_ratio);
