@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym.mechanics import HeightField, Plane, RoverModel, Simulation
+from rover_gym.mechanics import HeightField, RoverModel, Simulation
 
 RADIUS = 0.1
 
@@ -49,7 +49,7 @@ def rolling(model: RoverModel, speed: float, step: float, turned: float = 0.0) -
 @pytest.mark.parametrize("step", [0.005, 0.001])
 @pytest.mark.parametrize("ahead", [0.02, 0.005, -0.005, -0.001])
 def test_a_rigid_wheel_turns_itself_at_the_rate_v_over_e(ahead: float, step: float) -> None:
-    """Lateral forces over waves grew at a rate that no solver and no gain changes, and elsewhere changed sign in every step."""
+    """Lateral forces over waves grew whatever the solver and the gain, and elsewhere changed sign in every step."""
     speed = 0.3
     sim = rolling(caster(ahead), speed, step)
     steering = np.array(sim.linearise().a)[np.ix_([2, 6], [2, 6])]
@@ -65,7 +65,7 @@ def test_a_rigid_wheel_turns_itself_at_the_rate_v_over_e(ahead: float, step: flo
 
 
 def test_a_rigid_wheel_that_trails_by_less_than_a_step_changes_sides_in_every_step() -> None:
-    """Where the touching point trails the steering axis by 1 mm at 0.3 m/s, forces changed sign in nine of ten steps."""
+    """Where the touching point trails by 1 mm at 0.3 m/s, forces changed sign in nine of ten steps."""
     for step, alternates in ((0.005, True), (0.001, False)):
         sim = rolling(caster(-0.001), 0.3, step, turned=1e-6)
         lateral = []
