@@ -305,6 +305,8 @@ class RoverModel:
         contact_radius: float | None = None,
         wheel_stiffness: float | None = None,
         wheel_damping: float | None = None,
+        wheel_tangential_ratio: float | None = None,
+        wheel_relaxation_length: float | None = None,
         masses: Mapping[str, float] | Sequence[float] | None = None,
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
@@ -320,8 +322,12 @@ class RoverModel:
             contact_radius: Radius at which the wheels touch the ground, m. Shape and inertia do not
                 change.
             wheel_stiffness: Normal contact stiffness of all wheels, N/m; 0 for rigid wheels, which
-                have no damping either.
+                have no damping, tangential ratio and relaxation length either.
             wheel_damping: Normal contact damping of all wheels, N s/m.
+            wheel_tangential_ratio: Contact stiffness of all wheels along the surface relative to
+                the normal one.
+            wheel_relaxation_length: Way of rolling over which the deflection of all wheels along
+                the surface is renewed, m.
             masses: Masses by name of the solid, or a list with one for each solid, kg. Inertias
                 scale with them.
             steering_stiffness: Stiffness of every steering controller, N m/rad.

@@ -93,7 +93,7 @@ def moving_slider_crank() -> Simulation:
 
 
 def rolling_with_a_bar(**options) -> Simulation:
-    model = with_a_bar()
+    model = with_a_bar().replace(wheel_stiffness=0.0)
     sim = Simulation(model, **options)
     q, v = model.resting_pose(Plane(), (0.0, 0.0), 0.0), np.zeros(model.nv)
     v[0] = 0.05

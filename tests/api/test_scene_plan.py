@@ -29,7 +29,11 @@ from rover_gym.planar import MirroredRoverSimulation
 PARTS = ["ground", "steering", "base", "scheme", "contact solver", "step", "steps", "in a batch"]
 
 
+RIGID = RoverModel().replace(wheel_stiffness=0.0)
+
+
 def straight(terrain: Plane | SphereField | None = None, **facts: object) -> Scene:
+    facts.setdefault("model", RIGID)
     return Scene(terrain or Plane(), steered=False, equal_torques=True, **facts)  # type: ignore[arg-type]
 
 
@@ -70,7 +74,7 @@ def test_a_scene_that_excludes_nothing_gets_the_whole_model() -> None:
     ],
 )
 def test_only_what_is_excluded_is_left_out(facts: dict[str, object], kind: str) -> None:
-    made = plan(Scene(**facts))  # type: ignore[arg-type]
+    made = plan(Scene(model=RIGID, **facts))  # type: ignore[arg-type]
     assert made.kind == kind
     assert [row["part"] for row in made.explain()] == PARTS
     simulation = made.simulation()
@@ -109,7 +113,7 @@ def test_nothing_is_welded_where_wheels_may_turn_by_themselves() -> None:
     lopsided = start.copy()
     lopsided[11] = 0.1  # the left bogie alone
     assert plan(straight(start=lopsided)).kind == "full"
-    description = RoverModel().to_dict()
+    description = RIGID.to_dict()
     wheel = next(solid for solid in description["solids"] if solid["name"] == "wheel_ML")
     wheel["position"] = [0.02, -0.15, 0.0]
     trailing = plan(straight(model=RoverModel.from_dict(description)))
@@ -193,7 +197,7 @@ def test_what_was_left_out_is_refused() -> None:
 
 
 def test_a_planar_rover_that_tips_over_says_so() -> None:
-    made = plan(straight(model=RoverModel().replace(motor=None)))
+    made = plan(straight(model=RIGID.replace(motor=None)))
     start = made.start.copy()
     start[1] += 2.0
     rover = replace(made, start=start).rover()
@@ -267,10 +271,17 @@ def test_turned_wheels_at_the_start_contradict_a_scene_without_steering() -> Non
 
 
 def test_a_rover_that_is_not_its_mirror_image_is_no_planar_one() -> None:
-    model = RoverModel().replace(masses={"left_bogie": 60.0})
+    model = RIGID.replace(masses={"left_bogie": 60.0})
     made = plan(straight(model=model))
     assert made.kind == "welded"
     assert "left_bogie" in next(d.reason for d in made.decisions if d.part == "base")
+
+
+def test_wheels_that_yield_have_no_planar_image() -> None:
+    """The planar image has rigid wheels: a straight drive ended 3 mm from that of the gallery's rover."""
+    made = plan(straight(model=RoverModel()))
+    assert made.kind == "welded"
+    assert "yield" in next(d.reason for d in made.decisions if d.part == "base")
 
 
 def test_every_economy_is_measured_against_its_bound() -> None:

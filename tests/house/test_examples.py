@@ -28,6 +28,7 @@ PAGES = (
     "docs/training.md",
     "docs/vector.md",
     "docs/watching.md",
+    "docs/wheel-forces.md",
     "docs/your-map.md",
     "docs/several-machines.md",
     "docs/your-rover.md",

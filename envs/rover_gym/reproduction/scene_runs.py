@@ -87,8 +87,9 @@ STEERING_DAMPING = 1.5  # N m s/rad
 
 
 def report_model() -> RoverModel:
-    """The rover of the report's runs, whose wheel torque does not depend on speed."""
+    """The rover of the report's runs: rigid wheels, whose torque does not depend on speed."""
     return RoverModel().replace(
+        wheel_stiffness=0.0,
         contact_radius=WHEEL_RADIUS,
         masses=MASSES,
         steering_stiffness=STEERING_STIFFNESS,

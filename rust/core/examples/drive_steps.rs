@@ -1,8 +1,9 @@
 //! A drive in a curve, for counting instructions:
-//! `valgrind --tool=callgrind drive_steps 1000 [linearised|newton] [spheres]`.
+//! `valgrind --tool=callgrind drive_steps 1000 [linearised|newton] [spheres] [rigid|yielding]`.
 //!
 //! Arguments: number of 5 ms steps (after 400 of run-in), the variant, and the number of spheres
-//! just below the ground, which the search visits and the wheels never touch.
+//! just below the ground, which the search visits and the wheels never touch; the wheels, rigid
+//! unless they are to yield as the gallery's.
 
 use std::sync::Arc;
 
@@ -39,7 +40,12 @@ fn main() -> Result<(), StepError> {
     } else {
         Variant::Linearised
     };
-    let model = Arc::new(Model::rover());
+    let yields = arguments.get(4).is_some_and(|v| v == "yielding");
+    let model = Arc::new(if yields {
+        Model::gallery_rover()
+    } else {
+        Model::rover()
+    });
     let mut start = Configuration::zero(&model);
     start.position.y = 0.35;
     let options = StepOptions {

@@ -187,7 +187,7 @@ impl EpisodeRules {
         String,
     )> {
         let sizes = Sizes {
-            model: &Model::rover(),
+            model: &Model::gallery_rover(),
             actions: 12,
             goals: 1,
             has_battery: false,

@@ -184,7 +184,7 @@ fn not_finite<'py>(
 impl RoverModel {
     #[new]
     fn new() -> Self {
-        Arc::new(Model::rover()).into()
+        Arc::new(Model::gallery_rover()).into()
     }
 
     /// Reads a model from TOML text.
@@ -324,8 +324,12 @@ impl RoverModel {
     ///     contact_radius: Radius at which the wheels touch the ground, m. Shape and inertia do not
     ///         change.
     ///     wheel_stiffness: Normal contact stiffness of all wheels, N/m; 0 for rigid wheels, which
-    ///         have no damping either.
+    ///         have no damping, tangential ratio and relaxation length either.
     ///     wheel_damping: Normal contact damping of all wheels, N s/m.
+    ///     wheel_tangential_ratio: Contact stiffness of all wheels along the surface relative to
+    ///         the normal one.
+    ///     wheel_relaxation_length: Way of rolling over which the deflection of all wheels along
+    ///         the surface is renewed, m.
     ///     masses: Masses by name of the solid, or a list with one for each solid, kg. Inertias
     ///         scale with them.
     ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
@@ -338,7 +342,7 @@ impl RoverModel {
     /// Raises:
     ///     ModelError: A number is out of range, there is no solid of a given name, or
     ///         `wheel_radius` is given and the solid of a wheel is not a disc.
-    #[pyo3(signature = (**changes), text_signature = "($self, *, wheel_radius=None, contact_radius=None, wheel_stiffness=None, wheel_damping=None, masses=None, steering_stiffness=None, steering_damping=None, \
+    #[pyo3(signature = (**changes), text_signature = "($self, *, wheel_radius=None, contact_radius=None, wheel_stiffness=None, wheel_damping=None, wheel_tangential_ratio=None, wheel_relaxation_length=None, masses=None, steering_stiffness=None, steering_damping=None, \
         wheel_torque_limit=None, mass_scale=None, motor=...)")]
     fn replace(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> Result<Self> {
         let given = Named::keywords(py, changes)?.of(Kind::Model);
@@ -352,6 +356,8 @@ impl RoverModel {
             contact_radius: given.maybe("contact_radius")?,
             wheel_stiffness: given.maybe("wheel_stiffness")?,
             wheel_damping: given.maybe("wheel_damping")?,
+            wheel_tangential_ratio: given.maybe("wheel_tangential_ratio")?,
+            wheel_relaxation_length: given.maybe("wheel_relaxation_length")?,
             masses: masses.unwrap_or_default(),
             mass_scale: given.maybe("mass_scale")?,
             steering_stiffness: given.maybe("steering_stiffness")?,

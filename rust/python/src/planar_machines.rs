@@ -191,7 +191,7 @@ impl MirroredRoverSimulation {
         });
         let inner = model
             .transpose()?
-            .map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
+            .map_or_else(|| Arc::new(Model::gallery_rover()), |m| m.inner);
         let rover = MirroredRover::new(&inner).map_err(|e| border(Kind::Model, &e))?;
         let own = Self {
             joints: rover.joints(),

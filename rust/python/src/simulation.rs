@@ -148,7 +148,7 @@ impl Simulation {
     ) -> Result<PyClassInitializer<Self>> {
         let given = Named::keywords(py, options)?;
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
-        let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
+        let model = model.map_or_else(|| Arc::new(Model::gallery_rover()), |m| m.inner);
         let terrain = match terrain {
             None => DrawnGround::Plane(Plane::ground()),
             Some(given) => terrain::parse(given)?,

@@ -112,11 +112,11 @@ impl ContactSystem {
         self.W[3 * c * (size + 1)]
     }
 
-    /// Adds a number for each contact (n_c), 1/kg, to the three entries on W's diagonal.
-    pub fn soften(&mut self, diagonal: impl Iterator<Item = f64>) {
+    /// Adds numbers along n, t, b of each contact (n_c), 1/kg, to W's diagonal.
+    pub fn soften(&mut self, diagonal: impl Iterator<Item = [f64; 3]>) {
         let size = 3 * self.n_contacts();
-        for (c, term) in diagonal.enumerate() {
-            for k in 0..3 {
+        for (c, terms) in diagonal.enumerate() {
+            for (k, term) in terms.into_iter().enumerate() {
                 let own = &mut self.W[(3 * c + k) * (size + 1)];
                 // Of a row that is held only this is left.
                 let is_held = term > 0.0 && self.held.get(c).is_some_and(|held| held[k]);

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Disc, Ellipsoid, Hull, OrientedBox, PlacedShape, Roller, Sphere};
-use crate::law::compliance::Compliance;
+use crate::law::compliance::Tread;
 use crate::multibody::{Collider, ColliderForm, Kinematics, Model, Wheel};
 
 /// A part of the machine that can be in contact.
@@ -109,14 +109,18 @@ impl Part {
         }
     }
 
-    /// Spring and damper of its surface; `None` if it is rigid.
+    /// Tread of a wheel that yields, and the wheel as [`Mechanism::travel`] takes it; `None` if the
+    /// part is rigid.
+    ///
+    /// [`Mechanism::travel`]: crate::multibody::Mechanism::travel
     #[inline]
     #[must_use]
-    pub fn compliance(self, model: &Model) -> Option<Compliance> {
-        match self {
-            Self::Wheel(i) => model.wheels()[i].compliance,
-            _ => None,
-        }
+    pub(crate) fn tread(self, model: &Model) -> Option<(Tread, (usize, [f64; 3], f64))> {
+        let Self::Wheel(i) = self else {
+            return None;
+        };
+        let wheel = &model.wheels()[i];
+        Some((wheel.tread?, (wheel.body, wheel.axle.into(), wheel.radius)))
     }
 
     /// Name of its material; empty for a joint.

@@ -120,7 +120,7 @@ impl Audit {
             return Verdict::Sound;
         };
         ws.audited.energy = None;
-        let contact_work = contact_work::<S>(options, start.v, warm_start, ws);
+        let contact_work = contact_work::<S>(start.v, warm_start, ws);
         let Balance {
             after,
             excess,
@@ -419,7 +419,7 @@ fn balance<S: MechanicalSystem>(
 fn supplied_by_contacts<S: MechanicalSystem>(options: &StepOptions, ws: &ScratchOf<S>) -> f64 {
     let d = S::DIMENSION.components();
     let laws = ws.yielding.iter().enumerate();
-    laws.filter(|(_, law)| law.diagonal > 0.0)
+    laws.filter(|(_, law)| law.is_soft())
         .map(|(i, law)| {
             let mut p = [0.0; 3];
             p[..d].copy_from_slice(&ws.p[d * i..][..d]);

@@ -16,7 +16,7 @@ use super::contact_modes::{Answer, HeldLaw};
 use super::mechanical_system::{MechanicalSystem, UnilateralContact};
 use super::options::{Stabilisation, StepOptions};
 use super::scratch::ScratchOf;
-use super::step_contacts::{shift, yielded};
+use super::step_contacts::{shift, softness};
 use crate::law::compliance::Yielding;
 use crate::problem::Operator;
 
@@ -70,7 +70,6 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         } else {
             None
         };
-        let is_soft = |law: &Yielding| law.diagonal > 0.0;
         Some(Self {
             contacts: ws.contacts.clone(),
             answer: law.answer(W, &is_common),
@@ -78,7 +77,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
             projection,
             W: W.to_vec(),
             response: response(system, size),
-            yields: ws.yielding.iter().map(is_soft).collect(),
+            yields: ws.yielding.iter().map(Yielding::is_soft).collect(),
         })
     }
 }
@@ -100,10 +99,10 @@ impl Projection {
             .collect();
         let mut counts = Vec::with_capacity(n);
         for (i, contact) in ws.contacts.iter().enumerate() {
-            let given = shift(system, options, ws, i)[0] + yielded(ws, i, ws.p[d * i]);
+            let given = shift(system, options, ws, i)[0] + softness(ws, i)[0] * ws.p[d * i];
             let u = solved.u[d * i] - given;
             let gap = match ws.yielding.get(i) {
-                Some(law) if law.diagonal > 0.0 => law.unexplained,
+                Some(law) if law.is_soft() => law.unexplained,
                 _ => contact.gap() + options.theta * h * (u - ws.u_before[d * i]),
             };
             let is_counted = !system.is_immovable(i) && (gap >= 0.0 || gap + h * u < 0.0);

@@ -412,14 +412,15 @@ pub trait MechanicalSystem {
         None
     }
 
-    /// Spring and damper of a contact; `None`, the default, if it is rigid.
-    fn compliance(&self, _contact: &Self::Contact) -> Option<Compliance> {
+    /// Springs and damper of a contact at the velocity `v` (nv); `None`, the default, if it is
+    /// rigid.
+    fn compliance(&self, _contact: &Self::Contact, _v: &[f64]) -> Option<Compliance> {
         None
     }
 
-    /// Adds a number for each contact (n_c), 1/kg, to its entries on the diagonal of the assembled
-    /// W. Called only for a system that has a [compliant mass](Self::compliant_mass).
-    fn soften(&mut self, _diagonal: impl Iterator<Item = f64>) {}
+    /// Adds numbers along n, t, b of each contact (n_c), 1/kg, to the diagonal of the assembled W.
+    /// Called only for a system that has a [compliant mass](Self::compliant_mass).
+    fn soften(&mut self, _diagonal: impl Iterator<Item = [f64; 3]>) {}
 
     /// Whether a solve that does not converge suggests that the problem has no answer. True by
     /// default; false where sweeps end early by design.

@@ -300,7 +300,7 @@ pub(super) fn load_explicitly<S: MechanicalSystem>(
             system.close_velocity(options, start.v, start.v, &mut ws.y);
             // Impulses of an impact do not predict those of this step: v_m would be far off, and
             // the bias is quadratic in it.
-            if is_persistent(options, warm_start, &ws.contacts) {
+            if is_persistent(warm_start, &ws.contacts) {
                 system.add_impulses(&ws.p, &mut ws.y);
             }
             ws.half_solve_back(|y| system.half_solve_back(y));
@@ -321,7 +321,7 @@ pub(super) fn load_implicitly<S: MechanicalSystem>(
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
 ) {
-    let is_persistent = is_persistent(options, warm_start, &ws.contacts);
+    let is_persistent = is_persistent(warm_start, &ws.contacts);
     ws.forecast.fill(0.0);
     if is_persistent {
         system.generalized_impulse(&ws.contacts, &ws.p, &mut ws.forecast);

@@ -7,6 +7,7 @@ use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
 use super::warm_start::WarmStart;
 use crate::contact::Activation;
+use crate::law::compliance::Yielding;
 use crate::solver::SolveReport;
 
 /// The contact forecast, measured from `q_m`, with the margin within which a resting contact stays
@@ -87,12 +88,12 @@ pub(super) fn find_impacts<S: MechanicalSystem>(
 /// `½ (p_k·u_k + p·u⁺)` by the trapezoidal rule, with the last step's impulses p_k and the slip
 /// velocities u_k at the start and u⁺ at the end; only their sum `p_k·u_k = v·(H p_k)` is known at
 /// the start. A change of p is charged with the velocity before the step. An impact takes `p·(u +
-/// u⁺)/2`, by its law of restitution and friction. While a contact is new or in impact, the
-/// friction of the others counts with its value at the end.
+/// u⁺)/2`, by its law of restitution and friction. While a contact is new, in impact or yields, the
+/// friction of the others counts with its value at the end. That of one that yields is the work of
+/// its slip, and of the deflection that leaves it with the tread.
 ///
 /// Call it after [`find_impacts`]; `ws.p_position` is overwritten.
 pub(super) fn contact_work<S: MechanicalSystem>(
-    options: &StepOptions,
     v_before: &[f64],
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
@@ -101,7 +102,8 @@ pub(super) fn contact_work<S: MechanicalSystem>(
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
     let local = ws.p.chunks_exact(d).zip(local);
-    if is_persistent(options, warm_start, &ws.contacts) && !ws.impact.contains(&true) {
+    let is_rigid = !ws.yielding.iter().any(Yielding::is_soft);
+    if is_rigid && is_persistent(warm_start, &ws.contacts) && !ws.impact.contains(&true) {
         ws.p_position.resize(ws.p.len(), 0.0);
         warm_start.recall(&ws.contacts, d, &mut ws.p_position);
         let friction = local.zip(ws.p_position.chunks_exact(d));
@@ -110,11 +112,13 @@ pub(super) fn contact_work<S: MechanicalSystem>(
         });
         0.5 * (friction.sum::<f64>() + dot(v_before, &warm_start.persistent))
     } else {
-        let works = local.zip(&ws.impact).map(|((p, (u, before)), is_impact)| {
-            if *is_impact {
-                0.5 * (dot(p, u) + dot(p, before))
-            } else {
-                dot(&p[1..], &u[1..])
+        let works = local.zip(&ws.impact).enumerate();
+        let works = works.map(|(i, ((p, (u, before)), is_impact))| {
+            let law = ws.yielding.get(i).filter(|law| law.is_soft());
+            match law {
+                _ if *is_impact => 0.5 * (dot(p, u) + dot(p, before)),
+                Some(law) => law.slip_work([u[0], u[1], u[d - 1]], [p[0], p[1], p[d - 1]]),
+                None => dot(&p[1..], &u[1..]),
             }
         });
         works.sum()
@@ -141,17 +145,12 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
     system.assemble(&ws.contacts, v_before, &mut ws.u_before);
     let mass = system.compliant_mass();
     ws.yielding.clear();
-    if options.warm_start || mass.is_some() {
-        warm_start.recall(&ws.contacts, d, &mut ws.p);
-    }
+    warm_start.recall(&ws.contacts, d, &mut ws.p);
     if let Some(mass) = mass {
         // Without a memory a contact may bear the weight.
         let weight = mass * options.gravity.norm() * options.time_step;
         let unknown = warm_start.impulses.is_empty().then_some(weight);
         yield_under_load(system, options, unknown, ws);
-    }
-    if !options.warm_start {
-        ws.p.fill(0.0);
     }
 }
 
@@ -176,10 +175,10 @@ fn yield_under_load<S: MechanicalSystem>(
         before[..d].copy_from_slice(&ws.p[d * i..][..d]);
         let is_new = before[0] == 0.0;
         let bounces = is_new && system.normal_shift(options, contact, 1.0) > 0.0;
-        let compliance = system.compliance(contact).filter(|_| !bounces);
+        let compliance = system.compliance(contact, &ws.v).filter(|_| !bounces);
         let law = compliance.map(|compliance| {
-            let before = unknown.map_or(before, |p| [p, 0.0, 0.0]);
-            compliance.over(step, contact.gap(), ws.q_free[d * i], before)
+            let unknown = (unknown.is_some(), unknown.unwrap_or(0.0));
+            compliance.over(step, contact.gap(), ws.q_free[d * i], before, unknown)
         });
         ws.yielding.push(law.unwrap_or_default());
     }
@@ -194,7 +193,7 @@ pub(super) fn shift<S: MechanicalSystem>(
     i: usize,
 ) -> [f64; 3] {
     match ws.yielding.get(i) {
-        Some(law) if law.diagonal > 0.0 => law.shift,
+        Some(law) if law.is_soft() => law.shift,
         _ => {
             let before = ws.u_before[S::DIMENSION.components() * i];
             [
@@ -206,9 +205,9 @@ pub(super) fn shift<S: MechanicalSystem>(
     }
 }
 
-/// What a contact yields under an impulse `p`, m/s.
-pub(super) fn yielded<Q, C>(ws: &Scratch<Q, C>, i: usize, p: f64) -> f64 {
-    ws.yielding.get(i).map_or(0.0, |law| law.diagonal * p)
+/// What a contact yields along n, t, b under an impulse of 1 N s, m/s.
+pub(super) fn softness<Q, C>(ws: &Scratch<Q, C>, i: usize) -> [f64; 3] {
+    ws.yielding.get(i).map_or([0.0; 3], |law| law.diagonal)
 }
 
 /// μ of every contact.
@@ -227,13 +226,12 @@ pub(super) fn set_friction<S: MechanicalSystem>(
 }
 
 /// Whether the last step had the same contacts and none of them was new or in impact, so that its
-/// impulses equal those of this step up to O(h).
+/// impulses equal those of this step up to O(h). That is so whatever the solver starts from.
 pub(super) fn is_persistent<C: UnilateralContact>(
-    options: &StepOptions,
     warm_start: &WarmStart<C::Key>,
     contacts: &[C],
 ) -> bool {
-    options.warm_start && !warm_start.persistent.is_empty() && warm_start.is_of(contacts)
+    !warm_start.persistent.is_empty() && warm_start.is_of(contacts)
 }
 
 /// Adds the deferred correction r to `ws.y` if the last step had the same contacts and all of them
@@ -246,7 +244,7 @@ pub(super) fn add_correction<S: MechanicalSystem>(
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
 ) {
-    if !is_persistent(options, warm_start, &ws.contacts) {
+    if !is_persistent(warm_start, &ws.contacts) {
         return;
     }
     let share = 1.0 - options.theta;
@@ -267,7 +265,7 @@ pub(super) fn add_correction<S: MechanicalSystem>(
 /// two slopes cannot leave both. If the solver finds none, the impact is taken as inelastic. That
 /// problem always has a solution, since rest is admissible on ground at rest.
 ///
-/// Starts from `ws.p`. `v_begin`: the velocity before the step. `is_from_start`: `ws.v` is still
+/// Starts from `ws.p`, or without a warm start from zero. `v_begin`: the velocity before the step. `is_from_start`: `ws.v` is still
 /// that velocity, whose local velocity is known.
 pub(super) fn solve_contacts<S: MechanicalSystem>(
     system: &mut S,
@@ -285,6 +283,9 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         ..StepReport::default()
     };
     system.close_velocity(options, v_begin, &ws.v, &mut ws.y);
+    if !options.warm_start {
+        ws.p.fill(0.0);
+    }
     if n > 0 {
         system.local(&ws.y, &mut ws.q_free);
         if is_from_start {
@@ -314,8 +315,10 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         // u contains the shift and what the contacts yield: remove both.
         for i in 0..n {
             let shift = shift(system, law, ws, i);
-            for (k, shift) in (d * i..d * (i + 1)).zip(shift) {
-                ws.u[k] -= shift + yielded(ws, i, ws.p[k]);
+            let softness = softness(ws, i);
+            for (k, (shift, softness)) in (d * i..d * (i + 1)).zip(shift.into_iter().zip(softness))
+            {
+                ws.u[k] -= shift + softness * ws.p[k];
             }
         }
         report.enter(&solved);
@@ -403,7 +406,7 @@ pub(super) fn close_end<S: MechanicalSystem>(
 /// elastic force explains, and nothing of contacts that cannot move.
 pub(super) fn excuse_gaps<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>) {
     for (gap, law) in ws.gap_end.iter_mut().zip(&ws.yielding) {
-        if law.diagonal > 0.0 {
+        if law.is_soft() {
             *gap = law.unexplained;
         }
     }

@@ -15,7 +15,7 @@ use super::problem::{MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::contact::Part;
 #[cfg(doc)]
 use crate::geometry::Roller;
-use crate::law::compliance::Compliance;
+use crate::law::compliance::Tread;
 use crate::multibody::description::Limits;
 use crate::multibody::model::Loop;
 use crate::multibody::{Mechanism, Model, Wheel};
@@ -106,7 +106,7 @@ pub struct WheelDisc {
     /// Rounding of its edges.
     pub rounding: f64,
     /// Spring and damper where it touches; `None` if it is rigid.
-    pub compliance: Option<Compliance>,
+    pub tread: Option<Tread>,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
     pub rollers: Option<[f64; 2]>,
     /// Friction across over that along, if they differ.
@@ -203,7 +203,7 @@ impl Machine {
 
     /// Whether wheels of a cluster are rigid, and none touches a plane at two points.
     pub(super) fn has_rigid_discs(&self, cluster: usize) -> bool {
-        let is_rigid = |wheel: &WheelDisc| wheel.compliance.is_none();
+        let is_rigid = |wheel: &WheelDisc| wheel.tread.is_none();
         let has_lines = |wheel: &WheelDisc| wheel.n_circles() > 1;
         self.wheels_of(cluster).any(is_rigid) && !self.wheels_of(cluster).any(has_lines)
     }
@@ -235,7 +235,7 @@ impl Machine {
     /// Whether any wheel yields where it touches.
     #[must_use]
     pub fn yields(&self) -> bool {
-        self.wheels.iter().any(|wheel| wheel.compliance.is_some())
+        self.wheels.iter().any(|wheel| wheel.tread.is_some())
     }
 
     /// Pattern of a cluster's contact problems.
@@ -294,7 +294,7 @@ impl WheelDisc {
                 0.0
             },
             rounding: if is_wide { wheel.rounding } else { 0.0 },
-            compliance: wheel.compliance,
+            tread: wheel.tread,
             rollers: wheel.rollers,
             across: wheel.across,
             n_slots: 0,

@@ -128,7 +128,7 @@ impl Parts {
                     radius: wheel.radius - wheel.rounding,
                     half: wheel.half,
                     rounding: wheel.rounding,
-                    is_soft: wheel.compliance.is_some(),
+                    is_soft: wheel.tread.is_some(),
                     rollers: wheel.rollers,
                     across: wheel.across,
                     bound: wheel.bound(),

@@ -86,8 +86,8 @@ pub struct Factored {
     pub Z: Vec<Triple<f64>>,
     /// Diagonal blocks of W, 1/kg.
     pub diagonal: Vec<[f64; 9]>,
-    /// Diagonal of D by contact, 1/kg.
-    pub softness: Vec<f64>,
+    /// Diagonal of D by contact, along n, t, b, 1/kg; the latter two are equal.
+    pub softness: Vec<Triple<f64>>,
     /// Whether it is solved with the operator itself: at most [`MAX_LARGE`] contacts, of a pattern
     /// that has all entries.
     pub is_multiplied: bool,
@@ -153,7 +153,7 @@ impl Factored {
             self.pattern = Some(Arc::clone(pattern));
             self.Z.resize(MAX_CONTACTS * pattern.stride(), [0.0; 3]);
             self.diagonal.resize(MAX_CONTACTS, [0.0; 9]);
-            self.softness.resize(MAX_CONTACTS, 0.0);
+            self.softness.resize(MAX_CONTACTS, [0.0; 3]);
             self.normal.resize(MAX_CONTACTS, 0.0);
         }
     }

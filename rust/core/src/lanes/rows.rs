@@ -65,7 +65,7 @@ pub struct Rows<T: Lane> {
     sizes: Vec<usize>,
     /// Diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
     pub(super) diagonal: Vec<[T; 9]>,
-    pub(super) softness: Vec<T>,
+    pub(super) softness: Vec<Triple<T>>,
     /// W's entry of the normal of a joint's dry friction by slot, 1/kg; 0 of others.
     pub(super) normal: Vec<T>,
     /// The motion in [`Self::sweep`] (nv, factor coordinates), and the products of the loops with
@@ -157,7 +157,7 @@ impl<T: Lane> Rows<T> {
                 .map(|cluster| machine.clusters.nv(cluster))
                 .collect(),
             diagonal: vec![[zero; 9]; n_slots],
-            softness: vec![zero; n_slots],
+            softness: vec![[zero; 3]; n_slots],
             normal: vec![zero; n_slots],
             swept: vec![zero; machine.nv()],
             swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
@@ -506,11 +506,11 @@ impl<T: Lane> Rows<T> {
         own
     }
 
-    /// Adds a number by slot, 1/kg, to the three entries on W's diagonal.
-    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: impl Fn(usize) -> T) {
+    /// Adds numbers by slot, along n, t, b, 1/kg, to W's diagonal.
+    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: impl Fn(usize) -> Triple<T>) {
         let soften = |own: &mut [T; 9], slot: usize| {
-            for k in [0, 4, 8] {
-                own[k] += diagonal(slot);
+            for (k, more) in diagonal(slot).into_iter().enumerate() {
+                own[4 * k] += more;
             }
         };
         for cluster in 0..contacts.n_clusters() {
@@ -757,7 +757,8 @@ impl<T: Lane> Rows<T> {
         let (homes, places) = (contacts.homes(slot), contacts.places(slot));
         let near = T::mask(self.token, contacts.near(slot));
         let (path, rows) = self.of(contacts, slot);
-        let softness = store_all(&[self.softness[slot], self.normal[slot]]);
+        let [n, t, b] = self.softness[slot];
+        let softness = store_all(&[n, t, b, self.normal[slot]]);
         let diagonal = store_all(&self.diagonal[slot]);
         // Lanes whose problem has all velocities.
         let mut whole = 0;
@@ -767,8 +768,8 @@ impl<T: Lane> Rows<T> {
             |lane| {
                 let out = &mut problems[usize::from(homes[lane])].factored;
                 let contact = usize::from(places[lane]);
-                out.softness[contact] = softness[0][lane];
-                out.normal[contact] = softness[1][lane];
+                out.softness[contact] = [0, 1, 2].map(|k| softness[k][lane]);
+                out.normal[contact] = softness[3][lane];
                 let own = &mut out.diagonal[contact];
                 for k in 0..9 {
                     own[k] = diagonal[k][lane];

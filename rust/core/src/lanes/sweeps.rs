@@ -94,7 +94,9 @@ impl<T: Lane> Rows<T> {
             for slot in contacts.used_nearby() {
                 let (path, rows) = self.of(contacts, slot);
                 let mut u = q[slot];
-                add_scaled(&mut u, &p[slot], self.softness[slot]);
+                for k in 0..3 {
+                    u[k] += self.softness[slot][k] * p[slot][k];
+                }
                 u[0] += self.normal[slot] * p[slot][0];
                 let mut u = path.add_local(rows, &motion, u);
                 if let Some(loops) = &self.loops {

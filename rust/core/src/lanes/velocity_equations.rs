@@ -46,7 +46,7 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
     q: [Triple<T>; C],
     /// Diagonal blocks of W, the diagonal of D, and what it has more along the normal, 1/kg.
     diagonal: [Block<T>; C],
-    softness: [T; C],
+    softness: [Triple<T>; C],
     normal: [T; C],
     /// `G_i`.
     inverse: [Triple<T>; C],
@@ -220,8 +220,8 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for VelocitySystem<T, C> {
         }
         for i in Bits(self.used) {
             let local = self.local(i);
-            let own = self.softness[i];
-            let softness = [own + self.normal[i], own, own];
+            let [n, t, b] = self.softness[i];
+            let softness = [n + self.normal[i], t, b];
             for k in 0..3 {
                 u[i][k] = local[k] + softness[k] * p[i][k] + self.q[i][k];
             }
@@ -241,12 +241,12 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for VelocitySystem<T, C> {
                 gamma,
                 ..
             } = &modes[i];
-            let own = alpha + self.softness[i];
-            let inverse = one / own;
+            let [along_n, along_t, _] = self.softness[i];
+            let own = alpha + along_t;
             self.inverse[i] = [
-                T::select(*closed, one / (own + self.normal[i]), zero),
+                T::select(*closed, one / (alpha + along_n + self.normal[i]), zero),
                 one / ((b[0] * b[0] + b[1] * b[1]) * own + *gamma),
-                T::select(*stick, inverse, zero),
+                T::select(*stick, one / own, zero),
             ];
             self.add(i, &modes[i]);
         }
@@ -300,7 +300,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
             Z: Vec::new(),
             q: [[zero; 3]; C],
             diagonal: [[zero; 9]; C],
-            softness: [zero; C],
+            softness: [[zero; 3]; C],
             normal: [zero; C],
             inverse: [[zero; 3]; C],
             left: Columns::new(zero, 0),
@@ -335,7 +335,9 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
                 for own in &mut self.diagonal[slot] {
                     own.set(lane, 0.0);
                 }
-                self.softness[slot].set(lane, 0.0);
+                for own in &mut self.softness[slot] {
+                    own.set(lane, 0.0);
+                }
                 self.normal[slot].set(lane, 0.0);
                 continue;
             };
@@ -356,7 +358,12 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
             for k in 0..9 {
                 self.diagonal[slot][k].set(lane, w[k]);
             }
-            self.softness[slot].set(lane, factored.softness[contact]);
+            for (own, more) in self.softness[slot]
+                .iter_mut()
+                .zip(factored.softness[contact])
+            {
+                own.set(lane, more);
+            }
             self.normal[slot].set(lane, factored.normal[contact]);
         }
         Bits(changed)
@@ -370,7 +377,7 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
     #[inline(always)]
     fn least_softness(problem: &ContactProblem) -> f64 {
         let softness = problem.factored.softness.iter().take(problem.n_contacts);
-        softness.fold(f64::INFINITY, |least, own| least.min(*own))
+        softness.fold(f64::INFINITY, |least, [n, t, _]| least.min(*n).min(*t))
     }
 
     #[inline(always)]
@@ -422,7 +429,8 @@ pub(super) mod tests {
             Z[i * pattern.stride()..][..pattern.stride()].to_vec()
         };
         for i in 0..MAX_DENSE {
-            problem.factored.softness[i] = 0.01 * i as f64;
+            let along = 0.02 * i as f64;
+            problem.factored.softness[i] = [0.01 * i as f64, along, along];
             for j in 0..=i {
                 let shared = pattern.shared(i, j);
                 let (a, b) = (row(&problem.factored.Z, i), row(&problem.factored.Z, j));
@@ -430,7 +438,7 @@ pub(super) mod tests {
                     let products = a.iter().zip(&b).take(shared);
                     let mut w: f64 = products.map(|(x, y)| x[k / 3] * y[k % 3]).sum();
                     if i == j && k % 4 == 0 {
-                        w += problem.factored.softness[i];
+                        w += problem.factored.softness[i][k / 4];
                     }
                     problem.W[block(i, j)][k] = w;
                     if i == j {

@@ -3,8 +3,9 @@
 use super::contacts::Contacts;
 use super::machine::Machine;
 use super::problem::Triple;
-use crate::contact::{Contact, Part};
+use crate::contact::Part;
 use crate::law::compliance::{Compliance, Yielding};
+use crate::multibody::Poses;
 use crate::scalar::{Lane, LaneMask};
 
 /// The laws of a block's contacts. Empty where all wheels are rigid.
@@ -36,66 +37,62 @@ impl<T: Lane> Yields<T> {
 
     /// The laws over a `step`: its length (s) and the scheme's θ.
     ///
-    /// `u_before`: local velocities before the step by slot, m/s. `last`: impulses of the last step
-    /// by slot, N s; in the lanes of the mask `unknown`, without a last step, its number replaces
-    /// the normal one.
+    /// `motion`: poses at the midpoint, and the velocity (nv). `u_before`: local velocities before
+    /// the step by slot, m/s. `last`: impulses of the last step by slot, N s. `unknown`: lanes
+    /// without a last step, and the normal impulse there, as [`Compliance::over`] takes them.
     #[inline(always)]
     pub fn update(
         &mut self,
-        machine: &Machine,
-        contacts: &Contacts<T>,
+        (machine, contacts): (&Machine, &Contacts<T>),
+        motion: (&Poses<T>, &[T]),
         step: (T, T),
         u_before: &[Triple<T>],
         last: &[Triple<T>],
         unknown: (T::Mask, T),
     ) {
-        let zero = self.zero;
         for &slot in contacts.used() {
-            let (spring, is_soft) = self.spring(machine, contacts, slot);
-            if !is_soft.any() {
-                self.laws[slot] = Yielding::none(zero);
-                continue;
-            }
-            let [n, t, b] = last[slot];
-            let (no_memory, p) = unknown;
-            let before = [
-                T::select(no_memory, p, n),
-                T::select(no_memory, zero, t),
-                T::select(no_memory, zero, b),
-            ];
-            let law = spring.over(step, contacts.slot(slot).gap, u_before[slot][0], before);
-            self.laws[slot] = law.only(is_soft);
+            let (spring, is_soft) = self.spring((machine, contacts), motion, slot);
+            self.laws[slot] = match spring {
+                Some(spring) if is_soft.any() => {
+                    let (gap, u_N) = (contacts.slot(slot).gap, u_before[slot][0]);
+                    (spring.over(step, gap, u_N, last[slot], unknown)).only(is_soft)
+                }
+                _ => Yielding::none(self.zero),
+            };
         }
     }
 
-    /// Spring and damper of a slot, and the lanes that have one.
+    /// Springs and damper of a slot, and the lanes that have them.
     #[inline(always)]
     fn spring(
         &self,
-        machine: &Machine,
-        contacts: &Contacts<T>,
+        (machine, contacts): (&Machine, &Contacts<T>),
+        (poses, v): (&Poses<T>, &[T]),
         slot: usize,
-    ) -> (Compliance<T>, T::Mask) {
-        let (zero, active) = (self.zero, contacts.slot(slot).active);
-        let (mut spring, mut is_soft) = (
-            Compliance {
-                stiffness: zero,
-                damping: zero,
-            },
-            active & !active,
-        );
-        let own = machine.wheels.get(contacts.part(slot)); // none of a stop or a spare slot
-        if let Some(own) = own.and_then(|wheel| wheel.compliance) {
-            (spring.stiffness, spring.damping) = (zero.like(own.stiffness), zero.like(own.damping));
+    ) -> (Option<Compliance<T>>, T::Mask) {
+        let active = contacts.slot(slot).active;
+        let mut is_soft = active & !active;
+        let of = |w: usize| {
+            let wheel = machine.wheels.get(w)?; // none of a stop or a spare slot
+            let tread = wheel.tread?;
+            let parts = (wheel.body, wheel.axle, wheel.radius);
+            Some(tread.rolling(machine.travel(parts, poses, |k| v[k])))
+        };
+        let mut spring = of(contacts.part(slot));
+        if spring.is_some() {
             is_soft = active;
         }
         for (lane, contact) in contacts.by_lane.contacts(slot) {
-            let here = T::mask(zero.token(), 1 << lane);
+            let here = T::mask(self.zero.token(), 1 << lane);
             is_soft = is_soft & !here;
-            if let Some(own) = of_contact(machine, contact) {
+            let of = |part| match part {
+                Part::Wheel(w) => of(w),
+                _ => None,
+            };
+            let other = contact.other.and_then(|other| of(other.part));
+            if let Some(own) = Compliance::in_series(of(contact.part), other) {
                 is_soft = is_soft | (here & active);
-                spring.stiffness.set(lane, own.stiffness);
-                spring.damping.set(lane, own.damping);
+                spring = Some(spring.map_or(own, |spring| spring.or(here, &own)));
             }
         }
         (spring, is_soft)
@@ -116,9 +113,9 @@ impl<T: Lane> Yields<T> {
     #[inline(always)]
     pub fn unshift(&self, contacts: &Contacts<T>, p: &[Triple<T>], u: &mut [Triple<T>]) {
         for &slot in contacts.used().iter().filter(|_| !self.is_empty()) {
-            let law = &self.laws[slot];
-            for ((u, p), shift) in u[slot].iter_mut().zip(p[slot]).zip(law.shift) {
-                *u -= shift + law.diagonal * p;
+            let more = self.laws[slot].yielded(p[slot]);
+            for (u, more) in u[slot].iter_mut().zip(more) {
+                *u -= more;
             }
         }
     }
@@ -139,18 +136,8 @@ impl<T: Lane> Yields<T> {
         for &slot in contacts.used().iter().filter(|_| !self.is_empty()) {
             let law = &self.laws[slot];
             let given = law.supplied(h, [u_before[slot][0], u[slot][0]], p[slot]);
-            sum += T::select(self.zero.lt(law.diagonal), given, self.zero);
+            sum += T::select(law.is_soft(), given, self.zero);
         }
         sum
     }
-}
-
-/// Spring and damper of a contact that was found lane by lane.
-fn of_contact(machine: &Machine, contact: &Contact) -> Option<Compliance> {
-    let of = |part| match part {
-        Part::Wheel(w) => machine.wheels[w].compliance,
-        _ => None,
-    };
-    let other = contact.other.and_then(|other| of(other.part));
-    Compliance::in_series(of(contact.part), other)
 }

@@ -14,7 +14,7 @@ use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
 use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{
-    Activation, Contact, ContactKey, Opposite, detect, detect_limits, detect_pairs,
+    Activation, Contact, ContactKey, Opposite, Part, detect, detect_limits, detect_pairs,
     generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
@@ -268,15 +268,16 @@ impl MechanicalSystem for TreeSystem<'_> {
         model.has_compliance().then(|| model.mass())
     }
 
-    fn compliance(&self, contact: &Contact) -> Option<Compliance> {
-        let other = contact.other.map(|other| other.part);
-        Compliance::in_series(
-            contact.part.compliance(self.model),
-            other.and_then(|part| part.compliance(self.model)),
-        )
+    fn compliance(&self, contact: &Contact, v: &[f64]) -> Option<Compliance> {
+        let (model, poses) = (self.model, self.parts.kinematics.poses());
+        let of = |part: Part| {
+            let (tread, wheel) = part.tread(model)?;
+            Some(tread.rolling(model.mechanism().travel(wheel, poses, |k| v[k])))
+        };
+        Compliance::in_series(of(contact.part), contact.other.and_then(|own| of(own.part)))
     }
 
-    fn soften(&mut self, diagonal: impl Iterator<Item = f64>) {
+    fn soften(&mut self, diagonal: impl Iterator<Item = [f64; 3]>) {
         self.parts.system.soften(diagonal);
     }
 

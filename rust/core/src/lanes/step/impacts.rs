@@ -51,13 +51,21 @@ impl<T: Lane> Block<T> {
     #[inline(always)]
     pub(super) fn contact_work(&self) -> T {
         let (zero, half) = (self.number(0.0), self.number(0.5));
-        let persists = self.persists & !self.has_impact;
+        let mut persists = self.persists & !self.has_impact;
         let (mut ends, mut changes, mut struck) = (zero, zero, zero);
         for &slot in self.contacts.used() {
             let ([p_n, p_t, p_b], [u_n, u_t, u_b]) = (self.p[slot], self.u[slot]);
             let ([_, last_t, last_b], before) = (self.p_last[slot], self.rows.u_before[slot]);
             let active = self.contacts.slot(slot).active;
-            let end = p_t * u_t + p_b * u_b;
+            let mut end = p_t * u_t + p_b * u_b;
+            if !self.yields.is_empty() {
+                let law = &self.yields.laws[slot];
+                let is_soft = law.is_soft() & active;
+                let of_soft = law.slip_work(self.u[slot], self.p[slot]);
+                let is_struck = self.impact[slot];
+                end = T::select(is_soft & !is_struck, of_soft, end);
+                persists = persists & !is_soft;
+            }
             let change = (p_t - last_t) * before[1] + (p_b - last_b) * before[2];
             ends += T::select(active, end, zero);
             changes += T::select(active, change, zero);

@@ -124,8 +124,8 @@ impl<T: Lane> Block<T> {
         }
         let weight = self.inertias.mass * self.gravity.norm() * step.0;
         self.yields.update(
-            &self.machine,
-            &self.contacts,
+            (&self.machine, &self.contacts),
+            (&self.poses_middle, &self.v),
             step,
             &self.rows.u_before,
             &self.p_last,

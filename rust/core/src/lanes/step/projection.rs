@@ -46,7 +46,7 @@ impl<T: Lane> Block<T> {
         let mut gap = own.gap + theta * h * (u - before);
         if !self.yields.is_empty() {
             let law = &self.yields.laws[slot];
-            gap = T::select(zero.lt(law.diagonal), law.unexplained, gap);
+            gap = T::select(law.is_soft(), law.unexplained, gap);
         }
         let parts = gap.lt(zero) & !(gap + h * u).lt(zero);
         let gap = T::select(parts | self.rows.immovable(slot), zero, gap);

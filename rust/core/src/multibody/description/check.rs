@@ -391,19 +391,28 @@ fn check_compliance(
         not_negative(&at("stiffness"), stiffness)?;
         in_range(&at("stiffness"), stiffness, 1e12, "at most 1e12 N/m")?;
     }
-    let Some(damping) = wheel.damping else {
-        return Ok(());
-    };
+    let damping = wheel.damping.unwrap_or(0.0);
     not_negative(&at("damping"), damping)?;
     in_range(&at("damping"), damping, 1e12, "at most 1e12 N s/m")?;
-    if wheel.stiffness.is_none_or(|stiffness| stiffness == 0.0) && damping != 0.0 {
-        return Err(ModelError::OutOfRange {
-            field: at("damping"),
-            range: "given beside a stiffness",
-            value: damping,
-        });
+    let mut beside = vec![("damping", damping)];
+    if let Some(ratio) = wheel.tangential_ratio {
+        positive(&at("tangential_ratio"), ratio)?;
+        in_range(&at("tangential_ratio"), ratio, 1e6, "at most 1e6")?;
+        beside.push(("tangential_ratio", ratio));
     }
-    Ok(())
+    if let Some(relaxation) = wheel.relaxation_length {
+        length(&at("relaxation_length"), relaxation)?;
+        beside.push(("relaxation_length", relaxation));
+    }
+    let is_rigid = wheel.stiffness.is_none_or(|stiffness| stiffness == 0.0);
+    match beside.into_iter().find(|(_, value)| *value != 0.0) {
+        Some((field, value)) if is_rigid => Err(ModelError::OutOfRange {
+            field: at(field),
+            range: "given beside a stiffness",
+            value,
+        }),
+        _ => Ok(()),
+    }
 }
 
 fn check_wheels(

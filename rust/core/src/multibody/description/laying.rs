@@ -61,6 +61,11 @@ impl TrackDescription {
         }
     }
 
+    /// Distance of the last wheel from the first, m.
+    fn run(&self) -> f64 {
+        (Vector3::from(self.to) - Vector3::from(self.from)).norm()
+    }
+
     /// The k-th wheel: a ring with its share of the mass. `shared`: default stiffness and damping.
     fn wheel(&self, k: usize, shared: [f64; 2]) -> (SolidDescription, WheelDescription) {
         let name = self.name_of(k);
@@ -99,6 +104,8 @@ impl TrackDescription {
             rounding: self.rounding,
             stiffness: Some(share * stiffness),
             damping: Some(share * damping),
+            // A belt lies still on the ground from its first wheel to its last.
+            relaxation_length: (stiffness > 0.0).then(|| self.run()),
             material: self.material.clone(),
             torque_limit: self.torque_limit / self.wheels as f64,
             drive_sign: self.drive_sign,

@@ -234,6 +234,14 @@ pub struct WheelDescription {
     /// Normal damping beside the stiffness, N s/m; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<f64>,
+    /// Stiffness along the surface relative to the normal one; 1 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tangential_ratio: Option<f64>,
+    /// Relaxation length, m: the way of rolling over which the deflection along the surface is
+    /// renewed. By default half the length of the contact of a wheel that yields under its share of
+    /// the weight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relaxation_length: Option<f64>,
     /// Free rollers around its rim, as on a mecanum wheel: angle of the roller that touches the
     /// ground from the axle, rad, positive if its axis points forward on the right side. π/2 for an
     /// omni wheel; no rollers by default.
@@ -371,12 +379,25 @@ impl SolidDescription {
 }
 
 impl ModelDescription {
-    /// The built-in rover.
+    /// The rover of the report: the gallery's on rigid wheels.
     ///
     /// # Panics
     /// If the built-in file cannot be read, which the tests exclude.
     #[must_use]
     pub fn rover() -> Self {
+        let mut rover = Self::gallery_rover();
+        for wheel in &mut rover.wheels {
+            wheel.forget_tread();
+        }
+        rover
+    }
+
+    /// The rover of the gallery, whose wheels yield.
+    ///
+    /// # Panics
+    /// If the built-in file cannot be read, which the tests exclude.
+    #[must_use]
+    pub fn gallery_rover() -> Self {
         let parsed = Self::from_toml(ROVER);
         assert!(parsed.is_ok(), "the built-in rover is readable");
         parsed.unwrap_or_else(|_| Self::empty())

@@ -13,6 +13,14 @@ const DEFLECTION: f64 = 3e-5;
 const GRAVITY: f64 = 9.81;
 
 impl WheelDescription {
+    /// Leaves out what is stated of its tread.
+    pub(in crate::multibody) fn forget_tread(&mut self) {
+        self.stiffness = None;
+        self.damping = None;
+        self.tangential_ratio = None;
+        self.relaxation_length = None;
+    }
+
     /// Whether it touches a plane along a line: it has a width, and its edges are not rounded to a
     /// torus.
     fn stands_on_a_line(&self) -> bool {
@@ -22,7 +30,7 @@ impl WheelDescription {
 
 impl ModelDescription {
     /// Writes stiffness and critical damping, to two digits, into wheels that touch along a line
-    /// and state none.
+    /// and state none, and a relaxation length into those that yield and state none.
     pub(in crate::multibody) fn state_yielding(&mut self) {
         let mass: f64 = self.solids.iter().map(|solid| solid.mass).sum();
         let [stiffness, damping] = yielding(mass, self.wheels.len());
@@ -34,6 +42,15 @@ impl ModelDescription {
             wheel.stiffness = Some(stiffness);
             wheel.damping = Some(damping);
         }
+        let share = mass * GRAVITY / self.wheels.len() as f64;
+        for wheel in &mut self.wheels {
+            let radius = wheel.contact_radius.unwrap_or(wheel.radius);
+            let soft = wheel.stiffness.filter(|stiffness| *stiffness > 0.0);
+            if let (Some(stiffness), None) = (soft, wheel.relaxation_length) {
+                let length = half_length(radius, share / stiffness);
+                wheel.relaxation_length = Some(two_digits(length).clamp(1e-9 * radius, radius));
+            }
+        }
     }
 }
 
@@ -43,6 +60,12 @@ pub(super) fn yielding(mass: f64, n: usize) -> [f64; 2] {
     let stiffness = two_digits(mass * GRAVITY / (n as f64 * DEFLECTION));
     let time = 2.0 * (DEFLECTION / GRAVITY).sqrt();
     [stiffness.min(1e12), two_digits(time * stiffness).min(1e12)]
+}
+
+/// Half the length of the contact of a wheel that is pressed onto a plane by a deflection, m: the
+/// relaxation length of a tread whose points deflect one by one.
+fn half_length(radius: f64, deflection: f64) -> f64 {
+    (2.0 * radius * deflection).sqrt()
 }
 
 /// A positive number to two significant digits.
@@ -65,12 +88,15 @@ mod tests {
         }
         let model = Model::from_description(wide).unwrap();
         let own: Vec<_> = (model.wheels().iter())
-            .map(|wheel| wheel.compliance.map(|own| own.stiffness))
+            .map(|wheel| wheel.tread.map(|own| own.stiffness))
             .collect();
         let share = mass * 9.81 / 6.0 / 3e-5;
         assert!((own[0].unwrap() / share - 1.0).abs() < 0.05);
         assert_eq!(own[1..], [None, None, None, Some(1e6), own[0]]);
         let heavier = model.with_masses_scaled(1.3).unwrap();
-        assert_eq!(heavier.wheels()[0].compliance, model.wheels()[0].compliance);
+        assert_eq!(heavier.wheels()[0].tread, model.wheels()[0].tread);
+        let length = model.wheels()[0].tread.unwrap().relaxation_length;
+        let half = (2.0 * model.wheels()[0].radius * 3e-5).sqrt();
+        assert!((length / half - 1.0).abs() < 0.05, "{length}");
     }
 }

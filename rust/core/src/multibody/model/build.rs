@@ -12,7 +12,7 @@ use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
 use super::tree::{Paths, Tree};
 use super::{Body, Model, fingerprint};
-use crate::law::compliance::Compliance;
+use crate::law::compliance::Tread;
 use crate::law::materials::OwnFriction;
 use crate::multibody::description::{
     JointKind, MaterialDescription, ModelDescription, Shape, SolidDescription,
@@ -491,11 +491,11 @@ fn wheels(
                 .and_then(MaterialDescription::across),
             grouser_height: wheel.grouser_height.unwrap_or(0.0),
             grousers: wheel.grousers.unwrap_or(0),
-            compliance: (wheel.stiffness.filter(|stiffness| *stiffness > 0.0)).map(|stiffness| {
-                Compliance {
-                    stiffness,
-                    damping: wheel.damping.unwrap_or(0.0),
-                }
+            tread: (wheel.stiffness.filter(|stiffness| *stiffness > 0.0)).map(|stiffness| Tread {
+                stiffness,
+                damping: wheel.damping.unwrap_or(0.0),
+                tangential_ratio: wheel.tangential_ratio.unwrap_or(1.0),
+                relaxation_length: wheel.relaxation_length.unwrap_or(wheel.radius),
             }),
             material: named(wheel.material.as_ref(), "wheel"),
             torque_limit: wheel.torque_limit,

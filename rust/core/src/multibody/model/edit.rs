@@ -13,10 +13,15 @@ pub struct Changes {
     pub wheel_radius: Option<f64>,
     /// Radius at which the wheels touch, m, as of [`Model::with_contact_radius`].
     pub contact_radius: Option<f64>,
-    /// Normal stiffness of all wheels, N/m; 0 for rigid wheels, which have no damping either.
+    /// Normal stiffness of all wheels, N/m; 0 for rigid wheels, which state nothing else of their
+    /// tread.
     pub wheel_stiffness: Option<f64>,
     /// Normal damping of all wheels, N s/m.
     pub wheel_damping: Option<f64>,
+    /// Stiffness of all wheels along the surface relative to the normal one.
+    pub wheel_tangential_ratio: Option<f64>,
+    /// Relaxation length of all wheels, m.
+    pub wheel_relaxation_length: Option<f64>,
     /// Masses by the solids' names, kg; inertias scale with them.
     pub masses: Vec<(String, f64)>,
     /// Factor of all masses and inertias.
@@ -36,10 +41,14 @@ impl Changes {
         for wheel in wheels {
             wheel.torque_limit = self.wheel_torque_limit.unwrap_or(wheel.torque_limit);
             if let Some(stiffness) = self.wheel_stiffness {
+                if stiffness == 0.0 {
+                    wheel.forget_tread();
+                }
                 wheel.stiffness = Some(stiffness);
-                wheel.damping = wheel.damping.filter(|_| stiffness != 0.0);
             }
             wheel.damping = self.wheel_damping.or(wheel.damping);
+            wheel.tangential_ratio = self.wheel_tangential_ratio.or(wheel.tangential_ratio);
+            wheel.relaxation_length = self.wheel_relaxation_length.or(wheel.relaxation_length);
             wheel.motor = self.motor.unwrap_or(wheel.motor);
         }
     }

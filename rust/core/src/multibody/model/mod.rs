@@ -80,13 +80,26 @@ impl Model {
         Self::build(description)
     }
 
-    /// The built-in rover of the report, with 21 degrees of freedom.
+    /// The rover of the report, with 21 degrees of freedom, on rigid wheels.
     ///
     /// # Panics
     /// If the built-in file is invalid, which the tests exclude.
     #[must_use]
     pub fn rover() -> Self {
-        match Self::from_description(ModelDescription::rover()) {
+        Self::built_in(ModelDescription::rover())
+    }
+
+    /// The rover of the gallery: that of the report on wheels that yield.
+    ///
+    /// # Panics
+    /// If the built-in file is invalid, which the tests exclude.
+    #[must_use]
+    pub fn gallery_rover() -> Self {
+        Self::built_in(ModelDescription::gallery_rover())
+    }
+
+    fn built_in(description: ModelDescription) -> Self {
+        match Self::from_description(description) {
             Ok(model) => model,
             Err(e) => panic!("invariant: the built-in rover is valid: {e}"),
         }
@@ -274,7 +287,7 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn has_compliance(&self) -> bool {
-        self.wheels.iter().any(|wheel| wheel.compliance.is_some())
+        self.wheels.iter().any(|wheel| wheel.tread.is_some())
     }
 
     /// Free and spherical joints, whose coordinates are quaternions, with their first velocities.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::law::compliance::Compliance;
+use crate::law::compliance::Tread;
 use crate::multibody::motor::Motor;
 use crate::scalar::elementary::hypot;
 use crate::spatial::Polytope;
@@ -51,7 +51,7 @@ pub struct Wheel {
     /// Number of grousers around the rim.
     pub grousers: u32,
     /// Spring and damper where it touches; `None` if it is rigid.
-    pub compliance: Option<Compliance>,
+    pub tread: Option<Tread>,
     /// Name of its material.
     pub material: String,
     /// Largest driving torque, N m.

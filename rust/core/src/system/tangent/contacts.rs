@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 
 use super::held_tree::{HeldContact, TangentScene};
 use super::scratch::{Tangent, Varying};
-use crate::contact::Contact;
 use crate::contact::contact_slope::SlopeOfBody;
 use crate::contact::jacobian::sides;
 use crate::contact::limit;
 use crate::contact::rows::{Place, Triple, add_scaled};
-use crate::law::compliance::Yielding;
+use crate::contact::{Contact, Part};
+use crate::law::compliance::{Compliance, Yielding};
 use crate::multibody::{Model, Poses};
 use crate::scalar::{Dual, Lane, Vec3};
 
@@ -131,21 +131,35 @@ impl<T: Lane> Tangent<T> {
     /// The law of a contact that yields.
     #[inline(always)]
     pub(super) fn yielding(&self, scene: &TangentScene<'_>, i: usize) -> Option<Yielding<Dual<T>>> {
-        let compliance = scene.held.contacts[i].compliance?;
+        let held = &scene.held.contacts[i];
+        if !held.is_soft {
+            return None;
+        }
         let options = scene.options;
         let number = |x: f64| Dual::splat(self.token, x);
         let h = number(options.time_step);
         let zero = number(0.0);
         let one = T::splat(self.token, 1.0);
-        let law = crate::law::compliance::Compliance {
-            stiffness: number(compliance.stiffness) * Dual::new(one, self.d_stiffness),
-            damping: number(compliance.damping) * Dual::new(one, self.d_damping),
+        let of = |part: Part| {
+            let (tread, wheel) = part.tread(scene.model)?;
+            let (mechanism, poses) = (scene.model.mechanism(), &self.poses_middle);
+            let own = tread.rolling(mechanism.travel(wheel, poses, |k| self.v[k]));
+            Some(Compliance {
+                stiffness: own.stiffness * Dual::new(one, self.d_stiffness),
+                damping: own.damping * Dual::new(one, self.d_damping),
+                tangential: own.tangential * Dual::new(one, self.d_stiffness),
+                fading: own.fading,
+            })
         };
+        let contact = &scene.held.step.contacts[i];
+        let other = contact.other.and_then(|other| of(other.part));
+        let law = Compliance::in_series(of(contact.part), other)?;
         // As the step without a memory takes it.
         let weight = self.inertias.mass * number(options.gravity.norm()) * h;
         let u_N = self.local(scene, i, &self.v)[0];
         let step = (h, number(options.theta));
-        Some(law.over(step, self.contacts[i].gap, u_N, [weight, zero, zero]))
+        let unknown = (T::mask(self.token, u32::MAX >> (32 - T::LANES)), weight);
+        Some(law.over(step, self.contacts[i].gap, u_N, [zero; 3], unknown))
     }
 }
 

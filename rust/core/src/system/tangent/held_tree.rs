@@ -8,7 +8,6 @@ use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::held_step::HeldStep;
 use crate::integrator::{MechanicalSystem, ScratchOf, Start, StepOptions};
-use crate::law::compliance::Compliance;
 use crate::multibody::{Configuration, Factor, Model};
 use crate::system::TreeSystem;
 use crate::system::command::Command;
@@ -29,8 +28,8 @@ pub(crate) struct HeldTree {
 pub(super) struct HeldContact {
     pub slope: ContactSlope,
     pub restitution: f64,
-    /// Where it yields.
-    pub compliance: Option<Compliance>,
+    /// Whether it yields.
+    pub is_soft: bool,
     /// Index of the joint, of a stop or of dry friction.
     pub joint: Option<usize>,
 }
@@ -72,11 +71,10 @@ impl TreeSystem<'_> {
                 Part::Limit(joint, _) | Part::Friction(joint) => Some(joint),
                 _ => None,
             };
-            let yields = step.yields.get(i).is_some_and(|yields| *yields);
             HeldContact {
                 slope: ContactSlope::of(model, &self.parts.kinematics_end, terrain, contact),
                 restitution: self.normal_shift(options, contact, 1.0),
-                compliance: self.compliance(contact).filter(|_| yields),
+                is_soft: step.yields.get(i).is_some_and(|yields| *yields),
                 joint,
             }
         });

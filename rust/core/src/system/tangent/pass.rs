@@ -268,8 +268,9 @@ impl<T: Lane> Tangent<T> {
         let mut u = self.local(scene, i, &self.v_end);
         let p = &scene.held.step.law.p[3 * i..];
         if let Some(law) = self.yielding(scene, i) {
+            let more = law.yielded([0, 1, 2].map(|k| u[k].like(p[k])));
             for k in 0..3 {
-                u[k] += law.shift[k] + law.diagonal * law.diagonal.like(p[k]);
+                u[k] += more[k];
             }
         } else {
             let restitution = scene.held.contacts[i].restitution;
@@ -316,8 +317,9 @@ impl<T: Lane> Tangent<T> {
         for i in 0..step.contacts.len() {
             let mut local = self.local(scene, i, &self.y);
             if let Some(law) = self.yielding(scene, i) {
-                for (local, p) in local.iter_mut().zip(&projection.law.p[3 * i..]) {
-                    *local += law.diagonal * law.diagonal.like(*p);
+                let p = projection.law.p[3 * i..].iter();
+                for ((local, p), softness) in local.iter_mut().zip(p).zip(law.diagonal) {
+                    *local += softness * softness.like(*p);
                 }
             }
             for (du, local) in self.du[3 * i..].iter_mut().zip(local) {
