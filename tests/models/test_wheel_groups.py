@@ -255,3 +255,19 @@ def test_masses_make_a_body_of_what_is_only_drawn(tmp_path):
             read_robot(path, masses=wrong)
     heavier, _ = read_robot(write(tmp_path, four()), masses={"base": 40.0})
     np.testing.assert_allclose(heavier.to_dict()["solids"][0]["inertia"][:3], 0.02)
+
+
+def test_a_robot_with_a_caster_brakes_by_its_driven_wheels(tmp_path):
+    """A caster, which nothing can hold, kept the other wheels from being braked."""
+    source = RoverModel.from_urdf(write(tmp_path, four())).to_dict()
+    caster = source["wheels"][-1]
+    caster["torque_limit"] = 0.0
+    next(solid for solid in source["solids"] if solid["name"] == caster["solid"]).pop("hold")
+    model = RoverModel.from_dict(source)
+    slope = Plane.tilted(np.radians(10.0), 0.0)
+    sim = Simulation(model, slope)
+    start = model.resting_pose(slope, (0.0, 0.0), 0.0)
+    sim.set_state(start)
+    sim.brake()
+    sim.step(200)
+    assert np.linalg.norm((sim.q - start)[:3]) < 0.01

@@ -3,6 +3,7 @@
 use super::error::CommandError;
 use super::rover::RoverSimulation;
 use super::rover_command::check;
+use crate::multibody::model::Wheel;
 use crate::system::{Command, HeldJoint, Wrench};
 
 impl RoverSimulation {
@@ -226,16 +227,21 @@ impl RoverSimulation {
         })
     }
 
-    /// Checks that the model states gains for every wheel that [`Self::brake`] holds.
+    /// Checks that the model states gains for every wheel that [`Self::brake`] holds. A caster, whose
+    /// torque limit is 0, may roll on without, if another wheel is held.
     ///
     /// # Errors
     /// The first wheel without gains.
     pub fn check_brakes(&self) -> Result<(), CommandError> {
         let model = &self.scene.model;
-        (model.wheels().iter().filter_map(|wheel| wheel.joint)).try_for_each(|j| {
+        let check = |j: usize| {
             let hold = model.hold(j);
             self.check_gains(j, (hold.stiffness, hold.damping))
-        })
+        };
+        let of = |wheel: &Wheel| wheel.joint.map_or(Ok(()), check);
+        let is_any_held = model.wheels().iter().any(|wheel| of(wheel).is_ok());
+        let needed = |wheel: &&Wheel| wheel.torque_limit > 0.0 || !is_any_held;
+        model.wheels().iter().filter(needed).try_for_each(of)
     }
 
     /// Releases joints by name.
