@@ -55,7 +55,7 @@ fn on_stand(change: &dyn Fn(&mut WheelDescription), heading: f64, lower: f64) ->
 }
 
 fn rigid(wheel: &mut WheelDescription) {
-    (wheel.stiffness, wheel.damping) = (None, None);
+    (wheel.stiffness, wheel.damping, wheel.relaxation_length) = (None, None, None);
 }
 
 const STIFFNESS: f64 = 1e5;

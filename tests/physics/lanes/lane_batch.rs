@@ -90,6 +90,7 @@ fn models() -> Vec<Arc<Model>> {
             wheel.rounding = width.map(|_| rounding);
             wheel.stiffness = Some(if is_soft { 2e6 } else { 0.0 });
             wheel.damping = is_soft.then_some(1e4);
+            wheel.relaxation_length = wheel.relaxation_length.filter(|_| is_soft);
         }
         Arc::new(Model::from_description(own).unwrap())
     };

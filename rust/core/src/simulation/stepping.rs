@@ -446,6 +446,7 @@ impl<S: Scene> Simulation<S> {
         self.memory.clone_from(&snapshot.memory);
         self.warm_start.clone_from(&snapshot.warm_start);
         self.forget_last_call();
+        self.stored = Some(self.scene.stored(&self.state, &self.command));
         self.active.clone_from(&snapshot.active);
         Ok(())
     }
