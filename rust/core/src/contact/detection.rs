@@ -371,7 +371,7 @@ pub(crate) fn visit_on_surface(
         }
     };
     let overlaps = |point: &SurfacePoint| {
-        (point.gap >= -shallow || part.overlaps((id, piece), point, &still)) && !is_covered(point)
+        !is_covered(point) && (point.gap >= -shallow || part.overlaps((id, piece), point, &still))
     };
     match piece {
         Primitive::Face(face) => dispatch::visit_on_face(shape, face, base, reach, |point| {
