@@ -199,7 +199,19 @@ fn unrest(
 /// the place where its sides cross the edge did so when rounding allowed. Drums that stood or lay on
 /// two walls fell between them, and hulls trembled.
 #[test]
+fn a_flat_shape_rests_half_over_an_edge_and_on_two_walls() {
+    flat_shapes_rest(&[Support::Edge, Support::Walls], 1, 4);
+}
+
+/// Ignored because it takes minutes; the test above has the supports where bodies fell through.
+#[test]
+#[ignore = "tests/physics/surfaces/supports.rs::a_flat_shape_rests_half_over_an_edge_and_on_two_walls"]
 fn every_flat_shape_rests_on_an_edge_two_walls_a_slot_a_corner_and_spikes() {
+    flat_shapes_rest(&SUPPORTS, usize::MAX, 1);
+}
+
+/// On the first so many places of each support; every so many-th case.
+fn flat_shapes_rest(supports: &[Support], n_places: usize, every: usize) {
     let slab = slab();
     // Turned by rotation vectors; half the height of the body as it lies.
     let bodies: [(&str, [f64; 3], f64); 9] = [
@@ -214,7 +226,8 @@ fn every_flat_shape_rests_on_an_edge_two_walls_a_slot_a_corner_and_spikes() {
         ("radius = 0.2\nwidth = 0.1\nrounding = 0.02", [0.0; 3], 0.05),
     ];
     let mut wrong = Vec::new();
-    for support in SUPPORTS {
+    let mut case = 0;
+    for &support in supports {
         let grounds = [Arc::new(support.mesh()) as Arc<dyn Terrain>, support.map()];
         for (shape, turn, half) in bodies {
             let is_round = shape == ROD || shape == CAPSULE;
@@ -225,17 +238,21 @@ fn every_flat_shape_rests_on_an_edge_two_walls_a_slot_a_corner_and_spikes() {
             let model = body(shape);
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
             for (kind, ground) in ["mesh", "map"].iter().zip(&grounds) {
-                for &[x, z] in support.places() {
+                for &[x, z] in support.places().iter().take(n_places) {
                     for lifted in [0.0, 1e-3] {
                         // Nothing brakes what rolls, and what is all but half over tips over.
                         let is_close = (-0.01..0.0).contains(&x);
                         if (is_round || is_close) && lifted > 0.0 {
                             continue;
                         }
+                        case += 1;
+                        if case % every > 0 {
+                            continue;
+                        }
                         let place = Vector3::new(x, TOP + half, z);
                         if let Some(what) = unrest(&model, ground, place, turn, lifted) {
-                            let case = format!("{shape} {turn:?} {support:?} {kind} {x} {lifted}");
-                            wrong.push(format!("{case}: {what}"));
+                            let at = format!("{shape} {turn:?} {support:?} {kind} {x} {lifted}");
+                            wrong.push(format!("{at}: {what}"));
                         }
                     }
                 }
