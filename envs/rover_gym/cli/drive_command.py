@@ -47,7 +47,7 @@ from rover_gym.cli.options import (
     named_driver,
     named_ground,
     named_model,
-    place_on,
+    places_on,
     warn_of_slope,
 )
 from rover_gym.cli.tape import Tape, Watched
@@ -132,7 +132,6 @@ def drive(
     """Drive a rover to its goal, record the drive and tell how it went.
 
     The environment is Rover-v0, among rocks RoverRocks-v0, on hills RoverHills-v0.
-
     Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.
     """
     _check_time_step(time_step)
@@ -142,15 +141,12 @@ def drive(
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
     check_file("film", film)
-    angles = {"slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading}
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
-    scene |= _given({"difficulty": difficulty, **angles})
+    scene |= _given({"difficulty": difficulty, "slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading})
     named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
-    named |= _given({"nodata": "nan" if nodata is not None and math.isnan(nodata) else nodata})
+    named |= {} if nodata is None else {"nodata": str(nodata)}
     rover, ground = named_model(model), named_ground(terrain, spacing, height_range, nodata)
-    start = place_on(ground, "start", start, map_coordinates=map_coordinates)
-    goal = place_on(ground, "goal", goal, map_coordinates=map_coordinates)
-    options = _given({"position": start, "goal": goal})
+    options = places_on(ground, {"position": start, "goal": goal}, map_coordinates=map_coordinates)
     chosen = named_driver(policy, rover)
     as_given = {**scene, **named, **chosen.arguments}
     arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments}
@@ -162,7 +158,6 @@ def drive(
     title = f"{environment_title(terrain)} with {driver_title(policy)}"
     drives = _Drives(env, Watched(chosen.make(env)), title, as_given, options, list(dict.fromkeys(sensor or ())))
     drives.run(range(seed, seed + episodes), folder, film)
-
     summary = {
         "environment": environment_of(terrain),
         "policy": policy,

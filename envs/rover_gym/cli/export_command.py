@@ -25,7 +25,7 @@ from rover_gym.cli.options import (
     named_driver,
     named_ground,
     named_model,
-    place_on,
+    places_on,
     warn_of_slope,
 )
 from rover_gym.exports.fmu import fmu_library, write_fmu
@@ -121,9 +121,9 @@ def fmu(
         arguments["model"] = rover
     if (ground := named_ground(terrain, spacing, height_range, nodata)) is not None:
         arguments["terrain"] = ground
-    start = place_on(ground, "start", start, map_coordinates=map_coordinates)
+    options = places_on(ground, {"position": start}, map_coordinates=map_coordinates)
     env = gym.make("Rover-v0", **arguments)
-    env.reset(seed=seed, options=None if start is None else {"position": start})
+    env.reset(seed=seed, options=options)
     simulation = env.unwrapped.simulation  # type: ignore[attr-defined]
     say_path("FMU", write_fmu(simulation, output, name=simulation.model.name, axes=axes))  # type: ignore[arg-type]
     env.close()

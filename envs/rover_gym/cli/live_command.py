@@ -69,7 +69,6 @@ def live(
     """Drive a rover in real time in the browser, by hand or with a policy.
 
     By keyboard, gamepad, stick or sliders.
-
     Ctrl-C ends the drive; what was recorded is kept.
     """
     require("websockets", "replay")

@@ -204,15 +204,16 @@ def named_ground(
     return open_terrain(terrain, **given) if is_terrain_file(terrain) else None
 
 
-def place_on(
-    ground: object, option: str, place: tuple[float, float] | None, *, map_coordinates: bool
-) -> tuple[float, float] | None:
-    """A place of an option as (x, z), m; with `map_coordinates` it was given as easting and northing.
+def places_on(
+    ground: object, places: dict[str, tuple[float, float] | None], *, map_coordinates: bool
+) -> dict[str, tuple[float, float]]:
+    """Those places of options that are given, as (x, z), m; with `map_coordinates` they are easting and northing.
 
     Raises:
         OptionError: The ground has no map coordinates.
     """
-    return map_place(ground, option, place) if map_coordinates and place is not None else place
+    given = {name: place for name, place in places.items() if place is not None}
+    return {name: map_place(ground, name, place) for name, place in given.items()} if map_coordinates else given
 
 
 DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on policies."

@@ -17,13 +17,11 @@ from rover_gym.cli.options import (
     HeightRange,
     ModelName,
     NoData,
-    OnMap,
     Spacing,
     Start,
     complete_terrain,
     named_ground,
     named_model,
-    place_on,
     warn_of_slope,
 )
 from rover_gym.economy.economies import Economy, measure_economies
@@ -56,7 +54,6 @@ def scene(
     nodata: NoData = None,
     model: ModelName = BUILT_IN,
     start: Start = None,
-    map_coordinates: OnMap = False,
     slope: Annotated[float, typer.Option(help="Slope of the plane or rocks, degrees, rising along x.")] = 0.0,
     heading: Annotated[float, typer.Option(help="Start heading, degrees to the left of x.")] = 0.0,
     straight: Annotated[
@@ -86,7 +83,6 @@ def scene(
     number("torque", torque)
     rover = named_model(model) or RoverModel()
     ground: Terrain | None = named_ground(terrain, spacing, height_range, nodata)
-    start = place_on(ground, "start", start, map_coordinates=map_coordinates)
     if slope and (ground is not None or terrain == "rug"):
         refuse(OptionError, "slope", slope, "cannot be chosen: the ground defines its slope")
     if ground is None:

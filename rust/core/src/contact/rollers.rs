@@ -1,6 +1,6 @@
-//! Wheels whose friction differs by direction: free rollers, such as those of mecanum wheels, have
-//! friction along the axis of the roller that touches and none across it; materials may have another
-//! friction across the wheel than along it.
+//! Wheels whose friction differs by direction. Free rollers, such as those of mecanum wheels, have
+//! friction along the axis of the roller that touches and none across it; materials may have
+//! another friction across the wheel than along it.
 //!
 //! The frame of such a contact has t along the roller's axis and no b:
 //!

@@ -103,16 +103,10 @@ impl Model {
             .map(|joint| (joint.velocity, joint.passive.armature))
             .collect();
         let has_slides = bodies.iter().any(|body| body.joint.slides());
-        let text = description.to_json().unwrap_or_default();
-        let own_frictions = (description.materials.iter())
-            .map(|own| OwnFriction {
-                material: own.name.clone(),
-                friction_coefficient: own.friction,
-            })
-            .collect();
         let mut model = Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
-            fingerprint: fingerprint(text.bytes()),
+            fingerprint: fingerprint(description.to_json().unwrap_or_default().bytes()),
+            own_frictions: own_frictions(&description),
             has_slides,
             armatures,
             limited,
@@ -132,7 +126,6 @@ impl Model {
             common,
             body_of_velocity: paths.body_of_velocity,
             loops: Vec::new(),
-            own_frictions,
             machines,
         };
         model.build_loops()?;
@@ -449,6 +442,15 @@ fn tree(t: usize, bodies: &[Body], paths: &Paths) -> Tree {
             .sum(),
         bodies: range,
     }
+}
+
+/// The materials with a friction of their own.
+fn own_frictions(description: &ModelDescription) -> Arc<[OwnFriction]> {
+    let of = |own: &MaterialDescription| OwnFriction {
+        material: own.name.clone(),
+        friction_coefficient: own.friction,
+    };
+    description.materials.iter().map(of).collect()
 }
 
 fn wheels(
