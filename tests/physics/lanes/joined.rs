@@ -321,14 +321,23 @@ fn compare(scene: &Scene, steps: usize) -> Met {
         if difference < 1e-9 {
             let places = |sim: &RoverSimulation| {
                 let mut all: Vec<_> = (sim.contacts().iter())
-                    .map(|own| (own.contact.key.part, own.position))
+                    .map(|own| {
+                        (
+                            (own.contact.key.part, own.contact.key.feature),
+                            own.position,
+                        )
+                    })
                     .collect();
                 all.sort_by_key(|own| own.0);
                 all
             };
             for (a, b) in places(&own).iter().zip(&places(&general)) {
-                assert_eq!(a.0, b.0);
-                assert!((0..3).all(|k| (a.1[k] - b.1[k]).abs() < 1e-9));
+                assert_eq!(a.0, b.0, "{} {step}", scene.name);
+                assert!(
+                    (0..3).all(|k| (a.1[k] - b.1[k]).abs() < 1e-9),
+                    "{} {step} {a:?} {b:?}",
+                    scene.name
+                );
             }
         }
     }

@@ -3,9 +3,11 @@
 //! If the direction between the shapes is a face's normal, the wheel stands on that face as on a
 //! plane: its lowest rim point and, lying flat, one to either side ([`super::disc_plane`]), as far
 //! as they are over the face; lying over the face's edge, also the ends of its chord there. If the
-//! direction is the axle, the box's corners stand on the disc. At edges and corners [`super::convex`] gives the nearest points or the shortest way out.
+//! direction is the axle, the box's corners stand on the disc. At edges and corners
+//! [`super::convex`] gives the nearest points or the shortest way out.
 //!
-//! The gap's rate is exact, except for the two rim points beside the lowest, as on a plane.
+//! The gap's rate is exact, except for the two rim points beside the lowest, as on a plane, and for
+//! the ends of a chord, which slide along the edge as the disc turns.
 
 use nalgebra::Vector3;
 
