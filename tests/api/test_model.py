@@ -197,7 +197,7 @@ def test_a_binary_file_and_a_missing_one(tmp_path):
         with pytest.raises(FileNotFoundError) as missing:
             call(tmp_path / "no" / "such.file")
         assert missing.value.filename == str(tmp_path / "no" / "such.file")
-    with pytest.raises(IsADirectoryError, match=str(tmp_path)):
+    with pytest.raises(rover_gym.ModelError, match=f"regular file, got '{tmp_path}'"):
         rover_gym.RoverModel.from_file(tmp_path)
 
 
