@@ -56,6 +56,13 @@ def test_motor_table_is_the_model(env: RoverEnv) -> None:
         assert rows == {name: getattr(motor, name) for name in ("stall_torque", "no_load_speed", "regenerating")}
 
 
+def test_wheel_table_is_the_model(env: RoverEnv) -> None:
+    rows = {name: ast.literal_eval(value) for name, value, _, _ in table("Wheels")}
+    for wheel in env.model.to_dict()["wheels"]:
+        assert rows == {name: wheel[name] for name in rows}
+    assert set(rows) == {"stiffness", "damping", "relaxation_length"}
+
+
 def test_observation_table_is_the_layout(env: RoverEnv) -> None:
     rows = table("Observation")
     layout = env.observation_layout

@@ -83,13 +83,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     The full command is therefore available up to half the no-load speed, and the top speed on level ground is 3 m/s.
     `model=RoverModel().replace(motor=Motor(...))` changes the motors; with `motor=None` a wheel gets its command at any speed.
 
+    ## Wheels
+
     The wheels yield where they touch, and slip sideways by a small angle under a side force. Those of the built-in rover:
 
     | quantity          | value | unit  | meaning                                                      |
     |-------------------|-------|-------|--------------------------------------------------------------|
     | stiffness         | 4.7e6 | N/m   | upright and along the surface: 0.33 mm under the load        |
     | damping           | 5.5e4 | N s/m | upright: critical                                            |
-    | relaxation_length | 8.2   | mm    | way of rolling that renews the deflection along the surface  |
+    | relaxation_length | 0.0082 | m    | way of rolling that renews the deflection along the surface  |
 
     ## Observation
 
