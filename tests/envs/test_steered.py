@@ -62,7 +62,7 @@ def test_what_needs_steering_is_refused() -> None:
         RoverEnv(steered=False, max_steering_deg=10.0)
     env = RoverEnv(steered=False)
     env.reset(seed=0)
-    for actions in (np.zeros(12), np.full(6, 1.5)):
+    for actions in (np.zeros(12), np.full(6, np.nan)):
         with pytest.raises(CommandError):
             env.step(actions.astype(np.float32))
     rovers = RoverVectorEnv(2, steered=False)

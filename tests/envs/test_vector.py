@@ -338,6 +338,7 @@ def test_an_episode_keeps_its_end_through_a_pickle() -> None:
     progress: bytes = copied(env.snapshot()).progress
     again = copied(EpisodeRun.from_bytes(env.task.rules, progress))
     assert isinstance(again, EpisodeRun)
+    assert info.pop("clipped_actions") == 0
     assert again.info() == info
     twin = RoverEnv(goal_distance=0.6, goal_bearing_deg=0.0, goal_tolerance=0.59)
     twin.restore(copied(env.snapshot()))

@@ -30,8 +30,8 @@ proptest! {
         let model = folding(tips()[tip]);
         let (q, found) = contacts(&model, [yaw, lift, wrist], turn);
         // Excluded are the rim points beside a wheel's lowest, which support it only when it lies
-        // flat, the ends of its chord over an edge, which slide along it, and crossings of two edges:
-        // their modules state the error.
+        // flat, the ends of its chord over an edge, which slide along it, and crossings of two
+        // edges: their modules state the error.
         let is_exact = |c: &&Contact| match (tip, c.key.feature) {
             (2, feature) if feature & (1 << 15) != 0 => false,
             (0, feature) if feature & (1 << 13) != 0 => feature & 31 < 8,

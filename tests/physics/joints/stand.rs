@@ -1,7 +1,7 @@
 //! Machines on a test stand: loops hold the trunk, so that nothing moves their wheels' contacts.
 //!
-//! Noise stood on W's diagonal there. At a heading of 0.3 rad the wheels got forces of 1e11 N and were
-//! braked to a stop, in steps that had converged.
+//! Noise stood on W's diagonal there. At a heading of 0.3 rad the wheels got forces of 1e11 N and
+//! were braked to a stop, in steps that had converged.
 
 use std::sync::Arc;
 

@@ -397,9 +397,9 @@ fn lower_into_a_spiky_map(bodies: &[(Model, Part)], seed: u64, wrong: &mut Vec<S
     tried
 }
 
-/// A rock that lay on a rough map almost at rest was thrown 3 cm aside: of a steep ridge that it did not
-/// touch an edge counted, 13 cm deep, as the way behind the edge led through the ridge, across the
-/// valley with the rock and into the next hill.
+/// A rock that lay on a rough map almost at rest was thrown 3 cm aside: of a steep ridge that it
+/// did not touch an edge counted, 13 cm deep, as the way behind the edge led through the ridge,
+/// across the valley with the rock and into the next hill.
 #[test]
 fn a_rock_in_a_valley_is_not_in_the_ground_behind_the_next_ridge() {
     let heights: [[f32; 7]; 7] = [

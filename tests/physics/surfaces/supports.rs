@@ -196,8 +196,8 @@ fn unrest(
 }
 
 /// A box half over a block's edge never came to rest: only its corners over the block bore it, and
-/// the place where its sides cross the edge did so when rounding allowed. Drums that stood or lay on
-/// two walls fell between them, and hulls trembled.
+/// the place where its sides cross the edge did so when rounding allowed. Drums that stood or lay
+/// on two walls fell between them, and hulls trembled.
 #[test]
 fn a_flat_shape_rests_half_over_an_edge_and_on_two_walls() {
     flat_shapes_rest(&[Support::Edge, Support::Walls], 1, 4);
@@ -240,8 +240,8 @@ fn flat_shapes_rest(supports: &[Support], n_places: usize, every: usize) {
             for (kind, ground) in ["mesh", "map"].iter().zip(&grounds) {
                 for &[x, z] in support.places().iter().take(n_places) {
                     for lifted in [0.0, 1e-3] {
-                        // Nothing brakes what rolls, what is all but half over tips over, and what a
-                        // wheel that yields is dropped by dies away slowly.
+                        // Nothing brakes what rolls, what is all but half over tips over, and what
+                        // a wheel that yields is dropped by dies away slowly.
                         let is_close = (-0.01..0.0).contains(&x);
                         let yields = model.has_compliance();
                         if (is_round || is_close || yields) && lifted > 0.0 {

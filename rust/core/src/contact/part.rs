@@ -115,6 +115,7 @@ impl Part {
     /// [`Mechanism::travel`]: crate::multibody::Mechanism::travel
     #[inline]
     #[must_use]
+    #[allow(clippy::type_complexity)] // a tread, and body, axle and radius of its wheel
     pub(crate) fn tread(self, model: &Model) -> Option<(Tread, (usize, [f64; 3], f64))> {
         let Self::Wheel(i) = self else {
             return None;

@@ -79,8 +79,8 @@ impl OverSurfaces<'_> {
     }
 
     /// The furthest place behind an edge, up to the depth of a point there, to which the ground is
-    /// unbroken. Beyond the far side of a steep ridge there may be a valley, with the part in it, and
-    /// then ground again.
+    /// unbroken. Beyond the far side of a steep ridge there may be a valley, with the part in it,
+    /// and then ground again.
     fn behind(&self, (id, piece): (u32, &Primitive), point: &SurfacePoint) -> Vector3<f64> {
         let Primitive::Edge(edge) = piece else {
             return Vector3::zeros();

@@ -34,8 +34,8 @@
 //!
 //! # May use
 //!
-//! [`crate::scalar`], [`crate::spatial`], [`crate::law`], [`crate::contact`], [`crate::problem`],
-//! [`crate::solver`].
+//! [`crate::caught`], [`crate::scalar`], [`crate::spatial`], [`crate::law`], [`crate::contact`],
+//! [`crate::problem`], [`crate::solver`].
 //!
 //! No machine: a scheme knows a [`MechanicalSystem`].
 

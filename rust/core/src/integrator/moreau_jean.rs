@@ -171,8 +171,8 @@ impl Part<'_> {
         Ok(report)
     }
 
-    /// Takes the step in `n` equal parts, or leaves everything as it was, also where one panics. The remembered impulses
-    /// are those of a part meanwhile.
+    /// Takes the step in `n` equal parts, or leaves everything as it was, also where one panics.
+    /// The remembered impulses are those of a part meanwhile.
     fn divide<S: MechanicalSystem>(
         self,
         n: f64,

@@ -265,8 +265,8 @@ pub(super) fn add_correction<S: MechanicalSystem>(
 /// two slopes cannot leave both. If the solver finds none, the impact is taken as inelastic. That
 /// problem always has a solution, since rest is admissible on ground at rest.
 ///
-/// Starts from `ws.p`, or without a warm start from zero. `v_begin`: the velocity before the step. `is_from_start`: `ws.v` is still
-/// that velocity, whose local velocity is known.
+/// Starts from `ws.p`, or without a warm start from zero. `v_begin`: the velocity before the step.
+/// `is_from_start`: `ws.v` is still that velocity, whose local velocity is known.
 pub(super) fn solve_contacts<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,

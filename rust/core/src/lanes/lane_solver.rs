@@ -225,7 +225,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             };
         }
         let pivot = self.system.least_pivot(lane);
-        if !(pivot > 0.0) {
+        if pivot.is_nan() || pivot <= 0.0 {
             return Freedom::Unknown;
         }
         let mut slides = false;

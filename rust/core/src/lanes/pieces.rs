@@ -6,8 +6,8 @@
 //! ground, its contacts are found lane by lane.
 //!
 //! What is kept decides only what need not be compared: a face touches with the same bits here and
-//! where contacts are found lane by lane, and in the same order. So a step does not depend on when a
-//! search was made.
+//! where contacts are found lane by lane, and in the same order. So a step does not depend on when
+//! a search was made.
 
 use std::sync::Arc;
 

@@ -36,6 +36,7 @@ pub const fn block(i: usize, j: usize) -> usize {
 /// Contacts are numbered without gaps; entries beyond the last are not read. A contact's three
 /// unknowns are its normal and two tangents. A problem has either `W` or its factors.
 #[derive(Debug)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub struct ContactProblem {
     /// Number of contacts, at most [`MAX_DENSE`], or [`MAX_CONTACTS`] with factors; dry joints are
     /// counted, too.

@@ -162,11 +162,7 @@ impl<T: Lane> Rows<T> {
             swept: vec![zero; machine.nv()],
             swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
             loops,
-            spread: if machine.holds_the_world {
-                vec![[zero; 3]; n_slots * machine.nv()]
-            } else {
-                Vec::new()
-            },
+            spread: vec![[zero; 3]; usize::from(machine.holds_the_world) * n_slots * machine.nv()],
             held: Vec::new(),
             immovable: vec![T::mask(token, 0); n_slots],
             closing: vec![zero; n_slots],

@@ -76,7 +76,7 @@ impl<T: Lane> Yields<T> {
             let wheel = machine.wheels.get(w)?; // none of a stop or a spare slot
             let tread = wheel.tread?;
             let parts = (wheel.body, wheel.axle, wheel.radius);
-            Some(tread.rolling(machine.travel(parts, poses, |k| v[k])))
+            Some(tread.rolling(poses.travel(machine, parts, |k| v[k])))
         };
         let mut spring = of(contacts.part(slot));
         if spring.is_some() {

@@ -24,9 +24,10 @@
 //!
 //! In steady rolling `u_T/V = −f_T/(k_T σ)`: a side force needs a slip angle, and k_T σ is the
 //! cornering stiffness. A parked wheel has V = 0 and does not creep. Where the last step is not
-//! known, the contact is taken in steady rolling, `p_T⁻ = p_T`, and where it hardly rolls a share of
-//! the spring acts. The limit for k → ∞ is the rigid wheel. Along the surface there is no damper:
-//! relaxation and the implicit step take its place. W has a positive diagonal, and a machine on more contacts than it needs has one set of loads.
+//! known, the contact is taken in steady rolling, `p_T⁻ = p_T`, and where it hardly rolls a share
+//! of the spring acts. The limit for k → ∞ is the rigid wheel. Along the surface there is no
+//! damper: relaxation and the implicit step take its place. W has a positive diagonal, and a
+//! machine on more contacts than it needs has one set of loads.
 //!
 //! Sources: Anitescu and Potra 2002, *A time-stepping method for stiff multibody dynamics with
 //! contact and friction*, IJNME 55, 753–784; for the relaxation Pacejka 2012, *Tire and Vehicle
@@ -98,7 +99,8 @@ pub struct Yielding<T = f64> {
 const SLACK: f64 = 1e-6;
 
 /// Share of the spring along the surface that acts where the last step is not known and the contact
-/// hardly rolls. It makes loads unique; a rover parked across a slope of 10 degrees creeps by 0.1 mm/s if no step is remembered.
+/// hardly rolls. It makes loads unique; a rover parked across a slope of 10 degrees creeps by 0.1
+/// mm/s if no step is remembered.
 const UNKNOWN: f64 = 0.01;
 
 impl<T: Lane> Compliance<T> {

@@ -7,7 +7,6 @@
 use std::ops::Range;
 
 use super::joint::{Coupling, Joint, Motion, free};
-use super::poses::Poses;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Number of velocities of a free root. Every path of its tree starts with them.
@@ -245,26 +244,6 @@ impl Mechanism {
             velocity += motion(mover.motion).velocity_at(x) * v(mover.velocity);
         }
         velocity
-    }
-
-    /// Speed at which a wheel's point of contact travels over its tread, R |ω·s|, m/s. `wheel`: its
-    /// body, its unit axle in the body's frame, its radius, m; `v`: each velocity.
-    #[inline(always)]
-    pub(crate) fn travel<T: Lane>(
-        &self,
-        (body, axle, radius): (usize, [f64; 3], f64),
-        poses: &Poses<T>,
-        v: impl Fn(usize) -> T,
-    ) -> T {
-        let s = poses.bodies[body].R.times_shared(axle);
-        let mut spin = match self.base_of(body) {
-            Some(first) => Vec3::new(v(first + 3), v(first + 4), v(first + 5)).dot(s),
-            None => s.x.like(0.0),
-        };
-        for mover in self.movers(body) {
-            spin += poses.motions[mover.motion].axis.dot(s) * v(mover.velocity);
-        }
-        spin.abs() * s.x.like(radius)
     }
 
     /// Velocities that move body `b`: those of a free root, then of the joints outwards.

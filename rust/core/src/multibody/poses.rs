@@ -41,6 +41,26 @@ pub struct Pose<T> {
 }
 
 impl<T: Lane> Poses<T> {
+    /// Speed at which a wheel's point of contact travels over its tread, R |ω·s|, m/s. `wheel`: its
+    /// body, its unit axle in the body's frame, its radius, m; `v`: each velocity.
+    #[inline(always)]
+    pub(crate) fn travel(
+        &self,
+        mechanism: &Mechanism,
+        (body, axle, radius): (usize, [f64; 3], f64),
+        v: impl Fn(usize) -> T,
+    ) -> T {
+        let s = self.bodies[body].R.times_shared(axle);
+        let mut spin = match mechanism.base_of(body) {
+            Some(first) => Vec3::new(v(first + 3), v(first + 4), v(first + 5)).dot(s),
+            None => s.x.like(0.0),
+        };
+        for mover in mechanism.movers(body) {
+            spin += self.motions[mover.motion].axis.dot(s) * v(mover.velocity);
+        }
+        spin.abs() * s.x.like(radius)
+    }
+
     /// Room for a mechanism.
     #[must_use]
     pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {

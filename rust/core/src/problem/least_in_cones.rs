@@ -2,8 +2,31 @@
 //!
 //! Newton's method on the dual problem, see [`Cones`]. It runs only where the least impulses
 //! without regard to the cones leave one, as those of a box on a steep slope.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use super::redundancy::{Kind, ON_THE_CONE, Touching};
+/// Excess over a cone, relative to the largest impulse, that counts as rounding.
+pub(super) const ON_THE_CONE: f64 = 1e-13;
+
+/// What a contact may bear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Kind {
+    /// An impulse in its cone.
+    Rests,
+    /// A multiple of this unit vector.
+    Slides([f64; 3]),
+    /// The friction of a joint: at most so much along t.
+    Rubs(f64),
+}
+
+/// A contact that may bear something, and the first of its unknowns.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touching {
+    pub(super) contact: usize,
+    pub(super) kind: Kind,
+    pub(super) first: usize,
+    pub(super) mu: f64,
+    pub(super) is_joint: bool,
+}
 
 /// Most steps. Tables of five legs near tipping, and boxes on slopes up to the limit of friction,
 /// take 3 to 6.
@@ -27,7 +50,7 @@ pub(super) struct Cones {
     least: Vec<f64>,
     w: Vec<f64>,
     trial: Vec<f64>,
-    on_cones: Vec<f64>,
+    projected: Vec<f64>,
     gradient: Vec<f64>,
     next: Vec<f64>,
     step: Vec<f64>,
@@ -49,22 +72,7 @@ impl Cones {
         y: &mut [f64],
     ) -> bool {
         let scale = self.roots.iter().fold(0.0_f64, |most, x| most.max(*x)) * size;
-        for own in [
-            &mut self.least,
-            &mut self.w,
-            &mut self.trial,
-            &mut self.on_cones,
-            &mut self.gradient,
-            &mut self.next,
-            &mut self.step,
-        ] {
-            own.clear();
-            own.resize(n, 0.0);
-        }
-        for k in 0..n {
-            self.least[k] = self.roots[k] * y[k];
-        }
-        self.w.copy_from_slice(&self.least);
+        self.begin(n, y);
         self.slopes.resize(touching.len(), [0.0; 9]);
         let mut value = self.evaluate(touching, d, n, false);
         std::mem::swap(&mut self.gradient, &mut self.next);
@@ -113,11 +121,11 @@ impl Cones {
             touching,
             d,
             (&self.w, &self.roots),
-            &mut self.on_cones,
+            &mut self.projected,
             None,
         );
         for k in 0..n {
-            self.step[k] = self.on_cones[k] - self.least[k];
+            self.step[k] = self.projected[k] - self.least[k];
         }
         for row in self.Q.chunks_exact(n) {
             let along: f64 = row.iter().zip(&self.step).map(|(a, b)| a * b).sum();
@@ -131,14 +139,34 @@ impl Cones {
         is_found
     }
 
+    /// Makes room for n unknowns and begins at the impulses `y`.
+    fn begin(&mut self, n: usize, y: &[f64]) {
+        for own in [
+            &mut self.least,
+            &mut self.w,
+            &mut self.trial,
+            &mut self.projected,
+            &mut self.gradient,
+            &mut self.next,
+            &mut self.step,
+        ] {
+            own.clear();
+            own.resize(n, 0.0);
+        }
+        for k in 0..n {
+            self.least[k] = self.roots[k] * y[k];
+        }
+        self.w.copy_from_slice(&self.least);
+    }
+
     /// θ at `w`, or at the trial; its gradient into `next`.
     fn evaluate(&mut self, touching: &[Touching], d: usize, n: usize, of_trial: bool) -> f64 {
         let w = if of_trial { &self.trial } else { &self.w };
-        project(touching, d, (w, &self.roots), &mut self.on_cones, None);
+        project(touching, d, (w, &self.roots), &mut self.projected, None);
         let mut value = 0.0;
         for k in 0..n {
-            value += 0.5 * self.on_cones[k] * self.on_cones[k] - self.least[k] * w[k];
-            self.next[k] = self.on_cones[k] - self.least[k];
+            value += 0.5 * self.projected[k] * self.projected[k] - self.least[k] * w[k];
+            self.next[k] = self.projected[k] - self.least[k];
         }
         flatten(&self.Q, n, &mut self.next);
         value
@@ -156,7 +184,7 @@ impl Cones {
             touching,
             d,
             (&self.w, &self.roots),
-            &mut self.on_cones,
+            &mut self.projected,
             slopes,
         );
         self.matrix.clear();

@@ -18,14 +18,17 @@
 //!
 //! - [`Redundancy::settle`] replaces an answer by the least one: an elimination with the largest
 //!   pivots finds N, a projection the least y. Only if that leaves a cone, Newton's method on the
-//!   dual problem follows (Qi and Sun 1993, Polyak 2002 for the projection on cones and a plane).
+//!   dual problem follows (Qi and Sun 1993).
 //! - [`Redundancy::settle_problem`] does so for all groups of contacts of a problem.
 //! - [`undetermined_loads`] counts the contacts concerned.
 //!
 //! Where a contact yields, W has a positive number on its diagonal, and nothing is open.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::friction_contact::FrictionContactProblem;
-use super::least_in_cones::{Cones, backward, cholesky, forward, norm};
+use super::least_in_cones::{
+    Cones, Kind, ON_THE_CONE, Touching, backward, cholesky, forward, norm,
+};
 use super::operator::Operator;
 use super::residual::{Residual, evaluate_into};
 
@@ -40,33 +43,9 @@ const DEPENDENT: f64 = 1e-12;
 /// Share of a null vector below which it does not concern a contact.
 const CONCERNED: f64 = 1e-6;
 
-/// Excess over a cone, relative to the largest impulse, that counts as rounding.
-pub(super) const ON_THE_CONE: f64 = 1e-13;
-
 /// Most contacts of a group whose impulses are settled. Those of a heap, which takes many
 /// factorisations anyway, stay as the solver finds them.
 pub(crate) const MOST_SETTLED: usize = 32;
-
-/// What a contact may bear.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Kind {
-    /// An impulse in its cone.
-    Rests,
-    /// A multiple of this unit vector.
-    Slides([f64; 3]),
-    /// The friction of a joint: at most so much along t.
-    Rubs(f64),
-}
-
-/// A contact that may bear something, and the first of its unknowns.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Touching {
-    contact: usize,
-    pub(super) kind: Kind,
-    pub(super) first: usize,
-    pub(super) mu: f64,
-    is_joint: bool,
-}
 
 /// A problem and its answer. `D` entries a contact.
 pub(crate) struct Answered<'a, B: Fn(usize, usize) -> [f64; 9]> {
@@ -182,6 +161,7 @@ impl Redundancy {
 
     /// Finds the null vectors of the contacts that may bear something.
     #[inline(always)]
+    #[allow(clippy::needless_pass_by_value)] // an iterator that is cloned
     fn find<B: Fn(usize, usize) -> [f64; 9]>(
         &mut self,
         answered: &Answered<'_, B>,
@@ -312,8 +292,8 @@ impl Redundancy {
         }
     }
 
-    /// Eliminates with the pivots that are largest relative to their contact's block of W, as far as
-    /// there are any.
+    /// Eliminates with the pivots that are largest relative to their contact's block of W, as far
+    /// as there are any.
     #[inline(always)]
     fn eliminate(&mut self) {
         let stride = stride(self.n);
@@ -570,6 +550,7 @@ fn slide(mu: f64, block: &[f64; 9], p: &[f64], u: &[f64]) -> Kind {
 /// Whether the block of a contact may be that of a joint's stop or dry friction, whose entries on
 /// the diagonal are equal and have nothing beside them.
 #[inline(always)]
+#[allow(clippy::float_cmp)] // a joint's block has equal entries to the bit
 fn is_alone(w: &[f64; 9]) -> bool {
     w[0] == w[4] && w[4] == w[8] && [1, 2, 5].iter().all(|k| w[*k] == 0.0)
 }

@@ -33,7 +33,8 @@
 //!
 //! # May use
 //!
-//! `pool`, [`crate::quantity`], [`crate::scalar`], [`crate::spatial`], [`crate::multibody`],
+//! [`crate::caught`], `pool`, [`crate::quantity`], [`crate::scalar`], [`crate::spatial`],
+//! [`crate::multibody`],
 //! [`crate::sand`], [`crate::geometry`], [`crate::contact`], [`crate::problem`],
 //! [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`],
 //! [`crate::lanes`].

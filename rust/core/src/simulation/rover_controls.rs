@@ -227,8 +227,8 @@ impl RoverSimulation {
         })
     }
 
-    /// Checks that the model states gains for every wheel that [`Self::brake`] holds. A caster, whose
-    /// torque limit is 0, may roll on without, if another wheel is held.
+    /// Checks that the model states gains for every wheel that [`Self::brake`] holds. A caster,
+    /// whose torque limit is 0, may roll on without, if another wheel is held.
     ///
     /// # Errors
     /// The first wheel without gains.

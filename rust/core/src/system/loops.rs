@@ -48,8 +48,8 @@ use crate::scalar::{Lane, LaneMask, Single};
 /// Loops that close to a micrometre make redundant rows differ by 1e-6 of their length.
 const DEPENDENT: f64 = 1e-5;
 
-/// Part of an entry on W's diagonal that the loops leave, relative to what it is without them, below
-/// which it is rounding: of a difference `Z² − B²`, and of the square of a projected row.
+/// Part of an entry on W's diagonal that the loops leave, relative to what it is without them,
+/// below which it is rounding: of a difference `Z² − B²`, and of the square of a projected row.
 ///
 /// A sum over a hundred velocities rounds to about 1e-14 of itself. A projected row rounds to 1e-15
 /// of its length, and to 1e-11 where rows of the loops nearly depend on each other
@@ -375,8 +375,8 @@ impl<T: Lane> Loops<T> {
         }
     }
 
-    /// Along which directions the loops let nothing move a contact: `free` and `left` are its part of
-    /// W's diagonal without them and with them, 1/kg.
+    /// Along which directions the loops let nothing move a contact: `free` and `left` are its part
+    /// of W's diagonal without them and with them, 1/kg.
     #[inline(always)]
     pub(crate) fn holds(free: &Triple<T>, left: &Triple<T>, rounded: f64) -> [T::Mask; 3] {
         [0, 1, 2].map(

@@ -272,7 +272,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         let (model, poses) = (self.model, self.parts.kinematics.poses());
         let of = |part: Part| {
             let (tread, wheel) = part.tread(model)?;
-            Some(tread.rolling(model.mechanism().travel(wheel, poses, |k| v[k])))
+            Some(tread.rolling(poses.travel(model.mechanism(), wheel, |k| v[k])))
         };
         Compliance::in_series(of(contact.part), contact.other.and_then(|own| of(own.part)))
     }

@@ -2,10 +2,10 @@
 //! faces and edges on a convex vertex.
 //!
 //! Of the box's twelve edges those along one axis share the normal `n ∝ e × f` with an edge of the
-//! surface, and the side of n decides which of the four can touch: one, or both of a side of the box
-//! that lies flat on the edge. A corner that has not yet come down to an edge is met too. The
-//! feature at an edge is the number of the box's edge ([`OrientedBox::edge`]), or 12 and the corner's
-//! number.
+//! surface, and the side of n decides which of the four can touch: one, or both of a side of the
+//! box that lies flat on the edge. A corner that has not yet come down to an edge is met too. The
+//! feature at an edge is the number of the box's edge ([`OrientedBox::edge`]), or 12 and the
+//! corner's number.
 
 use nalgebra::Vector3;
 
@@ -17,8 +17,8 @@ use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 /// Sine of the angle between two edges below which they have no common normal.
 const PARALLEL: f64 = 1e-9;
 
-/// Sine of the angle by which a normal may leave the normals of an edge of the box: a side that lies
-/// flat on an edge of the surface rests on two of its own.
+/// Sine of the angle by which a normal may leave the normals of an edge of the box: a side that
+/// lies flat on an edge of the surface rests on two of its own.
 const SLACK: f64 = 0.02;
 
 /// Fraction of the box's size by which a crossing may lie beyond the ends of the edges.
@@ -136,8 +136,8 @@ pub fn point_at_edge(
     )
 }
 
-/// The common normal of an edge of the surface and the box's edges along an axis, out of the ground,
-/// and the sine of their angle.
+/// The common normal of an edge of the surface and the box's edges along an axis, out of the
+/// ground, and the sine of their angle.
 #[inline]
 fn normal(solid: &OrientedBox, edge: &Edge, axis: usize) -> Option<(Vector3<f64>, f64)> {
     let across = edge.along.cross(&solid.axis(axis));

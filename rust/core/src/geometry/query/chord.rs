@@ -19,9 +19,9 @@ pub(super) struct End {
     pub height: f64,
 }
 
-/// The ends of the chord of a disc over a line from `start` (m) with the unit direction `along`, seen
-/// along n, which is the axle or opposite to it: the one that is earlier on the line first. None if
-/// the line passes beside the disc or leans against it by more than [`LIES`].
+/// The ends of the chord of a disc over a line from `start` (m) with the unit direction `along`,
+/// seen along n, which is the axle or opposite to it: the one that is earlier on the line first.
+/// None if the line passes beside the disc or leans against it by more than [`LIES`].
 #[inline]
 pub(super) fn ends(
     disc: &Disc,

@@ -88,8 +88,8 @@ pub fn points(disc: &Disc, solid: &OrientedBox, reach: f64, mut visit: impl FnMu
     }
 }
 
-/// The end of the disc's chord over an edge of the box, and whether the edge reaches there. The code
-/// is 32 if the box is towards the axle's head, and the edge's number, and the end.
+/// The end of the disc's chord over an edge of the box, and whether the edge reaches there. The
+/// code is 32 if the box is towards the axle's head, and the edge's number, and the end.
 fn chord_end(disc: &Disc, solid: &OrientedBox, code: usize) -> Option<(PairPoint, bool)> {
     let n = disc.axle * if code >> 5 & 1 == 1 { 1.0 } else { -1.0 };
     let (middle, along, half) = solid.edge(code >> 1 & 15);

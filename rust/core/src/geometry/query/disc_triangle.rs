@@ -27,9 +27,9 @@ use super::{CHORD, NEAREST, SurfacePoint, disc_sphere};
 use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
 use crate::geometry::{Disc, Sphere};
 
-/// Sine of the angle between a disc and an edge up to which the ends of the chord are the only points. The lower one is then the point
-/// of the normal that separates most but for half the square of this, relative to the radius, and
-/// rounding does not swap the names of the ends.
+/// Sine of the angle between a disc and an edge up to which the ends of the chord are the only
+/// points. The lower one is then the point of the normal that separates most but for half the
+/// square of this, relative to the radius, and rounding does not swap the names of the ends.
 const FLAT: f64 = 1e-6;
 
 /// Fraction of the radius by which the end of a chord may lie beyond the edge.
@@ -87,9 +87,9 @@ pub fn rim_points_at_edge(
     }
 }
 
-/// Visits the ends of the chord of a disc that lies on an edge: both if it lies flat, and the higher
-/// one otherwise. `down`: the only direction along the axle in which it may lie. Whether both ends
-/// were visited.
+/// Visits the ends of the chord of a disc that lies on an edge: both if it lies flat, and the
+/// higher one otherwise. `down`: the only direction along the axle in which it may lie. Whether
+/// both ends were visited.
 #[inline]
 pub(super) fn visit_chord(
     disc: &Disc,

@@ -199,8 +199,8 @@ pub fn point_at_edge(
 
 /// Whether a convex vertex of a surface may push a shape along the normal of its point there.
 ///
-/// A round shape is pushed by the vertex where it would not be by an edge. A flat side or a straight
-/// line rests on the vertices at the ends of what it lies on, whatever the rounding.
+/// A round shape is pushed by the vertex where it would not be by an edge. A flat side or a
+/// straight line rests on the vertices at the ends of what it lies on, whatever the rounding.
 #[inline]
 #[must_use]
 pub fn pushes(vertex: &Vertex, shape: &PlacedShape<'_>, n: &Vector3<f64>) -> bool {

@@ -13,10 +13,10 @@
 //! | capsule | | its axis, with its radius |
 //! | disc, ellipsoid, sphere | | |
 //!
-//! Two lines that cross have the gap `n · (b − a) − r_a − r_b` with the normal n across both. A tread
-//! beside another one, or along an edge, almost parallel, touches it at the ends of what they share:
-//! the ends of the one that are abreast of the other. Whatever no such point explains is left to the
-//! nearest points, so that the deepest place always counts.
+//! Two lines that cross have the gap `n · (b − a) − r_a − r_b` with the normal n across both. A
+//! tread beside another one, or along an edge, almost parallel, touches it at the ends of what they
+//! share: the ends of the one that are abreast of the other. Whatever no such point explains is
+//! left to the nearest points, so that the deepest place always counts.
 //!
 //! The gap's rate is exact at vertices, at treads and at lines that cross; at the two points of a
 //! rim beside the lowest it is as on a plane ([`super::disc_plane`]).
@@ -32,8 +32,8 @@ const ALONG: f64 = 1e-5;
 /// Sine below which the axes of two treads have no common normal worth using.
 const PARALLEL: f64 = 0.1;
 
-/// The same where one of the lines is an edge. Where edges of two outlines cross at less, cutting off
-/// their corner takes 0.025 % of their length at most.
+/// The same where one of the lines is an edge. Where edges of two outlines cross at less, cutting
+/// off their corner takes 0.025 % of their length at most.
 const SKEW: f64 = 1e-3;
 
 /// Sine of the angle between a common normal of lines and the direction between the shapes, at
@@ -44,8 +44,8 @@ const ASIDE: f64 = 0.1;
 /// point may be deeper than the other points without being one itself.
 const SLACK: f64 = 1e-6;
 
-/// Features from here on are points on a flat side, crossings of lines, ends of lines, ends of chords,
-/// and crossings of circles.
+/// Features from here on are points on a flat side, crossings of lines, ends of lines, ends of
+/// chords, and crossings of circles.
 const ON_FLAT: usize = 1 << 20;
 const CROSSING: usize = 1 << 21;
 const END: usize = 1 << 22;
@@ -104,17 +104,34 @@ pub fn points(
             && point.n.cross(&near.n).norm() < ASIDE
             && point.gap > near.gap - SLACK * size
     };
+    visit_lines(first, second, sides, &near.n, &mut |point| {
+        if is_alike(point) {
+            offer(point);
+        }
+    });
+    if deepest > near.gap + SLACK * size {
+        visit(&near);
+    }
+}
+
+/// Visits the crossings and ends of straight lines, the ends of chords and the crossings of circles.
+/// `sides`: the flat sides that lie along the direction n between the shapes.
+fn visit_lines(
+    first: &PlacedShape<'_>,
+    second: &PlacedShape<'_>,
+    sides: [Option<usize>; 2],
+    n: &Vector3<f64>,
+    offer: &mut dyn FnMut(&PairPoint),
+) {
     let is_on_side = sides.iter().any(Option::is_some);
     let treads = [is_tread(first), is_tread(second)];
     if is_on_side || treads.contains(&true) {
         let lines = [
-            lines_along(first, sides[0], &near.n),
-            lines_along(second, sides[1], &-near.n),
+            lines_along(first, sides[0], n),
+            lines_along(second, sides[1], &-n),
         ];
         let mut offer_alike = |found: Option<(PairPoint, bool)>| {
-            if let Some((point, true)) = found
-                && is_alike(&point)
-            {
+            if let Some((point, true)) = found {
                 offer(&point);
             }
         };
@@ -144,9 +161,6 @@ pub fn points(
                 offer_alike(circles(first, second, a << 2 | b << 1 | end));
             }
         }
-    }
-    if deepest > near.gap + SLACK * size {
-        visit(&near);
     }
 }
 
@@ -433,8 +447,8 @@ fn chord_end(
     Some((point, end.place.abs() <= half))
 }
 
-/// Where the circles of two flat round sides cross, seen along the normal of the first one. The code
-/// has the numbers of the sides and of the crossing.
+/// Where the circles of two flat round sides cross, seen along the normal of the first one. The
+/// code has the numbers of the sides and of the crossing.
 fn circles(
     first: &PlacedShape<'_>,
     second: &PlacedShape<'_>,

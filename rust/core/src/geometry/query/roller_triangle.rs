@@ -3,9 +3,10 @@
 //! Over a face its points are those over a plane ([`super::roller_plane`]) that lie over the face.
 //! At a convex edge each circle touches like a disc's rim ([`super::disc_triangle`]), lowered along
 //! the normal by the rounding; the ends of a capsule are balls. Where the edge crosses the tread
-//! between the circles, it touches there too, also if the tread lies flat on one of the faces: the normal is `n ∝ s × e`, of axle and edge, and the
-//! gap `n · (c − a) − R` with a point a of the edge. A vertex is a ball of radius zero; one inside
-//! the wheel leaves it through the side that the surface lets it, the tread or a side face.
+//! between the circles, it touches there too, also if the tread lies flat on one of the faces: the
+//! normal is `n ∝ s × e`, of axle and edge, and the gap `n · (c − a) − R` with a point a of the
+//! edge. A vertex is a ball of radius zero; one inside the wheel leaves it through the side that
+//! the surface lets it, the tread or a side face.
 //!
 //! Features at an edge are those of [`super::roller_plane`], and [`TREAD`].
 

@@ -23,8 +23,8 @@ impl OrientedBox {
         self.centre + self.R * self.half_size.component_mul(&signs(number))
     }
 
-    /// Middle, unit direction and half length (m) of an edge: its number is 4 k for an edge along axis
-    /// k, and bits 0 and 1 select the side along the next two axes.
+    /// Middle, unit direction and half length (m) of an edge: its number is 4 k for an edge along
+    /// axis k, and bits 0 and 1 select the side along the next two axes.
     #[inline]
     #[must_use]
     pub fn edge(&self, number: usize) -> (Vector3<f64>, Vector3<f64>, f64) {

@@ -46,6 +46,7 @@ impl Area {
     }
 
     /// Its parts between the borders of others.
+    #[allow(clippy::needless_pass_by_value)] // an iterator that is cloned
     pub fn cut(&self, others: impl Iterator<Item = Self> + Clone) -> impl Iterator<Item = Self> {
         let borders = [0, 1].map(|axis| {
             let [low, high] = self.0[axis];

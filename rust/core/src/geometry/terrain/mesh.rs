@@ -11,8 +11,7 @@ use nalgebra::Vector3;
 use super::error::TerrainError;
 use super::limits::check_entry;
 use super::plane::Plane;
-use super::seams::Rim;
-use super::surface::{Edge, Face, Hinge, Vertex, Wall};
+use super::surface::{Edge, Face, Hinge, Rim, Vertex, Wall};
 use super::{Area, Coverage, GROUND, Neighbourhood, Primitive, Terrain};
 use crate::geometry::broad_phase::{BallTree, Bounds, BoxTree};
 use crate::geometry::ray::triangle::Sheared;
@@ -52,7 +51,8 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// The same with another material of the surface; see [`is_name`](crate::law::materials::is_name).
+    /// The same with another material of the surface; see
+    /// [`is_name`](crate::law::materials::is_name).
     #[must_use]
     pub fn with_material(mut self, name: &str) -> Self {
         self.material = Some(name.into());
@@ -494,8 +494,8 @@ impl Terrain for TriangleMesh {
         above % 2 == 1
     }
 
-    /// What is next above the place must face up, so that a hall of inward faces is not solid. Below
-    /// an open surface, such as a bridge, there may be free space.
+    /// What is next above the place must face up, so that a hall of inward faces is not solid.
+    /// Below an open surface, such as a bridge, there may be free space.
     fn buries(&self, place: &Vector3<f64>, within: f64) -> bool {
         let mut next = (f64::INFINITY, false);
         self.visit_crossings(place.x, place.z, |y, faces_up| {

@@ -30,10 +30,9 @@ pub use mesh::TriangleMesh;
 pub use neighbourhood::Neighbourhood;
 pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
-pub use seams::Rim;
 pub use soft_ground::SoftGround;
 pub use sphere_field::SphereField;
-pub use surface::{Edge, Face, Vertex};
+pub use surface::{Edge, Face, Rim, Vertex};
 pub use union::Union;
 
 use super::ray::{Hit, Ray};

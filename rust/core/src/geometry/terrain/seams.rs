@@ -1,18 +1,18 @@
 //! Where the parts of a ground meet: their borders are inner edges of the union.
 //!
-//! A part knows only itself. At its border, and at the upper edge of a block, it bends away from the
-//! free side and would push a body that slides on to its neighbour. So the edges of every part, its
-//! [`Rim`]s, are compared once with the faces of the others. Where a face goes on beyond an edge,
-//! the union has the edge between these two faces: no piece if they are flat or form a valley, a
-//! ridge otherwise. What is left of the edge stays as it was. At corners there, the edges of all
-//! parts bound the vertex.
+//! A part knows only itself. At its border, and at the upper edge of a block, it bends away from
+//! the free side and would push a body that slides on to its neighbour. So the edges of every part,
+//! its [`Rim`]s, are compared once with the faces of the others. Where a face goes on beyond an
+//! edge, the union has the edge between these two faces: no piece if they are flat or form a
+//! valley, a ridge otherwise. What is left of the edge stays as it was. At corners there, the edges
+//! of all parts bound the vertex.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::surface::{Edge, Face, Hinge, Vertex};
+use super::surface::{Edge, Face, Hinge, Rim, Vertex};
 use super::{Plane, Primitive, Terrain};
 use crate::geometry::broad_phase::BallTree;
 use crate::geometry::query::any_tangent;
@@ -35,27 +35,6 @@ const DEEP: f64 = 0.1;
 
 /// Cosine between the normals of two faces below which they lie back to back.
 const BACK: f64 = -0.9;
-
-/// An edge of a part on one side of which a face ends.
-#[derive(Clone, Copy, Debug)]
-pub struct Rim {
-    /// Number of the face, and of its wall at the edge.
-    pub face: u32,
-    /// See above.
-    pub wall: usize,
-    /// Number of the convex edge that is a piece there, if there is one.
-    pub piece: Option<u32>,
-    /// Numbers of the vertices where it begins and ends.
-    pub corners: [u32; 2],
-    /// Begin and end, world, m: the face is on the side of `normal × (end − start)`.
-    pub start: Vector3<f64>,
-    /// See above.
-    pub end: Vector3<f64>,
-    /// Unit normal of the face.
-    pub normal: Vector3<f64>,
-    /// Unit normal of the face beyond the edge; none at a border.
-    pub beyond: Option<Vector3<f64>>,
-}
 
 /// What changes where parts meet. Numbers are those of the union.
 #[derive(Clone, Debug, Default)]
@@ -119,18 +98,18 @@ impl Seams {
         let mut replaced: BTreeMap<u32, Replaced> = BTreeMap::new();
         let mut corners: BTreeMap<(usize, u32), Corner> = BTreeMap::new();
         let mut least = f64::INFINITY;
+        let others_of = |a: usize| {
+            let others = parts.iter().enumerate();
+            let others = others.filter(move |(b, other)| *b != a && has_faces(other));
+            others.map(|(_, other)| &**other)
+        };
         for (a, part) in parts.iter().enumerate() {
-            let others = || {
-                let all = parts.iter().enumerate();
-                all.filter(|(b, other)| *b != a && has_faces(other))
-                    .map(|(_, other)| &**other)
-            };
             let (mut sum, mut n) = (0.0, 0.0);
             part.visit_rims(&mut |rim| {
                 let line = Line::new(rim);
                 (sum, n) = (sum + line.length, n + 1.0);
                 let mut stretches = Vec::new();
-                for other in others() {
+                for other in others_of(a) {
                     line.find_stretches(other, &mut stretches);
                 }
                 let stretches = line.bounding(&stretches);
@@ -178,12 +157,7 @@ impl Seams {
             seams.replace(piece, own);
         }
         for ((a, corner), at) in corners {
-            let mut others: Vec<&dyn Terrain> = Vec::new();
-            for (b, other) in parts.iter().enumerate() {
-                if b != a && has_faces(other) {
-                    others.push(&**other);
-                }
-            }
+            let others: Vec<&dyn Terrain> = others_of(a).collect();
             seams.place_vertex((&*parts[a], first[a]), (corner, &at), &others);
         }
         let balls: Vec<Sphere> = seams

@@ -109,8 +109,8 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// As [`Self::has`], with its ends `slack` (m) further out: where a line ends on the edge's end,
-    /// rounding leaves no gap between them.
+    /// As [`Self::has`], with its ends `slack` (m) further out: where a line ends on the edge's
+    /// end, rounding leaves no gap between them.
     #[inline]
     #[must_use]
     pub fn has_within(&self, place: f64, depth: f64, slack: f64) -> bool {
@@ -142,9 +142,9 @@ impl Edge {
         self.lean(first, n) < 0.0 && self.lean(second, n) > 0.0
     }
 
-    /// Whether the edge may bear a flat side or a straight line that it crosses, along a unit normal
-    /// n across the edge: one between the faces' normals, or beyond them by a small share of the
-    /// angle between them.
+    /// Whether the edge may bear a flat side or a straight line that it crosses, along a unit
+    /// normal n across the edge: one between the faces' normals, or beyond them by a small share of
+    /// the angle between them.
     ///
     /// What lies flat on one of the faces rests on the edge where that face ends, and then n is the
     /// face's normal but for rounding.
@@ -321,6 +321,27 @@ impl Hinge {
         };
         Self { walls, is_convex }
     }
+}
+
+/// An edge of a part on one side of which a face ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Rim {
+    /// Number of the face.
+    pub face: u32,
+    /// Number of the face's wall at the edge.
+    pub wall: usize,
+    /// Number of the convex edge that is a piece there, if there is one.
+    pub piece: Option<u32>,
+    /// Numbers of the vertices where it begins and ends.
+    pub corners: [u32; 2],
+    /// Begin, world, m.
+    pub start: Vector3<f64>,
+    /// End, world, m: the face is on the side of `normal × (end − start)`.
+    pub end: Vector3<f64>,
+    /// Unit normal of the face.
+    pub normal: Vector3<f64>,
+    /// Unit normal of the face beyond the edge; none at a border.
+    pub beyond: Option<Vector3<f64>>,
 }
 
 #[cfg(test)]

@@ -168,8 +168,8 @@ impl Patch<'_> {
         vertex
     }
 
-    /// Edges of a face in the order of its walls: whose they are, their number, and whether the face
-    /// is the first or the second at it.
+    /// Edges of a face in the order of its walls: whose they are, their number, and whether the
+    /// face is the first or the second at it.
     fn edges_of(half: Half) -> [(Place, u32, usize); 3] {
         match half {
             Half::Low => [([0, 0], 2, 1), ([1, 0], 3, 1), ([0, 0], 4, 0)],
