@@ -13,8 +13,9 @@
 //! - The remaining excess is removed by scaling the velocity, `v⁺ ← s v⁺`. Signorini's condition at
 //!   e = 0 and Coulomb's law are homogeneous in the velocity, so both still hold. With restitution
 //!   the rebounds are slower than Newton's law says, which the report's residual contains.
-//! - Where nothing outside touches the system only the motion relative to the mass centre of the
-//!   whole is scaled, so the linear momentum is kept. Contacts among its own parts feel relative
+//! - Clusters that touch each other are judged together, and apart from all others
+//!   ([`super::groups`]): neither energies nor corrections of other groups count.
+//! - Where nothing outside touches a group only the motion relative to its mass centre is scaled, so the linear momentum is kept. Contacts among its own parts feel relative
 //!   velocities alone. Free flight conserves energy too: without any contact s may be above 1.
 //!
 //! - If even v⁺ = 0 leaves an excess, the displacement is shortened too: a contact ended the motion
@@ -32,12 +33,11 @@
 //! ```
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use super::mechanical_system::{
-    KeyOf, MechanicalEnergy, MechanicalSystem, Start, UnilateralContact,
-};
+use super::groups::{Group, keep_ends, return_ends};
+use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::report::StepReport;
-use super::scratch::{Scratch, ScratchOf};
+use super::scratch::ScratchOf;
 use super::step_contacts::{contact_work, place};
 use super::warm_start::WarmStart;
 use crate::scalar::{Lane, Vec3};
@@ -66,19 +66,23 @@ const LEAST_WAY: f64 = 1e-3;
 /// Most times that a velocity is shortened together with its displacement.
 const MOST_SHORTENINGS: usize = 8;
 
-/// Energy at the start of a step, remembered from the end of the last one if the state is the same.
-pub(super) fn energy_before<S: MechanicalSystem>(
+/// `ws.before`: the clusters' energies at the start of a step, remembered from the end of the last
+/// one if the state is the same.
+pub(super) fn note_energy_before<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
-    ws: &ScratchOf<S>,
-) -> Option<MechanicalEnergy> {
+    ws: &mut ScratchOf<S>,
+) {
     let known = &ws.audited;
-    if known.energy.is_some() && known.v == *start.v && known.configuration == *start.configuration
+    if !known.energies.is_empty()
+        && known.v == *start.v
+        && known.configuration == *start.configuration
     {
-        return known.energy;
+        ws.before.clone_from(&known.energies);
+    } else {
+        system.energies(options, start.configuration, start.v, &mut ws.before);
     }
-    system.energy(options, start.configuration, start.v)
 }
 
 /// Result of an audit.
@@ -92,11 +96,9 @@ pub(super) enum Verdict {
 
 /// Limits of an audit.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Audit {
-    /// Energy before the step; none where the system is not audited.
-    pub before: Option<MechanicalEnergy>,
-    /// Whether no safer way to take the step is left.
-    pub is_last: bool,
+pub(super) struct Audit<F> {
+    /// Whether no safer way to take the step of a group is left.
+    pub is_last: F,
     /// Fraction of the kinetic energy that may be gained, see [`GAIN`].
     pub gain: f64,
     /// Fraction of the kinetic energy that free flight may gain or lose: an error of the scheme's
@@ -104,8 +106,9 @@ pub(super) struct Audit {
     pub drift: f64,
 }
 
-impl Audit {
-    /// Judges `ws.v` and `ws.end` before projection, and corrects `ws.v` if no safer way is left.
+impl<F: Fn(&Group) -> bool> Audit<F> {
+    /// Judges `ws.v` and `ws.end` before projection, group by group, and corrects `ws.v` where no
+    /// safer way is left. It is coarse if the step of any group is.
     pub(super) fn judge<S: MechanicalSystem>(
         &self,
         system: &mut S,
@@ -116,118 +119,167 @@ impl Audit {
         report: &mut StepReport,
     ) -> Verdict {
         system.normalise(&mut ws.end);
-        let Some(before) = self.before else {
-            system.work(options, start, &ws.v);
+        if ws.before.is_empty() {
+            system.work(options, start, &ws.v, &mut ws.work);
             return Verdict::Sound;
-        };
-        ws.audited.energy = None;
-        let dissipated = -contact_work::<S>(options, start.v, warm_start, ws);
-        let Balance {
-            after,
-            excess,
-            work,
-            released,
-        } = if self.is_last {
-            shortened_balance(system, options, start, ws, &before)
-        } else {
-            balance(system, options, start, ws, &before)
-        };
-        let gained = excess.value;
-        if !gained.is_finite() {
-            return if self.is_last {
-                Verdict::Sound // not finite: refused when the step ends
+        }
+        ws.audited.energies.clear();
+        weigh(system, options, start, ws);
+        let mut verdict = Verdict::Sound;
+        let mut corrected = std::mem::take(&mut ws.corrected);
+        for number in 0..ws.groups.n() {
+            if !ws.groups.is_group(number) {
+                continue;
+            }
+            let dissipated = -contact_work(system, start.v, warm_start, ws, number);
+            let found = if (self.is_last)(ws.groups.group(number)) {
+                shortened_balance(system, options, start, ws, number)
             } else {
-                Verdict::Coarse
+                balance::<S>(options, ws, number)
             };
-        }
-        // With θ > ½ the scheme itself dissipates.
-        let is_free = ws.contacts.is_empty() && options.theta <= 0.5;
-        if excess.is_balanced(is_free, [self.gain, self.drift]) {
-            report.energy_gain = report.energy_gain.max(excess.relative());
-            report.enter_balance(dissipated, 0.0, released, gained);
-            ws.audited.is(&ws.end, &ws.v, after);
-            return Verdict::Sound;
-        }
-        if excess.is_coarse(is_free, self.gain) && !self.is_last {
-            return Verdict::Coarse;
-        }
-        let d = S::DIMENSION.components();
-        let nothing_outside = is_free || ws.contacts.iter().all(UnilateralContact::is_internal);
-        let (share, is_enough) = excess.share_of_relative_motion(after.momentum.into(), after.mass);
-        let is_relative = is_enough && nothing_outside && (is_free || gained > 0.0);
-        if is_relative || gained > 0.0 {
-            let share = if is_relative { share } else { excess.share() };
-            if options.is_elastic() && !is_free {
-                report.residual = report.residual.max(violation_by(share, ws, d));
-            }
-            if is_relative {
-                scale_relative_motion(system, ws, share, &after);
-            } else {
-                shorten(ws, share);
-            }
-            if excess.is_left(self.gain) {
-                self.hold_back(system, options, start, ws);
+            match self.judge_group(system, options, start, ws, (number, &found), report) {
+                GroupVerdict::Sound => {
+                    report.enter_balance(dissipated, 0.0, found.released, found.excess.value);
+                }
+                GroupVerdict::Corrected => corrected.push((number, dissipated, found)),
+                GroupVerdict::NotFinite => {}
+                GroupVerdict::Coarse => {
+                    verdict = Verdict::Coarse;
+                    ws.groups.group_mut(number).is_coarse = true;
+                }
             }
         }
-        if let Some(corrected) = system.energy(options, &ws.end, &ws.v) {
-            let change =
-                (corrected.kinetic - before.kinetic) + (corrected.potential - before.potential);
-            let left = change - work - released;
-            report.enter_balance(dissipated, gained.max(0.0), released, left);
-            ws.audited.is(&ws.end, &ws.v, corrected);
+        if !corrected.is_empty() {
+            system.energies(options, &ws.end, &ws.v, &mut ws.after);
+            for (number, dissipated, found) in corrected.drain(..) {
+                let before = ws.groups.energy(&ws.before, number);
+                let after = ws.groups.energy(&ws.after, number);
+                let change =
+                    (after.kinetic - before.kinetic) + (after.potential - before.potential);
+                let (removed, released) = (found.excess.value.max(0.0), found.released);
+                let left = change - found.work - released;
+                report.enter_balance(dissipated, removed, released, left);
+            }
         }
-        Verdict::Sound
+        ws.corrected = corrected;
+        ws.audited.is(&ws.end, &ws.v, &ws.after);
+        verdict
     }
-}
 
-impl Audit {
-    /// Shortens the displacement of a step that ends at rest and still gained energy.
-    ///
-    /// Something stopped such a step before its end: the machine jammed while the actuators' work
-    /// was counted to the end, or a contact closed on its way up. The largest fraction σ of the
-    /// displacement that the energy allows is kept; σ = 0 is always allowed.
-    fn hold_back<S: MechanicalSystem>(
+    /// Judges a group, and corrects its velocity if no safer way is left.
+    fn judge_group<S: MechanicalSystem>(
         &self,
         system: &mut S,
         options: &StepOptions,
         start: Start<'_, S::Configuration>,
         ws: &mut ScratchOf<S>,
-    ) {
-        let Some(before) = self.before else {
-            return;
-        };
-        let (h, theta) = (options.time_step, options.theta);
-        let d = S::DIMENSION.components();
-        for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
-            *mean = theta * end + (1.0 - theta) * begin;
-        }
-        let work = system.work(options, start, &ws.v);
-        let mut share = 1.0;
-        for k in 0..MOST_SHORTENINGS {
-            let after = system.energy(options, &ws.end, &ws.v).unwrap_or(before);
-            let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential)
-                - share * work;
-            if excess <= 0.0 {
-                break;
-            }
-            // With no displacement the excess is minus the kinetic energy; in between it is nearly
-            // linear.
-            let shorter = SAFE * share * before.kinetic / (excess + before.kinetic);
-            let back = h * (share - shorter);
-            let is_last = k + 1 == MOST_SHORTENINGS;
-            share = if shorter > LEAST_WAY && !is_last {
-                shorter
+        (number, found): (usize, &Balance),
+        report: &mut StepReport,
+    ) -> GroupVerdict {
+        let Balance { after, excess, .. } = found;
+        let own = *ws.groups.group(number);
+        let is_last = (self.is_last)(&own);
+        let gained = excess.value;
+        if !gained.is_finite() {
+            return if is_last {
+                GroupVerdict::NotFinite // refused when the step ends
             } else {
-                0.0
+                GroupVerdict::Coarse
             };
-            let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
-            for (gap, (u, before)) in ws.gap_end.iter_mut().zip(local) {
+        }
+        // With θ > ½ the scheme itself dissipates.
+        let is_free = own.n_contacts == 0 && options.theta <= 0.5;
+        if excess.is_balanced(is_free, [self.gain, self.drift]) {
+            report.energy_gain = report.energy_gain.max(excess.relative());
+            return GroupVerdict::Sound;
+        }
+        if excess.is_coarse(is_free, self.gain) && !is_last {
+            return GroupVerdict::Coarse;
+        }
+        let nothing_outside = is_free || own.is_untouched;
+        let (share, is_enough) = excess.share_of_relative_motion(after.momentum.into(), after.mass);
+        let is_relative = is_enough && nothing_outside && (is_free || gained > 0.0);
+        if is_relative || gained > 0.0 {
+            let share = if is_relative { share } else { excess.share() };
+            if options.is_elastic() && !is_free {
+                report.residual = report.residual.max(violation_by::<S>(share, ws, number));
+            }
+            if is_relative {
+                scale_relative_motion(system, ws, share, (number, after));
+            } else {
+                shorten(system, ws, share, number);
+            }
+            if excess.is_left(self.gain) {
+                hold_back(system, options, start, ws, number);
+            }
+        }
+        GroupVerdict::Corrected
+    }
+}
+
+/// Result of the audit of a group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum GroupVerdict {
+    /// The step is accepted as it is.
+    Sound,
+    /// The step is accepted; its velocity may have been corrected.
+    Corrected,
+    /// The step is to be refused.
+    NotFinite,
+    /// The step should be repeated.
+    Coarse,
+}
+
+/// Shortens the displacement of a group in a step that ends at rest and still gained energy.
+///
+/// Something stopped such a step before its end: the machine jammed while the actuators' work was
+/// counted to the end, or a contact closed on its way up. The largest fraction σ of the
+/// displacement that the energy allows is kept; σ = 0 is always allowed.
+fn hold_back<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    ws: &mut ScratchOf<S>,
+    number: usize,
+) {
+    let before = ws.groups.energy(&ws.before, number);
+    let (h, theta) = (options.time_step, options.theta);
+    let d = S::DIMENSION.components();
+    keep_ends(system, ws);
+    for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
+        *mean = theta * end + (1.0 - theta) * begin;
+    }
+    system.work(options, start, &ws.v, &mut ws.work);
+    let work = ws.groups.sum(&ws.work, number);
+    let mut share = 1.0;
+    for k in 0..MOST_SHORTENINGS {
+        system.energies(options, &ws.end, &ws.v, &mut ws.after);
+        let after = ws.groups.energy(&ws.after, number);
+        let excess =
+            (after.kinetic - before.kinetic) + (after.potential - before.potential) - share * work;
+        if excess <= 0.0 {
+            break;
+        }
+        // With no displacement the excess is minus the kinetic energy; in between it is nearly
+        // linear.
+        let shorter = SAFE * share * before.kinetic / (excess + before.kinetic);
+        let back = h * (share - shorter);
+        let is_last = k + 1 == MOST_SHORTENINGS;
+        share = if shorter > LEAST_WAY && !is_last {
+            shorter
+        } else {
+            0.0
+        };
+        let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
+        for (i, (gap, (u, before))) in ws.gap_end.iter_mut().zip(local).enumerate() {
+            if ws.groups.of_contact(i) == number {
                 *gap -= back * (theta * u[0] + (1.0 - theta) * before[0]);
             }
-            system.set_moved(start.configuration, &ws.v_mean, share * h, &mut ws.end);
-            system.close_end(&ws.p, &mut ws.end, &mut ws.v);
-            system.normalise(&mut ws.end);
         }
+        system.set_moved(start.configuration, &ws.v_mean, share * h, &mut ws.end);
+        system.close_end(&ws.p, &mut ws.end, &mut ws.v);
+        system.normalise(&mut ws.end);
+        return_ends(system, ws, |own, _| own != number);
     }
 }
 
@@ -240,22 +292,25 @@ pub(super) fn count_lift<S: MechanicalSystem>(
     ws: &mut ScratchOf<S>,
     report: &mut StepReport,
 ) {
-    let Some(before) = ws.audited.energy else {
+    if ws.audited.energies.is_empty() {
         return;
+    }
+    system.energies(options, &ws.end, &ws.v, &mut ws.after);
+    let total = |all: &[MechanicalEnergy]| {
+        let all = all.iter().copied();
+        all.reduce(MechanicalEnergy::with).unwrap_or_default()
     };
-    let Some(after) = system.energy(options, &ws.end, &ws.v) else {
-        return;
-    };
+    let (before, after) = (total(&ws.audited.energies), total(&ws.after));
     let work = system.work_of_displacement(options, start, &ws.v, &ws.dv);
     let lifted = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
     report.energy_lifted += lifted.max(0.0);
     report.energy_lost += (-lifted).max(0.0);
-    ws.audited.is(&ws.end, &ws.v, after);
+    ws.audited.is(&ws.end, &ws.v, &ws.after);
 }
 
-/// Energy balance of a step.
+/// Energy balance of a group in a step.
 #[derive(Clone, Copy, Debug)]
-struct Balance {
+pub(super) struct Balance {
     after: MechanicalEnergy,
     excess: Excess<f64>,
     work: f64,
@@ -324,6 +379,12 @@ impl<T: Lane> Excess<T> {
         !(self.value - self.kinetic).le(self.rounding + gain * self.size)
     }
 
+    /// Where there is more energy than supplied.
+    #[inline(always)]
+    pub(crate) fn is_gain(&self) -> T::Mask {
+        self.value.like(0.0).lt(self.value)
+    }
+
     /// As a fraction of the kinetic energy.
     #[inline(always)]
     pub(crate) fn relative(&self) -> T {
@@ -352,33 +413,48 @@ impl<T: Lane> Excess<T> {
     }
 }
 
-/// The balance of the step to `ws.end` and `ws.v`.
-fn balance<S: MechanicalSystem>(
+/// `ws.after` and `ws.work`: energies of the clusters at `ws.end` and `ws.v`, and the work of their
+/// actuators.
+fn weigh<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
+    ws: &mut ScratchOf<S>,
+) {
+    system.work(options, start, &ws.v, &mut ws.work);
+    system.energies(options, &ws.end, &ws.v, &mut ws.after);
+}
+
+/// The balance of a group, from what was weighed.
+fn balance<S: MechanicalSystem>(
+    options: &StepOptions,
     ws: &ScratchOf<S>,
-    before: &MechanicalEnergy,
+    number: usize,
 ) -> Balance {
-    let work = system.work(options, start, &ws.v);
-    let after = system.energy(options, &ws.end, &ws.v).unwrap_or(*before);
-    let released = supplied_by_contacts::<S>(options, ws);
+    let before = ws.groups.energy(&ws.before, number);
+    let after = ws.groups.energy(&ws.after, number);
+    let work = ws.groups.sum(&ws.work, number);
+    let released = supplied_by_contacts::<S>(options, ws, number);
     let both = |energy: &MechanicalEnergy| [energy.kinetic, energy.potential];
     let fall = options.gravity.norm() * options.time_step;
-    let (before, ends) = (both(before), both(&after));
+    let ends = [both(&before), both(&after)];
     Balance {
         after,
-        excess: Excess::new(before, ends, [work, released], (after.mass, fall)),
+        excess: Excess::new(ends[0], ends[1], [work, released], (after.mass, fall)),
         work,
         released,
     }
 }
 
-/// Energy that the step may gain by contacts that yield, J.
-fn supplied_by_contacts<S: MechanicalSystem>(options: &StepOptions, ws: &ScratchOf<S>) -> f64 {
+/// Energy that the step may gain by contacts of a group that yield, J.
+fn supplied_by_contacts<S: MechanicalSystem>(
+    options: &StepOptions,
+    ws: &ScratchOf<S>,
+    number: usize,
+) -> f64 {
     let d = S::DIMENSION.components();
     let laws = ws.yielding.iter().enumerate();
-    laws.filter(|(_, law)| law.diagonal > 0.0)
+    laws.filter(|(i, law)| law.diagonal > 0.0 && ws.groups.of_contact(*i) == number)
         .map(|(i, law)| {
             let mut p = [0.0; 3];
             p[..d].copy_from_slice(&ws.p[d * i..][..d]);
@@ -387,16 +463,16 @@ fn supplied_by_contacts<S: MechanicalSystem>(options: &StepOptions, ws: &Scratch
         .sum()
 }
 
-/// The same, after the velocity and its displacement are shortened while the excess is a large part
-/// of the kinetic energy.
+/// The same, after the velocity of the group and its displacement are shortened while the excess is
+/// a large part of the kinetic energy.
 fn shortened_balance<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
     ws: &mut ScratchOf<S>,
-    before: &MechanicalEnergy,
+    number: usize,
 ) -> Balance {
-    let mut found = balance(system, options, start, ws, before);
+    let mut found = balance::<S>(options, ws, number);
     for _ in 0..MOST_SHORTENINGS {
         let Balance { after, excess, .. } = found;
         if excess.value.is_nan() || excess.value <= SHORT * after.kinetic {
@@ -404,50 +480,87 @@ fn shortened_balance<S: MechanicalSystem>(
         }
         // The velocity is far off, and so is the displacement that it caused. Shorten both
         // together.
+        let before = ws.groups.energy(&ws.before, number);
         let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
-        shorten(ws, share);
+        keep_ends(system, ws);
+        let gaps = (system.n_clusters() > 1).then(|| ws.gap_end.clone());
+        shorten(system, ws, share, number);
         place(system, options, ws);
         system.normalise(&mut ws.end);
-        found = balance(system, options, start, ws, before);
+        return_ends(system, ws, |own, _| own != number);
+        for (i, gap) in gaps.into_iter().flatten().enumerate() {
+            if ws.groups.of_contact(i) != number {
+                ws.gap_end[i] = gap;
+            }
+        }
+        weigh(system, options, start, ws);
+        found = balance::<S>(options, ws, number);
     }
     found
 }
 
-/// Scales the motion relative to the mass centre, in the local velocities too.
+/// Scales the motion of a group relative to its mass centre, in the local velocities too.
 fn scale_relative_motion<S: MechanicalSystem>(
     system: &S,
     ws: &mut ScratchOf<S>,
     share: f64,
-    after: &MechanicalEnergy,
+    (number, after): (usize, &MechanicalEnergy),
 ) {
     let translation = after.momentum / after.mass;
-    for (k, v) in ws.v.iter_mut().enumerate() {
+    scale::<S>(system, ws, share, number, |k| {
         let axis = system.translation_axis(k);
-        let common = axis.map_or(0.0, |axis| translation[axis]);
-        *v = common + share * (*v - common);
+        Some(axis.map_or(0.0, |axis| translation[axis]))
+    });
+}
+
+/// Scales the velocity of a group relative to a common one, in the local velocities too.
+fn scale<S: MechanicalSystem>(
+    system: &S,
+    ws: &mut ScratchOf<S>,
+    share: f64,
+    number: usize,
+    common: impl Fn(usize) -> Option<f64>,
+) {
+    for (k, v) in ws.v.iter_mut().enumerate() {
+        if ws.groups.of_cluster(system.cluster_of_velocity(k)) == number {
+            *v = match common(k) {
+                Some(common) => common + share * (*v - common),
+                None => share * *v,
+            };
+        }
     }
-    for u in &mut ws.u {
-        *u *= share;
+    let d = S::DIMENSION.components();
+    for (i, u) in ws.u.chunks_exact_mut(d).enumerate() {
+        if ws.groups.of_contact(i) == number {
+            for u in u {
+                *u *= share;
+            }
+        }
     }
 }
 
-/// Violation of the contacts' law by `v⁺ ← share v⁺`, relative to the free velocity.
+/// Violation of the law of a group's contacts by `v⁺ ← share v⁺`, relative to the free velocity.
 ///
 /// A closed contact that is to rebound at u_N separates at `share u_N`. At e = 0 a rigid contact
 /// has u_N = 0, and the law holds.
-fn violation_by<Q, C>(share: f64, ws: &Scratch<Q, C>, d: usize) -> f64 {
-    let squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-    let local = ws.u.chunks_exact(d).zip(ws.p.chunks_exact(d));
-    let closed = local.filter(|(_, p)| p[0] > 0.0);
-    let lost = closed.map(|(u, _)| squares(&u[..1])).sum::<f64>();
-    relative((1.0 - share) * lost.sqrt(), squares(&ws.q_free).sqrt())
+fn violation_by<S: MechanicalSystem>(share: f64, ws: &ScratchOf<S>, number: usize) -> f64 {
+    let d = S::DIMENSION.components();
+    let own = (0..ws.contacts.len()).filter(|i| ws.groups.of_contact(*i) == number);
+    let (mut lost, mut free) = (0.0, 0.0);
+    for i in own {
+        if ws.p[d * i] > 0.0 {
+            lost += ws.u[d * i] * ws.u[d * i];
+        }
+        for q in &ws.q_free[d * i..][..d] {
+            free += q * q;
+        }
+    }
+    relative((1.0 - share) * f64::sqrt(lost), f64::sqrt(free))
 }
 
-/// `v⁺ ← share v⁺`, in the local velocities too.
-fn shorten<Q, C>(ws: &mut Scratch<Q, C>, share: f64) {
-    for x in ws.v.iter_mut().chain(&mut ws.u) {
-        *x *= share;
-    }
+/// `v⁺ ← share v⁺` of a group, in the local velocities too.
+fn shorten<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>, share: f64, number: usize) {
+    scale(system, ws, share, number, |_| None);
 }
 
 fn relative(excess: f64, size: f64) -> f64 {

@@ -106,7 +106,8 @@ impl Projection {
                 Some(law) if law.diagonal > 0.0 => law.unexplained,
                 _ => contact.gap() + options.theta * h * (u - ws.u_before[d * i]),
             };
-            let is_counted = gap >= 0.0 || gap + h * u < 0.0;
+            let is_moved = ws.groups.group(ws.groups.of_contact(i)).is_moved;
+            let is_counted = is_moved && (gap >= 0.0 || gap + h * u < 0.0);
             displacement[d * i] += if is_counted { gap } else { 0.0 };
             counts.push(is_counted);
         }

@@ -83,6 +83,23 @@ pub struct MechanicalEnergy {
     pub momentum: Vector3<f64>,
     /// kg.
     pub mass: f64,
+    /// Whether a base or a loop passes the momentum on to the world; the momentum is zero then.
+    pub is_held: bool,
+}
+
+impl MechanicalEnergy {
+    /// Those of two clusters together.
+    pub(crate) fn with(self, other: Self) -> Self {
+        let is_held = self.is_held || other.is_held;
+        let momentum = self.momentum + other.momentum;
+        Self {
+            kinetic: self.kinetic + other.kinetic,
+            potential: self.potential + other.potential,
+            momentum: if is_held { Vector3::zeros() } else { momentum },
+            mass: self.mass + other.mass,
+            is_held,
+        }
+    }
 }
 
 /// A system with unilateral contacts, see the page above.
@@ -100,6 +117,34 @@ pub trait MechanicalSystem {
 
     /// Current number of velocities.
     fn nv(&self) -> usize;
+
+    /// Number of clusters, see [`super::groups`]; by default the system is one.
+    fn n_clusters(&self) -> usize {
+        1
+    }
+
+    /// The cluster of a velocity.
+    fn cluster_of_velocity(&self, _k: usize) -> usize {
+        0
+    }
+
+    /// The two clusters that a contact touches, the same one twice where it touches no other.
+    fn clusters_of(&self, _key: &KeyOf<Self>) -> [usize; 2]
+    where
+        Self: Sized,
+    {
+        [0, 0]
+    }
+
+    /// Takes the coordinates of some clusters from another configuration. Called only for a system
+    /// of several clusters.
+    fn take_clusters(
+        &self,
+        _from: &Self::Configuration,
+        _is_taken: &dyn Fn(usize) -> bool,
+        _to: &mut Self::Configuration,
+    ) {
+    }
 
     /// `to = from ⊕ h v`, without allocating.
     fn set_moved(
@@ -176,8 +221,9 @@ pub trait MechanicalSystem {
     /// default nothing.
     fn add_given(&self, _options: &StepOptions, _impulse: &mut [f64]) {}
 
-    /// Whether the gyroscopic terms are too stiff to be explicit in this step. By default never.
-    fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64]) -> bool {
+    /// Whether the gyroscopic terms of a cluster are too stiff to be explicit in this step. By
+    /// default never.
+    fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64], _cluster: usize) -> bool {
         false
     }
 
@@ -224,15 +270,16 @@ pub trait MechanicalSystem {
         MOST_REVISIONS
     }
 
-    /// Kinetic and potential energy of a state, J, and its overall momentum; none if the system is
-    /// not audited.
-    fn energy(
+    /// Kinetic and potential energy of each cluster in a state, J, and its momentum; `out` is
+    /// cleared first, and stays empty if the system is not audited.
+    fn energies(
         &mut self,
         _options: &StepOptions,
         _q: &Self::Configuration,
         _v: &[f64],
-    ) -> Option<MechanicalEnergy> {
-        None
+        out: &mut Vec<MechanicalEnergy>,
+    ) {
+        out.clear();
     }
 
     /// Largest angular speed of a frame whose pose matters, rad/s. By default 0.
@@ -252,14 +299,15 @@ pub trait MechanicalSystem {
         false
     }
 
-    /// Work of the actuators over a step that ends with `v_end`, J.
+    /// Work of the actuators of each cluster (n_clusters) over a step that ends with `v_end`, J.
     fn work(
         &mut self,
         _options: &StepOptions,
         _start: Start<'_, Self::Configuration>,
         _v_end: &[f64],
-    ) -> f64 {
-        0.0
+        out: &mut [f64],
+    ) {
+        out.fill(0.0);
     }
 
     /// Work of the actuators of such a step, as they are at its end, over a `displacement` (nv)
@@ -378,8 +426,8 @@ pub trait MechanicalSystem {
         rebound(options.restitution, u_N_before)
     }
 
-    /// Total mass, kg, of a machine of which any contact yields. By default none does.
-    fn compliant_mass(&self) -> Option<f64> {
+    /// Mass of a cluster, kg, of a machine of which any contact yields. By default none does.
+    fn compliant_mass(&self, _cluster: usize) -> Option<f64> {
         None
     }
 
@@ -434,7 +482,7 @@ pub trait MechanicalSystem {
     /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.
     fn add_moments(&self, _y: &mut [f64]) {}
 
-    /// Largest displacement, m, that `y` (nv) causes away from the contact points; it limits the
-    /// projection.
-    fn displacement(&self, y: &[f64]) -> f64;
+    /// Largest displacement of a cluster, m, that `y` (nv) causes away from the contact points; it
+    /// limits the projection.
+    fn displacement(&self, y: &[f64], cluster: usize) -> f64;
 }

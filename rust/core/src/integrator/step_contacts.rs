@@ -1,5 +1,7 @@
 //! The contacts of a step: forecast, assembly, solve, and the gaps at the end.
 
+use super::groups::Group;
+use super::island::{Level, solve_group};
 use super::mechanical_system::{KeyOf, MechanicalSystem, UnilateralContact};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
@@ -90,29 +92,39 @@ pub(super) fn find_impacts<S: MechanicalSystem>(
 /// u⁺)/2`, by its law of restitution and friction. While a contact is new or in impact, the
 /// friction of the others counts with its value at the end.
 ///
-/// Call it after [`find_impacts`]; `ws.p_position` is overwritten.
+/// Call it after [`find_impacts`]; `ws.p_position` is overwritten. `group`: whose contacts.
 pub(super) fn contact_work<S: MechanicalSystem>(
-    options: &StepOptions,
+    system: &S,
     v_before: &[f64],
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
+    group: usize,
 ) -> f64 {
     let d = S::DIMENSION.components();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
-    let local = ws.p.chunks_exact(d).zip(local);
-    if is_persistent(options, warm_start, &ws.contacts) && !ws.impact.contains(&true) {
-        ws.p_position.resize(ws.p.len(), 0.0);
+    ws.p_position.resize(ws.p.len(), 0.0);
+    let groups = &ws.groups;
+    let is_own = |i: &usize| groups.of_contact(*i) == group;
+    let own = || (0..ws.contacts.len()).filter(is_own);
+    if groups.group(group).persists && !own().any(|i| ws.impact[i]) {
         warm_start.recall(&ws.contacts, d, &mut ws.p_position);
-        let friction = local.zip(ws.p_position.chunks_exact(d));
-        let friction = friction.map(|((p, (u, before)), last)| {
-            dot(&p[1..], &u[1..]) + dot(&p[1..], &before[1..]) - dot(&last[1..], &before[1..])
+        let friction = own().map(|i| {
+            let at = d * i + 1..d * (i + 1);
+            let (p, u) = (&ws.p[at.clone()], &ws.u[at.clone()]);
+            let (before, last) = (&ws.u_before[at.clone()], &ws.p_position[at]);
+            dot(p, u) + dot(p, before) - dot(last, before)
         });
-        0.5 * (friction.sum::<f64>() + dot(v_before, &warm_start.persistent))
+        let friction = friction.sum::<f64>();
+        let is_own = |k: &usize| groups.of_cluster(system.cluster_of_velocity(*k)) == group;
+        let start = (0..v_before.len()).filter(is_own);
+        let start = start.map(|k| v_before[k] * warm_start.persistent[k]);
+        0.5 * (friction + start.sum::<f64>())
     } else {
-        let works = local.zip(&ws.impact).map(|((p, (u, before)), is_impact)| {
-            if *is_impact {
-                0.5 * (dot(p, u) + dot(p, before))
+        let works = own().map(|i| {
+            let at = d * i..d * (i + 1);
+            let (p, u) = (&ws.p[at.clone()], &ws.u[at.clone()]);
+            if ws.impact[i] {
+                0.5 * (dot(p, u) + dot(p, &ws.u_before[at]))
             } else {
                 dot(&p[1..], &u[1..])
             }
@@ -139,16 +151,13 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
     }
     set_friction(system, options, &ws.contacts, &mut ws.mu);
     system.assemble(&ws.contacts, v_before, &mut ws.u_before);
-    let mass = system.compliant_mass();
+    let yields = system.compliant_mass(0).is_some();
     ws.yielding.clear();
-    if options.warm_start || mass.is_some() {
+    if options.warm_start || yields {
         warm_start.recall(&ws.contacts, d, &mut ws.p);
     }
-    if let Some(mass) = mass {
-        // Without a memory a contact may bear the weight.
-        let weight = mass * options.gravity.norm() * options.time_step;
-        let unknown = warm_start.impulses.is_empty().then_some(weight);
-        yield_under_load(system, options, unknown, ws);
+    if yields {
+        yield_under_load(system, options, warm_start, ws);
     }
     if !options.warm_start {
         ws.p.fill(0.0);
@@ -158,13 +167,13 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
 /// Computes the yielding law of every contact and adds its part to W.
 ///
 /// `ws.p` holds the impulses of the last step, and `ws.v` the velocity that led to the end pose.
-/// Without a last step, `unknown` replaces the normal impulses.
+/// Where a cluster remembers no contact, each of its contacts may bear its weight.
 ///
 /// A contact with restitution is rigid in the step in which it closes, and Newton's law bounces it.
 fn yield_under_load<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
-    unknown: Option<f64>,
+    warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
 ) {
     let d = S::DIMENSION.components();
@@ -178,7 +187,14 @@ fn yield_under_load<S: MechanicalSystem>(
         let bounces = is_new && system.normal_shift(options, contact, 1.0) > 0.0;
         let compliance = system.compliance(contact).filter(|_| !bounces);
         let law = compliance.map(|compliance| {
-            let before = unknown.map_or(before, |p| [p, 0.0, 0.0]);
+            let [cluster, _] = system.clusters_of(&contact.key());
+            let mut known = warm_start.impulses.iter();
+            let is_known = known.any(|(key, _)| system.clusters_of(key).contains(&cluster));
+            let weight = || {
+                let mass = system.compliant_mass(cluster).unwrap_or(0.0);
+                [mass * options.gravity.norm() * options.time_step, 0.0, 0.0]
+            };
+            let before = if is_known { before } else { weight() };
             compliance.over(step, contact.gap(), ws.q_free[d * i], before)
         });
         ws.yielding.push(law.unwrap_or_default());
@@ -226,18 +242,8 @@ pub(super) fn set_friction<S: MechanicalSystem>(
     );
 }
 
-/// Whether the last step had the same contacts and none of them was new or in impact, so that its
-/// impulses equal those of this step up to O(h).
-pub(super) fn is_persistent<C: UnilateralContact>(
-    options: &StepOptions,
-    warm_start: &WarmStart<C::Key>,
-    contacts: &[C],
-) -> bool {
-    options.warm_start && !warm_start.persistent.is_empty() && warm_start.is_of(contacts)
-}
-
-/// Adds the deferred correction r to `ws.y` if the last step had the same contacts and all of them
-/// persisted.
+/// Adds the deferred correction r to `ws.y` in the groups whose contacts are those of the last step
+/// and persisted.
 ///
 /// `ws.p` must still hold the last step's impulses.
 pub(super) fn add_correction<S: MechanicalSystem>(
@@ -246,17 +252,33 @@ pub(super) fn add_correction<S: MechanicalSystem>(
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
 ) {
-    if !is_persistent(options, warm_start, &ws.contacts) {
+    if !ws.groups.any_persists() {
         return;
     }
     let share = 1.0 - options.theta;
     system.generalized_impulse(&ws.contacts, &ws.p, &mut ws.correction);
-    for (r, before) in ws.correction.iter_mut().zip(&warm_start.persistent) {
-        *r = share * (before - *r);
+    for (k, r) in ws.correction.iter_mut().enumerate() {
+        let group = ws.groups.of_cluster(system.cluster_of_velocity(k));
+        *r = if ws.groups.group(group).persists {
+            share * (warm_start.persistent[k] - *r)
+        } else {
+            0.0
+        };
     }
     system.half_solve(&mut ws.correction);
     for (y, r) in ws.y.iter_mut().zip(&ws.correction) {
         *y += r;
+    }
+}
+
+/// `ws.p_position`: the last step's impulses `ws.p` of the contacts that persist, 0 of the others.
+pub(super) fn take_persistent<S: MechanicalSystem>(ws: &mut ScratchOf<S>) {
+    let d = S::DIMENSION.components();
+    ws.p_position.clone_from(&ws.p);
+    for (i, p) in ws.p_position.chunks_exact_mut(d).enumerate() {
+        if !ws.groups.group(ws.groups.of_contact(i)).persists {
+            p.fill(0.0);
+        }
     }
 }
 
@@ -293,31 +315,42 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         } else {
             system.add_local_of_velocity(&ws.contacts, &ws.v, &mut ws.q_free);
         }
-        add_shifts(system, options, ws, 1.0);
-        let mut solved = solve_problem(system, options, ws);
-        let inelastic;
+        add_shifts(system, (options, 1.0), ws, |_| true);
+        ws.island.forget_answers();
+        solve_problems(system, options, ws, |_| true);
         let mut law = options;
-        if !solved.is_converged() && options.is_elastic() && system.solves_to_the_end() {
+        let inelastic;
+        let is_unsolved = ws.groups.all().any(|own| !own.is_solved);
+        if is_unsolved && options.is_elastic() && system.solves_to_the_end() {
             inelastic = StepOptions {
                 restitution: 0.0,
                 materials: options.materials.inelastic(),
                 ..options.clone()
             };
-            add_shifts(system, law, ws, -1.0);
             law = &inelastic;
-            add_shifts(system, law, ws, 1.0);
-            ws.p.fill(0.0);
-            solved = solve_problem(system, options, ws);
+            for number in 0..ws.groups.n() {
+                let own = ws.groups.group_mut(number);
+                own.is_inelastic = !own.is_solved;
+            }
+            add_shifts(system, (options, -1.0), ws, |own| own.is_inelastic);
+            add_shifts(system, (law, 1.0), ws, |own| own.is_inelastic);
+            for (i, p) in ws.p.chunks_exact_mut(d).enumerate() {
+                if ws.groups.group(ws.groups.of_contact(i)).is_inelastic {
+                    p.fill(0.0);
+                }
+            }
+            solve_problems(system, options, ws, |own| own.is_inelastic);
             report.retaken = 1;
         }
         // u contains the shift and what the contacts yield: remove both.
         for i in 0..n {
-            let shift = shift(system, law, ws, i);
+            let is_inelastic = ws.groups.group(ws.groups.of_contact(i)).is_inelastic;
+            let shift = shift(system, if is_inelastic { law } else { options }, ws, i);
             for (k, shift) in (d * i..d * (i + 1)).zip(shift) {
                 ws.u[k] -= shift + yielded(ws, i, ws.p[k]);
             }
         }
-        report.enter(&solved);
+        ws.island.enter_answers(&mut report);
         system.add_impulses(&ws.p, &mut ws.y);
         system.add_moments(&mut ws.y);
         probe.end(Phase::Solve);
@@ -329,19 +362,47 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
     report
 }
 
-/// Adds `sign` times the impact law's shift to the normal free velocities `ws.q_free`.
+/// Adds the impact law's shift, times a sign, to the normal free velocities `ws.q_free` of some
+/// groups.
 fn add_shifts<S: MechanicalSystem>(
     system: &S,
-    options: &StepOptions,
+    (options, sign): (&StepOptions, f64),
     ws: &mut ScratchOf<S>,
-    sign: f64,
+    is_meant: impl Fn(&Group) -> bool,
 ) {
     let d = S::DIMENSION.components();
     for i in 0..ws.contacts.len() {
+        if !is_meant(ws.groups.group(ws.groups.of_contact(i))) {
+            continue;
+        }
         let shift = shift(system, options, ws, i);
         for (q, shift) in ws.q_free[d * i..][..d].iter_mut().zip(shift) {
             *q += sign * shift;
         }
+    }
+}
+
+/// Solves the assembled problems of some groups from `ws.p` and charges the step's budget.
+fn solve_problems<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    ws: &mut ScratchOf<S>,
+    is_meant: impl Fn(&Group) -> bool,
+) {
+    let are_several = ws.groups.are_several();
+    for number in 0..ws.groups.n() {
+        let own = ws.groups.group(number);
+        if !ws.groups.is_group(number) || own.n_contacts == 0 || !is_meant(own) {
+            continue;
+        }
+        let solved = if are_several {
+            solve_group(system, &options.solver, ws, number, Level::Velocity)
+        } else {
+            None
+        };
+        let solved = solved.unwrap_or_else(|| solve_problem(system, options, ws));
+        ws.groups.group_mut(number).is_solved = solved.is_converged();
+        ws.island.keep_answer(number, solved);
     }
 }
 

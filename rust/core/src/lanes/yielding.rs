@@ -37,8 +37,8 @@ impl<T: Lane> Yields<T> {
     /// The laws over a `step`: its length (s) and the scheme's θ.
     ///
     /// `u_before`: local velocities before the step by slot, m/s. `last`: impulses of the last step
-    /// by slot, N s; in the lanes of the mask `unknown`, without a last step, its number replaces
-    /// the normal one.
+    /// by slot, N s; in the lanes of a slot's mask `unknown`, without a last step, its number
+    /// replaces the normal one.
     #[inline(always)]
     pub fn update(
         &mut self,
@@ -47,7 +47,7 @@ impl<T: Lane> Yields<T> {
         step: (T, T),
         u_before: &[Triple<T>],
         last: &[Triple<T>],
-        unknown: (T::Mask, T),
+        unknown: impl Fn(usize) -> (T::Mask, T),
     ) {
         let zero = self.zero;
         for &slot in contacts.used() {
@@ -57,7 +57,7 @@ impl<T: Lane> Yields<T> {
                 continue;
             }
             let [n, t, b] = last[slot];
-            let (no_memory, p) = unknown;
+            let (no_memory, p) = unknown(slot);
             let before = [
                 T::select(no_memory, p, n),
                 T::select(no_memory, zero, t),
@@ -123,10 +123,9 @@ impl<T: Lane> Yields<T> {
         }
     }
 
-    /// Energy that the contacts give off in a step of `h`, J; see
+    /// Energy that the contacts of each cluster give off in a step of `h`, J, added to `out`; see
     /// [`crate::integrator::energy_audit`].
     #[inline(always)]
-    #[must_use]
     pub fn supplied(
         &self,
         contacts: &Contacts<T>,
@@ -134,14 +133,14 @@ impl<T: Lane> Yields<T> {
         p: &[Triple<T>],
         u: &[Triple<T>],
         u_before: &[Triple<T>],
-    ) -> T {
-        let mut sum = self.zero;
+        out: &mut [T],
+    ) {
         for &slot in contacts.used().iter().filter(|_| !self.is_empty()) {
             let law = &self.laws[slot];
             let given = law.supplied(h, [u_before[slot][0], u[slot][0]], p[slot]);
-            sum += T::select(self.zero.lt(law.diagonal), given, self.zero);
+            let given = T::select(self.zero.lt(law.diagonal), given, self.zero);
+            contacts.add(slot, given, out);
         }
-        sum
     }
 }
 

@@ -280,7 +280,8 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Work of all joints over a step from `v` to `v_end`, J; keeps impulse and work of each drive.
+    /// Work of the joints of each cluster over a step from `v` to `v_end`, J; keeps impulse and work
+    /// of each drive.
     #[inline(always)]
     pub fn work(
         &mut self,
@@ -288,9 +289,10 @@ impl<T: Lane> Drives<T> {
         step: (T, T),
         places: &[T],
         [v, v_end]: [&[T]; 2],
-    ) -> T {
+        out: &mut [T],
+    ) {
         let zero = step.0.like(0.0);
-        let mut total = zero;
+        out.fill(zero);
         for (j, own) in mechanism.joints.iter().enumerate() {
             let k = own.velocity;
             let torque = self.actuation(j, step, places[j], [v[k], v_end[k]]);
@@ -299,9 +301,8 @@ impl<T: Lane> Drives<T> {
             self.tried[j] = [torque.drive * step.0, work];
             // A damper only dissipates. In a step that reverses the rate, torque and displacement
             // are evaluated at different times, and their product may be positive.
-            total += work + torque.other * turned + (torque.damper * turned).min(zero);
+            out[own.cluster] += work + torque.other * turned + (torque.damper * turned).min(zero);
         }
-        total
     }
 
     /// Work of all joints over a displacement that is added to such a step, J.

@@ -34,19 +34,22 @@ pub(crate) struct Turning<T> {
 }
 
 impl<T: Lane> Turning<T> {
-    /// Those at a velocity (nv); `zero`: 0 in every lane.
+    /// Those of a cluster at a velocity (nv); `zero`: 0 in every lane.
     #[inline(always)]
-    pub(crate) fn of(zero: T, mechanism: &Mechanism, v: &[T]) -> Self {
+    pub(crate) fn of_cluster(zero: T, mechanism: &Mechanism, v: &[T], cluster: usize) -> Self {
+        let is_one = mechanism.n_clusters() == 1;
+        let is_own = |k: usize| is_one || mechanism.cluster_of_velocity(k) == cluster;
         let (mut base, mut joints, mut spin) = (zero, zero, zero);
-        for tree in mechanism.trees.iter().filter(|tree| tree.is_free) {
+        let trees = mechanism.trees.iter();
+        for tree in trees.filter(|tree| tree.is_free && tree.cluster == cluster) {
             let first = tree.velocities.start;
             let [x, y, z] = [v[first + 3], v[first + 4], v[first + 5]];
             base = (x * x + y * y + z * z).sqrt().max(base);
         }
-        for &(k, ratio) in &mechanism.turning {
+        for &(k, ratio) in mechanism.turning.iter().filter(|(k, _)| is_own(*k)) {
             joints = (v[k].abs() * zero.like(ratio)).max(joints);
         }
-        for &k in &mechanism.spinning {
+        for &k in mechanism.spinning.iter().filter(|k| is_own(**k)) {
             spin = v[k].abs().max(spin);
         }
         Self { base, joints, spin }
@@ -67,12 +70,16 @@ impl<T: Lane> Turning<T> {
     }
 }
 
-/// Size of a displacement (nv), m: the largest of the free bases, and of the joints at their arm;
-/// `zero`: 0 in every lane.
+/// Size of the displacement of a cluster (`y`, nv), m: the largest of the free bases, and of the
+/// joints at their arm; `zero`: 0 in every lane.
 #[inline(always)]
-pub(crate) fn displacement<T: Lane>(zero: T, mechanism: &Mechanism, y: &[T]) -> T {
+pub(crate) fn displacement<T: Lane>(zero: T, mechanism: &Mechanism, y: &[T], cluster: usize) -> T {
     let mut largest = zero;
-    for tree in &mechanism.trees {
+    for tree in mechanism
+        .trees
+        .iter()
+        .filter(|tree| tree.cluster == cluster)
+    {
         let lead = tree.lead();
         for (k, y) in y[tree.velocities.clone()].iter().enumerate() {
             let arm = if k < lead { 1.0 } else { JOINT_ARM };

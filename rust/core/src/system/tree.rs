@@ -14,7 +14,7 @@ use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
 use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{
-    Activation, Contact, ContactKey, Opposite, detect, detect_limits, detect_pairs,
+    Activation, Contact, ContactKey, Opposite, clusters_of, detect, detect_limits, detect_pairs,
     generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
@@ -25,7 +25,7 @@ use crate::integrator::{
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::multibody::bias::bias;
-use crate::multibody::energy::energy;
+use crate::multibody::energy::energies;
 use crate::multibody::{Configuration, Factor, Model};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::sand::RutMap;
@@ -170,6 +170,29 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
+    fn n_clusters(&self) -> usize {
+        self.model.mechanism().n_clusters()
+    }
+
+    #[inline]
+    fn cluster_of_velocity(&self, k: usize) -> usize {
+        self.model.mechanism().cluster_of_velocity(k)
+    }
+
+    fn clusters_of(&self, key: &ContactKey) -> [usize; 2] {
+        clusters_of(self.model, key)
+    }
+
+    fn take_clusters(
+        &self,
+        from: &Configuration,
+        is_taken: &dyn Fn(usize) -> bool,
+        to: &mut Configuration,
+    ) {
+        to.take_clusters(self.model, from, is_taken);
+    }
+
+    #[inline]
     fn advance(&self, q: &mut Configuration, v: &[f64], h: f64) {
         q.advance(self.model, v, h);
     }
@@ -266,9 +289,10 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn compliant_mass(&self) -> Option<f64> {
+    fn compliant_mass(&self, cluster: usize) -> Option<f64> {
         let model = &self.model;
-        model.has_compliance().then(|| model.mass())
+        let mass = || model.inertias().mass_of(model.mechanism(), cluster);
+        model.has_compliance().then(mass)
     }
 
     fn compliance(&self, contact: &Contact) -> Option<Compliance> {
@@ -336,13 +360,18 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
-        Turning::of(0.0, self.model.mechanism(), v).is_gyroscopic(options.time_step)
+    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], cluster: usize) -> bool {
+        let turning = Turning::of_cluster(0.0, self.model.mechanism(), v, cluster);
+        turning.is_gyroscopic(options.time_step)
     }
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
-        Turning::of(0.0, self.model.mechanism(), v).of_frames()
+        let mechanism = self.model.mechanism();
+        let of_frames = |own| Turning::of_cluster(0.0, mechanism, v, own).of_frames();
+        (0..mechanism.n_clusters())
+            .map(of_frames)
+            .fold(0.0, f64::max)
     }
 
     fn translation_axis(&self, velocity: usize) -> Option<usize> {
@@ -413,14 +442,16 @@ impl MechanicalSystem for TreeSystem<'_> {
         is_new | is_new_in_sand
     }
 
-    fn energy(
+    fn energies(
         &mut self,
         options: &StepOptions,
         q: &Configuration,
         v: &[f64],
-    ) -> Option<MechanicalEnergy> {
+        out: &mut Vec<MechanicalEnergy>,
+    ) {
+        out.clear();
         if self.parts.has_given_sand() {
-            return None;
+            return;
         }
         let TreeScratch {
             q: lane,
@@ -430,18 +461,22 @@ impl MechanicalSystem for TreeSystem<'_> {
         lane.set_lane(0, q);
         let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
         let gravity = options.gravity.into();
-        let (energy, momentum) = energy(mechanism, inertias, lane, v, gravity, scratch);
-        Some(MechanicalEnergy {
-            kinetic: energy.kinetic,
-            potential: energy.potential,
+        let found = energies(mechanism, inertias, lane, v, gravity, scratch);
+        out.extend(found.iter().enumerate().map(|(cluster, own)| {
             // A tree on a fixed base, or tied to the world, passes momentum on to it.
-            momentum: if self.model.is_free() && !self.model.holds_the_world() {
-                momentum.into()
-            } else {
-                Vector3::zeros()
-            },
-            mass: self.model.mass(),
-        })
+            let is_held = mechanism.is_held(cluster);
+            MechanicalEnergy {
+                kinetic: own.energy.kinetic,
+                potential: own.energy.potential,
+                momentum: if is_held {
+                    Vector3::zeros()
+                } else {
+                    own.momentum.into()
+                },
+                mass: inertias.mass_of(mechanism, cluster),
+                is_held,
+            }
+        }));
     }
 
     fn work(
@@ -449,18 +484,31 @@ impl MechanicalSystem for TreeSystem<'_> {
         options: &StepOptions,
         start: Start<'_, Configuration>,
         v_end: &[f64],
-    ) -> f64 {
-        let of_sand = (self.sand()).map_or(0.0, |(sand, scene, _)| {
-            sand.work(&scene.layers, start.v, v_end)
-        });
+        out: &mut [f64],
+    ) {
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let velocities = [start.v, v_end];
-        let applied = self.parts.applied.iter().zip(start.v.iter().zip(v_end));
-        let power = applied
-            .map(|(force, (v, end))| force * (options.theta * end + (1.0 - options.theta) * v));
-        let of_wrenches = options.time_step * power.sum::<f64>();
-        let of_drives = (self.parts.drives).work(mechanism, step(options), places, velocities);
-        of_sand + of_wrenches + of_drives
+        (self.parts.drives).work(mechanism, step(options), places, velocities, out);
+        let n = out.len();
+        let mut given = std::mem::take(&mut self.parts.given_work);
+        given.clear();
+        given.resize(n, 0.0);
+        if let Some((sand, scene, _)) = self.sand() {
+            sand.work(mechanism, &scene.layers, [start.v, v_end], &mut given);
+        }
+        for (cluster, given) in given.iter_mut().enumerate() {
+            let own = 0..self.parts.applied.len();
+            let own = own.filter(|&k| mechanism.cluster_of_velocity(k) == cluster);
+            let power = own.map(|k| {
+                let mean = options.theta * v_end[k] + (1.0 - options.theta) * start.v[k];
+                self.parts.applied[k] * mean
+            });
+            *given += options.time_step * power.sum::<f64>();
+        }
+        for (out, given) in out.iter_mut().zip(&given) {
+            *out += *given;
+        }
+        self.parts.given_work = given;
     }
 
     fn work_of_displacement(
@@ -606,8 +654,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
     }
 
-    fn displacement(&self, y: &[f64]) -> f64 {
-        displacement(0.0, self.model.mechanism(), y)
+    fn displacement(&self, y: &[f64], cluster: usize) -> f64 {
+        displacement(0.0, self.model.mechanism(), y, cluster)
     }
 }
 

@@ -7,7 +7,7 @@ use crate::integrator::position_projection::FARTHEST;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::scalar::{Lane, LaneMask};
 use crate::system::extent::displacement;
 
 /// Sweeps before pivoting, of machines with many contacts: a problem of six cylinders on hills with
@@ -22,18 +22,24 @@ impl<T: Lane> Block<T> {
             .then_some(self.options.penetration_tolerance)
     }
 
-    /// Predicts the gaps at the end of the step; true if a lane's position must be projected.
+    /// Predicts the gaps at the end of the step; true if the position of a group must be projected.
     #[inline(always)]
     pub(super) fn measure(&mut self, tolerated: f64) -> bool {
         let (h, theta) = self.time_step();
         let zero = h.like(0.0);
-        let mut deepest = zero;
+        let mut deepest = std::mem::take(&mut self.deepest);
+        deepest.fill(zero);
         for &slot in self.contacts.used() {
-            deepest = deepest.min(self.gap_at_end(slot, h, theta));
+            (self.contacts).lower(slot, self.gap_at_end(slot, h, theta), &mut deepest);
         }
+        self.contacts.spread_least(&mut deepest);
         self.deepest = deepest;
-        self.is_deep = deepest.lt(zero.like(-tolerated)) & self.going;
-        self.is_deep.any()
+        let mut is_any = false;
+        for (is_deep, deepest) in self.is_deep.iter_mut().zip(&self.deepest) {
+            *is_deep = deepest.lt(zero.like(-tolerated)) & self.going;
+            is_any |= is_deep.any();
+        }
+        is_any
     }
 
     /// Gap of a slot after the step, m; 0 where it is negative and opening.
@@ -65,7 +71,7 @@ impl<T: Lane> Block<T> {
                 let zero = h.like(0.0);
                 let problems = &mut problems[..self.contacts.n_problems()];
                 for (index, problem) in problems.iter_mut().enumerate() {
-                    if !self.is_deep.get(Self::lane_of(index)) {
+                    if !self.is_deep[index / T::LANES].get(Self::lane_of(index)) {
                         problem.n_contacts = 0;
                     }
                     let n = problem.n_unknowns();
@@ -77,13 +83,14 @@ impl<T: Lane> Block<T> {
                     self.gaps[slot] = [gap, zero, zero];
                     self.pushes[slot] = [zero; 3];
                     let (homes, places) = (self.contacts.homes(slot), self.contacts.places(slot));
-                    let active = self.contacts.slot(slot).active & self.is_deep;
+                    let is_deep = self.contacts.mask_of(slot, &self.is_deep);
+                    let active = self.contacts.slot(slot).active & is_deep;
                     for lane in (0..T::LANES).filter(|lane| active.get(*lane)) {
                         let problem = &mut problems[usize::from(homes[lane])];
                         problem.q[3 * usize::from(places[lane])] = gap.get(lane);
                     }
                 }
-                let swept = self.is_deep & T::mask(self.token, self.contacts.factored());
+                let swept = self.any(&self.is_deep) & T::mask(self.token, self.contacts.factored());
                 if swept.any() {
                     let data = (&self.gaps[..], &self.mu[..]);
                     let pushes = &mut self.pushes;
@@ -100,7 +107,7 @@ impl<T: Lane> Block<T> {
         let mut unsolved = 0;
         for (index, problem) in problems[..self.n_problems()].iter().enumerate() {
             let lane = Self::lane_of(index);
-            if self.is_deep.get(lane) {
+            if self.is_deep[index / T::LANES].get(lane) {
                 unsolved |= u32::from(!problem.is_solved) << lane;
                 let report = &mut self.reports[lane];
                 report.iterations += problem.iterations;
@@ -114,52 +121,99 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.displace(problems),
         );
-        self.close_end(self.is_deep & self.going);
-        let lifted = self.energy(State::End).0.kinetic_and_potential();
-        let is_moved = self.is_deep & self.going;
-        let [kinetic, potential] = self.balance.after;
+        let is_moved = self.any(&self.is_deep) & self.going;
+        self.close_moved(is_moved);
+        let mut own = std::mem::take(&mut self.energies);
+        let mut gained = self.number(0.0);
+        let going = self.going;
+        for (cluster, lifted) in self.energy(State::End).iter().enumerate() {
+            own.lifted[cluster] = lifted.energy.kinetic_and_potential();
+        }
+        for (cluster, (after, lifted)) in own.after.iter_mut().zip(&own.lifted).enumerate() {
+            let lanes = self.is_deep[cluster] & going;
+            let change = (lifted[0] - after[0]) + (lifted[1] - after[1]);
+            gained += T::select(lanes, change, change.like(0.0));
+            *after = select_both(lanes, *lifted, *after);
+        }
+        self.energies = own;
         let work = self.drives.work_of_displacement(
             &self.machine,
             self.time_step(),
             &self.start.joints,
             [&self.v, &self.v_end, &self.y],
         );
-        let gained = (lifted[0] - kinetic) + (lifted[1] - potential) - work;
+        let gained = gained - work;
         for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
             if is_moved.get(lane) {
                 report.energy_lifted = gained.get(lane).max(0.0);
                 report.energy_lost += (-gained.get(lane)).max(0.0);
             }
         }
-        self.balance.after = select_both(is_moved, lifted, self.balance.after);
+    }
+
+    /// Closes the loops of the groups that were moved.
+    fn close_moved(&mut self, is_moved: T::Mask) {
+        if self.rows.loops.is_none() || self.n_clusters() == 1 {
+            self.close_end(is_moved);
+            return;
+        }
+        self.middle.clone_from(&self.end);
+        self.v_mean.copy_from_slice(&self.v_end);
+        self.close_end(is_moved);
+        let others = |cluster: usize| !self.is_deep[cluster];
+        (self.end).select_clusters_from(&self.machine, others, &self.middle);
+        let kept = self.v_mean.iter().zip(&self.cluster_of);
+        for (v, (kept, cluster)) in self.v_end.iter_mut().zip(kept) {
+            *v = T::select(!self.is_deep[*cluster], *kept, *v);
+        }
     }
 
     #[inline(always)]
     fn displace(&mut self, problems: &[ContactProblem]) {
         let zero = self.number(0.0);
-        let mut farthest = [0.0_f64; MAX_LANES];
+        let mut farthest = std::mem::take(&mut self.energies.number);
+        farthest.fill(zero);
         for (index, problem) in problems[..self.n_problems()].iter().enumerate() {
-            let (lane, n) = (Self::lane_of(index), problem.n_unknowns());
+            let (leader, lane, n) = (index / T::LANES, Self::lane_of(index), problem.n_unknowns());
+            let mut most = farthest[leader].get(lane);
             for (u, q) in problem.u[..n].iter().zip(&problem.q[..n]) {
-                farthest[lane] = farthest[lane].max((u - q).abs());
+                most = most.max((u - q).abs());
             }
+            farthest[leader].set(lane, most);
         }
-        let farthest = T::load(self.token, &farthest[..T::LANES]);
+        self.contacts.spread(&mut farthest);
         let mut pushes = std::mem::take(&mut self.pushes);
         self.rows
             .read(&self.contacts, problems, Answer::Impulses, &mut pushes);
+        if self.n_clusters() > 1 {
+            for &slot in self.contacts.used() {
+                let is_deep = self.contacts.mask_of(slot, &self.is_deep);
+                pushes[slot] = pushes[slot].map(|push| T::select(is_deep, push, zero));
+            }
+        }
         self.y.fill(zero);
+        let is_deep = self.any(&self.is_deep);
         self.rows
-            .add_impulses(&self.contacts, self.is_deep, &pushes, &mut self.y);
+            .add_impulses(&self.contacts, is_deep, &pushes, &mut self.y);
         self.pushes = pushes;
         self.factor.half_solve_back(&self.machine, &mut self.y);
-        let size = displacement(zero, &self.machine, &self.y).max(farthest);
-        let limit = zero.like(-FARTHEST) * self.deepest;
-        self.fall_back(Fallback::Projection, !size.le(limit) & self.is_deep);
-        let is_moved = self.is_deep & self.going;
+        let mut is_far = T::mask(self.token, 0);
+        for (cluster, (farthest, deepest)) in farthest.iter().zip(&self.deepest).enumerate() {
+            let size = displacement(zero, &self.machine, &self.y, cluster).max(*farthest);
+            let limit = zero.like(-FARTHEST) * *deepest;
+            is_far = is_far | (!size.le(limit) & self.is_deep[cluster]);
+        }
+        self.energies.number = farthest;
+        self.fall_back(Fallback::Projection, is_far);
         self.middle
             .set_moved(&self.machine, &self.end, &self.y, 1.0);
         self.middle.normalise();
-        self.end.select_from(is_moved, &self.middle);
+        let going = self.going;
+        if let [is_deep] = self.is_deep[..] {
+            self.end.select_from(is_deep & going, &self.middle);
+        } else {
+            let is_moved = |cluster: usize| self.is_deep[cluster] & going;
+            (self.end).select_clusters_from(&self.machine, is_moved, &self.middle);
+        }
     }
 }

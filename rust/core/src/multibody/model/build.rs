@@ -128,6 +128,12 @@ impl Model {
             machines,
         };
         model.build_loops()?;
+        let tied = model.loops.iter().map(|closure| {
+            let trees = closure.trees(&model.mechanism).collect();
+            (trees, closure.holds_the_world())
+        });
+        let tied: Vec<(Vec<usize>, bool)> = tied.collect();
+        model.mechanism.tie(&tied);
         Ok(model)
     }
 }

@@ -611,7 +611,7 @@ where
         self.parts.rolling.add(&self.parts.pairs.round, y);
     }
 
-    fn displacement(&self, y: &[f64]) -> f64 {
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
         match &self.scene.machine {
             Some(machine) => machine.displacement(self.scene.machine_velocities(y)),
             None => 0.0,
