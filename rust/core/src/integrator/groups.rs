@@ -44,6 +44,8 @@ pub(super) struct Group {
     pub is_inelastic: bool,
     /// Whether its positions were projected.
     pub is_moved: bool,
+    /// Penetration that is tolerated, m: the least of its clusters.
+    pub tolerated: f64,
     /// Which share of the projection's displacement it makes.
     pub share: f64,
 }
@@ -67,9 +69,11 @@ impl Groups {
         for own in &mut self.own {
             own.is_untouched = true;
             own.is_solved = true;
+            own.tolerated = f64::INFINITY;
         }
         self.of_contact.clear();
         if n == 1 {
+            self.own[0].tolerated = system.tolerated(options, 0);
             let own = &mut self.own[0];
             own.n_contacts = contacts.len();
             own.is_untouched = contacts.iter().all(UnilateralContact::is_internal);
@@ -93,6 +97,9 @@ impl Groups {
         self.compare(system, contacts, warm_start);
         for (cluster, &group) in self.of_cluster.iter().enumerate() {
             self.own[group].is_gyroscopic |= gyroscopic.get(cluster) == Some(&true);
+            let tolerated = system.tolerated(options, cluster);
+            let own = &mut self.own[group];
+            own.tolerated = own.tolerated.min(tolerated);
             let has_contacts = self.own[group].n_contacts > 0;
             let lasts = options.warm_start && warm_start.persists(system, cluster);
             self.own[group].persists &= lasts || !has_contacts;

@@ -34,6 +34,9 @@ use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 /// its torque–speed line needs one, a single wheel at most four.
 pub(crate) const MOST_REVISIONS: usize = 6;
 
+/// Penetration that is tolerated by default, m, of a system without a size of its own.
+const TOLERATED: f64 = 1e-8;
+
 /// A contact as time stepping sees it: a key and a gap.
 pub trait UnilateralContact {
     /// Identifies a contact from one step to the next.
@@ -481,6 +484,11 @@ pub trait MechanicalSystem {
 
     /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.
     fn add_moments(&self, _y: &mut [f64]) {}
+
+    /// Penetration of a cluster that is tolerated, m.
+    fn tolerated(&self, options: &StepOptions, _cluster: usize) -> f64 {
+        options.penetration_tolerance.unwrap_or(TOLERATED)
+    }
 
     /// Largest displacement of a cluster, m, that `y` (nv) causes away from the contact points; it
     /// limits the projection.

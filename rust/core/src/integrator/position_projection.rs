@@ -42,7 +42,7 @@ pub(super) fn project<S: MechanicalSystem>(
         let own = ws.gap_end.iter().enumerate();
         let own = own.filter(|(i, _)| ws.groups.of_contact(*i) == number);
         let deepest = own.fold(0.0_f64, |deepest, (_, gap)| deepest.min(*gap));
-        if deepest >= -options.penetration_tolerance {
+        if deepest >= -ws.groups.group(number).tolerated {
             continue;
         }
         if !has_moved {
@@ -124,7 +124,7 @@ fn tolerance<Q: Clone, C>(options: &StepOptions, ws: &Scratch<Q, C>, number: usi
     let gaps = ws.gap_end.iter().enumerate();
     let gaps = gaps.filter(|(i, _)| ws.groups.of_contact(*i) == number);
     let size = gaps.map(|(_, gap)| gap * gap).sum::<f64>().sqrt();
-    own.max((EXACT * options.penetration_tolerance / size).min(EXACT))
+    own.max((EXACT * ws.groups.group(number).tolerated / size).min(EXACT))
 }
 
 /// Compliance of the ground for a wedged machine that nothing else frees, relative to that of W.

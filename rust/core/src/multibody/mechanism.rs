@@ -57,6 +57,10 @@ pub struct Mechanism {
     /// Of each cluster, a set of trees that closed loops tie together, whether a base or a loop
     /// passes its momentum on to the world.
     pub(super) clusters: Vec<bool>,
+    /// How far a unit of each velocity moves what it carries.
+    pub(crate) levers: Vec<Lever>,
+    /// Of each cluster, the largest distance of anything from the origin of its tree, m.
+    pub(super) sizes: Vec<f64>,
     pub(super) n_motions: usize,
     pub(super) paths: Vec<usize>,
     pub(super) movers: Vec<Mover>,
@@ -77,6 +81,20 @@ pub struct TreeSpan {
     pub pose: usize,
     /// Its cluster.
     pub(crate) cluster: usize,
+}
+
+/// Velocities that move what they carry together: the components of a vector, or one alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lever {
+    /// The first of them.
+    pub first: usize,
+    /// Their number.
+    pub n: usize,
+    /// Farthest displacement by a unit: 1 for a translation, for a rotation the largest distance
+    /// from its axis, m.
+    pub arm: f64,
+    /// Their cluster.
+    pub cluster: usize,
 }
 
 /// A joint with a coordinate of its own.
@@ -210,6 +228,13 @@ impl Mechanism {
     #[must_use]
     pub(crate) fn is_held(&self, cluster: usize) -> bool {
         self.clusters[cluster]
+    }
+
+    /// Size of a cluster, m: the largest distance of anything from the origin of its tree.
+    #[inline]
+    #[must_use]
+    pub(crate) fn size(&self, cluster: usize) -> f64 {
+        self.sizes[cluster]
     }
 
     /// Index of a body's cluster.

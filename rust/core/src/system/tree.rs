@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::command::Command;
-use super::extent::{Turning, displacement};
+use super::extent::{Turning, displacement, tolerated};
 use super::loops::{each, placed};
 use super::momentum_balance::BalanceScene;
 use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
@@ -652,6 +652,11 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
+    }
+
+    fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
+        let stated = options.penetration_tolerance;
+        tolerated(stated, self.model.mechanism(), cluster)
     }
 
     fn displacement(&self, y: &[f64], cluster: usize) -> f64 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::balance::{Balance, Conditions, Correction, Energies, select_both};
 use super::{Block, Fallback, Next, State};
 use crate::contact::clusters_of;
-use crate::integrator::{Phase, Probe, StepReport};
+use crate::integrator::{Phase, Probe, Stabilisation, StepReport};
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
@@ -243,13 +243,12 @@ impl<T: Lane> Block<T> {
             },
         );
         probe.end(Phase::Update);
-        let is_deep = self.tolerated().is_some_and(|tolerated| {
-            T::vectorize(
+        let is_deep = self.options.stabilisation == Stabilisation::Projection
+            && T::vectorize(
                 token,
                 #[inline(always)]
-                || self.measure(tolerated),
-            )
-        });
+                || self.measure(),
+            );
         if is_deep { Next::Project } else { Next::Finish }
     }
 

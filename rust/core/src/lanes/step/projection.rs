@@ -2,13 +2,12 @@
 
 use super::balance::select_both;
 use super::{Block, Fallback, State};
-use crate::integrator::Stabilisation;
 use crate::integrator::position_projection::FARTHEST;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
 use crate::scalar::{Lane, LaneMask};
-use crate::system::extent::displacement;
+use crate::system::extent::{displacement, tolerated};
 
 /// Sweeps before pivoting, of machines with many contacts: a problem of six cylinders on hills with
 /// cells of 0.25 m takes 5.0 systems without them, 3.0 after three and 2.3 after six. Thin wheels
@@ -16,15 +15,9 @@ use crate::system::extent::displacement;
 const SWEEPS: usize = 4;
 
 impl<T: Lane> Block<T> {
-    /// Penetration that is tolerated, m, if positions are projected.
-    pub(super) fn tolerated(&self) -> Option<f64> {
-        (self.options.stabilisation == Stabilisation::Projection)
-            .then_some(self.options.penetration_tolerance)
-    }
-
     /// Predicts the gaps at the end of the step; true if the position of a group must be projected.
     #[inline(always)]
-    pub(super) fn measure(&mut self, tolerated: f64) -> bool {
+    pub(super) fn measure(&mut self) -> bool {
         let (h, theta) = self.time_step();
         let zero = h.like(0.0);
         let mut deepest = std::mem::take(&mut self.deepest);
@@ -34,11 +27,19 @@ impl<T: Lane> Block<T> {
         }
         self.contacts.spread_least(&mut deepest);
         self.deepest = deepest;
+        let mut least = std::mem::take(&mut self.energies.number);
+        for (cluster, least) in least.iter_mut().enumerate() {
+            let stated = self.options.penetration_tolerance;
+            *least = zero.like(tolerated(stated, &self.machine, cluster));
+        }
+        self.contacts.spread_least(&mut least);
         let mut is_any = false;
-        for (is_deep, deepest) in self.is_deep.iter_mut().zip(&self.deepest) {
-            *is_deep = deepest.lt(zero.like(-tolerated)) & self.going;
+        let limits = self.deepest.iter().zip(&least);
+        for (is_deep, (deepest, tolerated)) in self.is_deep.iter_mut().zip(limits) {
+            *is_deep = deepest.lt(-*tolerated) & self.going;
             is_any |= is_deep.any();
         }
+        self.energies.number = least;
         is_any
     }
 

@@ -134,6 +134,7 @@ impl Model {
         });
         let tied: Vec<(Vec<usize>, bool)> = tied.collect();
         model.mechanism.tie(&tied);
+        model.find_levers();
         Ok(model)
     }
 }

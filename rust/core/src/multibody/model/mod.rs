@@ -9,6 +9,7 @@ mod build;
 mod close;
 pub(in crate::multibody) mod closed_loop;
 mod edit;
+mod levers;
 mod links;
 mod machines;
 mod parts;
@@ -142,10 +143,14 @@ impl Model {
             _ => 0.0,
         };
         let half = tree.lead() / 2;
-        // A translation counts as a rotation at an arm of more than one metre.
         let turning: f64 = v[half..].iter().map(|w| w.abs()).sum();
-        let mut reach = tree.reach + 1.0;
+        let mut reach = tree.reach
+            + self
+                .mechanism
+                .size(self.mechanism.cluster_of_body(tree.bodies.start));
         if self.has_slides() {
+            // A translation counts as a rotation at an arm of more than one metre.
+            reach += 1.0;
             let first = place(tree.bodies.start);
             let farthest = tree.bodies.clone().map(|body| (place(body) - first).norm());
             reach = farthest.fold(reach, f64::max);
