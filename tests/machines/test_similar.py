@@ -58,7 +58,7 @@ def cart(width: float = 0.0) -> dict[str, Any]:
         disc = {"kind": "disc", "radius": 0.1}
         own = {"name": "w" + name, "parent": "body", "position": [x, -0.1, z], "axis": [0, 0, 1], "mass": 1.5}
         solids.append(own | {"shape": disc})
-        wheel = {"name": name, "solid": "w" + name, "axle": [0, 0, 1], "radius": 0.1, "torque_limit": 8.0}
+        wheel = {"name": name, "solid": "w" + name, "axle": [0, 0, 1], "radius": 0.1, "torque_limit": 8.0, "drive_sign": -1}
         wheels.append(wheel | ({"width": width} if width else {}))
     return {"format": 1, "name": "c", "solids": solids, "wheels": wheels}
 
