@@ -485,6 +485,12 @@ pub trait MechanicalSystem {
     /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.
     fn add_moments(&self, _y: &mut [f64]) {}
 
+    /// What a unit of a contact's gap counts as where it is compared with lengths, m: of a stop, in
+    /// rad, the arm of its joint. By default 1.
+    fn lever(&self, _contact: &Self::Contact) -> f64 {
+        1.0
+    }
+
     /// Penetration of a cluster that is tolerated, m.
     fn tolerated(&self, options: &StepOptions, _cluster: usize) -> f64 {
         options.penetration_tolerance.unwrap_or(TOLERATED)

@@ -41,7 +41,8 @@ pub(super) fn project<S: MechanicalSystem>(
     for number in 0..ws.groups.n() {
         let own = ws.gap_end.iter().enumerate();
         let own = own.filter(|(i, _)| ws.groups.of_contact(*i) == number);
-        let deepest = own.fold(0.0_f64, |deepest, (_, gap)| deepest.min(*gap));
+        let own = own.map(|(i, gap)| gap * system.lever(&ws.contacts[i]));
+        let deepest = own.fold(0.0_f64, f64::min);
         if deepest >= -ws.groups.group(number).tolerated {
             continue;
         }
@@ -198,7 +199,10 @@ fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>, number: usize) -> f6
     let own = |i: &usize| ws.groups.of_contact(i / d) == number;
     // The answer is u = d + (gap, 0, 0) with d = W λ: subtract the gaps.
     let points = (0..ws.u_position.len()).filter(own);
-    let points = points.map(|i| ws.u_position[i] - ws.q_free[i]);
+    let points = points.map(|i| {
+        let lever = system.lever(&ws.contacts[i / d]);
+        (ws.u_position[i] - ws.q_free[i]) * lever
+    });
     let clusters = 0..ws.groups.n();
     let clusters = clusters.filter(|own| ws.groups.of_cluster(*own) == number);
     let elsewhere = clusters.map(|own| system.displacement(&ws.dv, own));

@@ -62,9 +62,10 @@ pub(super) fn find_impacts<S: MechanicalSystem>(
 ) {
     let d = S::DIMENSION.components();
     let slow = slow(options);
-    let is_fast = |u: &[f64]| u[0].abs() > slow;
+    let is_fast = |(u, contact): (&[f64], &S::Contact)| u[0].abs() * system.lever(contact) > slow;
     ws.impact.clear();
-    ws.impact.extend(ws.u_before.chunks_exact(d).map(is_fast));
+    let local = ws.u_before.chunks_exact(d).zip(&ws.contacts);
+    ws.impact.extend(local.map(is_fast));
     if !ws.impact.contains(&true) {
         return;
     }

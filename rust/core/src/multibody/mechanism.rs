@@ -98,7 +98,7 @@ pub(crate) struct Lever {
 }
 
 /// A joint with a coordinate of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnJoint {
     /// The body that it carries.
     pub body: usize,
@@ -106,6 +106,9 @@ pub struct OwnJoint {
     pub velocity: usize,
     /// The cluster of its tree.
     pub(crate) cluster: usize,
+    /// Its [lever](Lever::arm): what a coordinate and a rate count as, m and m/s, where they are
+    /// compared with lengths and speeds.
+    pub(crate) arm: f64,
 }
 
 /// A velocity that moves a body, and the motion that a unit of it imparts to the body.

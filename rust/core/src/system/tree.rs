@@ -14,8 +14,8 @@ use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
 use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{
-    Activation, Contact, ContactKey, Opposite, clusters_of, detect, detect_limits, detect_pairs,
-    generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
+    Activation, Contact, ContactKey, Opposite, Part, clusters_of, detect, detect_limits,
+    detect_pairs, generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
@@ -652,6 +652,13 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
+    }
+
+    fn lever(&self, contact: &Contact) -> f64 {
+        match contact.part {
+            Part::Limit(joint, _) => self.model.mechanism().joints[joint].arm,
+            _ => 1.0,
+        }
     }
 
     fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {

@@ -13,7 +13,11 @@ impl<T: Lane> Block<T> {
         self.has_impact.fill(T::mask(self.token, 0));
         for &slot in self.contacts.used() {
             let active = self.contacts.slot(slot).active;
-            let is_fast = active & !self.rows.u_before[slot][0].abs().le(slow);
+            let mut speed = self.rows.u_before[slot][0].abs();
+            if let Some(lever) = self.lever(slot) {
+                speed *= lever;
+            }
+            let is_fast = active & !speed.le(slow);
             self.impact[slot] = is_fast;
             self.contacts.mark(slot, is_fast, &mut self.has_impact);
         }

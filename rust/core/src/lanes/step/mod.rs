@@ -30,6 +30,7 @@ use std::sync::Arc;
 use self::balance::{Balance, Energies};
 use super::contacts::Contacts;
 use super::ground::Ground;
+use super::joint_slots::JointRow;
 use super::machine::Machine;
 use super::problem::{MAX_CONTACTS, Triple};
 use super::rows::Rows;
@@ -331,6 +332,16 @@ impl<T: Lane> Block<T> {
             self.gravity,
             &mut self.energy_scratch,
         )
+    }
+
+    /// What a unit of a slot's gap counts as where it is compared with lengths, m: of a stop the arm
+    /// of its joint.
+    #[inline(always)]
+    fn lever(&self, slot: usize) -> Option<T> {
+        match self.contacts.joint_row(slot) {
+            Some((joint, JointRow::Stop(_))) => Some(self.number(self.machine.joints[joint].arm)),
+            _ => None,
+        }
     }
 
     /// Number of clusters.

@@ -23,7 +23,11 @@ impl<T: Lane> Block<T> {
         let mut deepest = std::mem::take(&mut self.deepest);
         deepest.fill(zero);
         for &slot in self.contacts.used() {
-            (self.contacts).lower(slot, self.gap_at_end(slot, h, theta), &mut deepest);
+            let mut gap = self.gap_at_end(slot, h, theta);
+            if let Some(lever) = self.lever(slot) {
+                gap *= lever;
+            }
+            self.contacts.lower(slot, gap, &mut deepest);
         }
         self.contacts.spread_least(&mut deepest);
         self.deepest = deepest;
@@ -177,8 +181,11 @@ impl<T: Lane> Block<T> {
         for (index, problem) in problems[..self.n_problems()].iter().enumerate() {
             let (leader, lane, n) = (index / T::LANES, Self::lane_of(index), problem.n_unknowns());
             let mut most = farthest[leader].get(lane);
-            for (u, q) in problem.u[..n].iter().zip(&problem.q[..n]) {
-                most = most.max((u - q).abs());
+            let list = self.contacts.list(index);
+            for (i, (u, q)) in problem.u[..n].iter().zip(&problem.q[..n]).enumerate() {
+                let slot = usize::from(list.slots[i / 3]);
+                let lever = self.lever(slot).map_or(1.0, |lever| lever.get(lane));
+                most = most.max((u - q).abs() * lever);
             }
             farthest[leader].set(lane, most);
         }

@@ -137,6 +137,10 @@ impl Model {
                 }
             }
         }
+        for own in &mut self.mechanism.joints {
+            let same = levers.iter().filter(|lever| lever.first == own.velocity);
+            own.arm = same.map(|lever| lever.arm).fold(0.0, f64::max);
+        }
         self.mechanism.levers = levers;
         self.mechanism.sizes = sizes;
     }

@@ -25,6 +25,7 @@ pub(super) fn mechanism_of(
                 body: joint.body,
                 velocity: joint.velocity,
                 cluster: 0,
+                arm: 1.0,
             })
             .collect(),
         rotors: (0..joints.len())
