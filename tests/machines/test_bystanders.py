@@ -84,8 +84,10 @@ def test_a_rover_drives_to_the_bit_as_alone_while_another_one_stands_or_drives()
     torques = np.linspace(0.2, 0.5, 6)
     both.set_wheel_torques(np.concatenate([np.zeros(6), torques]))
     alone.set_wheel_torques(torques)
-    for _ in range(150):
-        both.step()
+    for k in range(150):
+        if both.step().fallbacks:
+            assert k > 60, "the scene is for fast steps"
+            break
         alone.step()
         np.testing.assert_array_equal(both.q[first.nq :], alone.q)
         np.testing.assert_array_equal(both.v[first.nv :], alone.v)
