@@ -50,6 +50,7 @@ __all__: list[str] = [
     "GrainContacts",
     "GrainSimulation",
     "HeightField",
+    "InternalError",
     "Line",
     "Linearisation",
     "Machine",
@@ -136,6 +137,9 @@ class StepError(RoverGymError, RuntimeError):
 
 class BusyError(RoverGymError, RuntimeError):
     """An object was used while another call on it was still running. Nothing has changed."""
+
+class InternalError(RoverGymError, RuntimeError):
+    """A fault of rover-gym. Please report it, with what led to it and the message, which names the place."""
 
 @final
 class Motor:
@@ -875,10 +879,12 @@ class HeightField(Terrain):
         origin: Place (x, z) of the first height, m. By default the middle of the map is at the
             world's origin.
         material: Name of its material, for the laws of a `Simulation` by pair of materials.
+        map_frame: Easting and northing of the world's origin in the coordinates of a map, and
+            their change per metre along x and along z, (4,). `from_file` reads it from a GeoTIFF.
 
     Raises:
         TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
-            has data, or the spacing is not positive.
+            has data, the spacing is not positive, or a change per metre is 0.
     """
 
     def __new__(
@@ -887,6 +893,7 @@ class HeightField(Terrain):
         spacing: float | tuple[float, float],
         origin: tuple[float, float] | None = None,
         material: str = "ground",
+        map_frame: Sequence[float] | None = None,
     ) -> HeightField: ...
     from_file = staticmethod(terrain_files.height_field_from_file)
     fractal = staticmethod(fractal_map)
@@ -908,6 +915,32 @@ class HeightField(Terrain):
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Corners x_min, z_min, x_max, z_max of the map, m."""
+    @property
+    def map_frame(self) -> tuple[float, float, float, float] | None:
+        """Easting and northing of the world's origin, and their change per metre; None without a map.
+
+        Four numbers: the last two are the changes of easting along x and of northing along z.
+        """
+    def place_of(self, easting: float, northing: float) -> tuple[float, float]:
+        """Place (x, z), m, of a point in map coordinates.
+
+        Args:
+            easting: Easting, in the unit of the map.
+            northing: Northing, in the unit of the map.
+
+        Raises:
+            TerrainError: The ground has no map coordinates, or a number is not finite.
+        """
+    def coordinates_of(self, x: float, z: float) -> tuple[float, float]:
+        """Easting and northing of a place, in the unit of the map.
+
+        Args:
+            x: Along x, m.
+            z: Along z, m.
+
+        Raises:
+            TerrainError: The ground has no map coordinates, or a number is not finite.
+        """
     def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
@@ -953,7 +986,12 @@ class Union(Terrain):
     """Several terrains combined, for instance a map with rocks on it. Immutable.
 
     A rover can touch each of them. With a plane the ground is known everywhere; otherwise it is
-    known where a height field has data.
+    known where the parts together have it: height fields, and meshes beside them.
+
+    Where parts meet, their borders are no edges: a box slides from one to the next, and a ridge
+    between them is one ridge. Parts meet within 1e-5 of the length of an edge. Where they coincide,
+    a contact counts once, with the material of the first. What lies inside another part is not
+    touched.
 
     Args:
         parts: Terrains of any kind, at least one; at most one of them may have a plane.
@@ -1008,6 +1046,13 @@ class StepReport:
     def n_contacts(self) -> int:
         """Largest number of contacts in a step."""
     @property
+    def immovable_contacts(self) -> int:
+        """Largest number of contacts in a step along whose normal closed loops let nothing move.
+
+        Example: the wheels of a machine that is welded to a stand. Such a contact bears no load,
+        unless its wheel is elastic, and an overlap there cannot be removed.
+        """
+    @property
     def loop_gap(self) -> float:
         """Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.
 
@@ -1034,8 +1079,18 @@ class StepReport:
     def energy_removed(self) -> float:
         """Spurious energy gain of the scheme that the audit removed, summed over the steps, J."""
     @property
+    def energy_supplied(self) -> float:
+        """Work of torques, motors and wrenches, summed over the steps, J."""
+    @property
+    def energy_of_set_points(self) -> float:
+        """Energy that commands since the last call have added to held joints, J.
+
+        `Simulation.energy` contains it from the command on, so it is not part of the change over
+        the call. 0 in the first call after the state was set or restored.
+        """
+    @property
     def energy_dissipated(self) -> float:
-        """Energy dissipated by friction and impacts, summed over the steps, J.
+        """Energy dissipated by friction, impacts, dampers and sand, summed over the steps, J.
 
         It can be negative with Newton's law of restitution and friction. A new contact counts as an
         impact if it closes faster than gravity explains.
@@ -1044,15 +1099,18 @@ class StepReport:
     def energy_lost(self) -> float:
         """Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
 
-        The change of the energy is the work of the actuators minus `energy_dissipated`,
-        `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
+        The change of the energy over the call is `energy_supplied` plus `energy_lifted` and
+        `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
         `energy_lost` therefore contains the errors of the time stepping and the work of reactions
         in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
         0 for grains and planar soils, whose energy is not audited.
         """
     @property
     def energy_lifted(self) -> float:
-        """Energy gained by removing penetration, less the actuators' work, sum of the steps, J."""
+        """Work against gravity and springs by removing penetration, summed over the steps, J.
+
+        The work of the actuators on the way is part of `energy_supplied`.
+        """
     @property
     def energy_released(self) -> float:
         """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -1064,12 +1122,14 @@ class StepReport:
         """
     @property
     def undetermined_loads(self) -> int:
-        """Degree of static indeterminacy of the wheel loads in the last step.
+        """Number of contacts whose impulses the motion of the last step does not determine.
 
-        0 means that equilibrium determines the loads. Otherwise many distributions of loads satisfy
-        equilibrium, and micrometres of height decide between them: a rigid chassis on four rigid
-        wheels has degree 1. Wheels with a `stiffness` always have 0. Friction is not considered. 0
-        for machines other than rovers.
+        0 means that the motion determines the impulses of all contacts. Otherwise other impulses
+        cause the same motion, and the step returns those of least norm within the cones of friction:
+        four corners of a box share its weight like four equal springs. Friction counts: six rigid
+        wheels that drive straight could push sideways against each other, so the number is 6.
+        Contacts that yield, such as wheels with a `stiffness`, have determined impulses. Always 0 for
+        grains. In a group of more than 32 rigid contacts the solver chooses among the impulses.
         """
     def followed_by(self, later: StepReport) -> StepReport:
         """Combines this report with that of the following steps.
@@ -1339,7 +1399,10 @@ class Energy:
         """Kinetic energy, J."""
     @property
     def potential(self) -> float:
-        """Potential energy in gravity, J, zero at the world's origin."""
+        """Potential energy in gravity, springs and the stiffness of held joints, J.
+
+        That in gravity is zero with all mass centres at the world's origin.
+        """
     @property
     def total(self) -> float:
         """Sum of both, J."""
@@ -1670,8 +1733,9 @@ class Simulation(AnySimulation):
             damping: Damping of the controllers, N m s/rad; the model's by default.
 
         Raises:
-            CommandError: There is no such joint, the number of set-points differs, or a number is
-                negative or not finite. Nothing has changed.
+            CommandError: There is no such joint, the number of set-points differs, a number is
+                negative or not finite, or neither model nor arguments give a stiffness or a
+                damping. Nothing has changed.
         """
     def release(self, joints: str | Sequence[str]) -> None:
         """Releases joints that are held.
@@ -1683,7 +1747,11 @@ class Simulation(AnySimulation):
             CommandError: There is no such joint. Nothing has changed.
         """
     def brake(self) -> None:
-        """Holds all wheels at their present angles, as `hold` does, and sets their torques to 0."""
+        """Holds all wheels at their present angles, as `hold` does, and sets their torques to 0.
+
+        Raises:
+            CommandError: The model states no gains to hold a wheel. Nothing has changed.
+        """
     @property
     def contacts(self) -> Contacts:
         """The contacts of the last step."""

@@ -9,6 +9,7 @@ import inspect
 import math
 import numbers
 import os
+import stat
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set, Sized
 from decimal import Decimal
 from pathlib import Path
@@ -144,16 +145,33 @@ def span(
     return (low, high)
 
 
-def text_of_file(path: object, most_bytes: int, *, error: type[RoverGymError]) -> str:
-    """Reads a file of UTF-8 text, of which no more than `most_bytes` are read.
+def regular_file(path: object, *, error: type[RoverGymError]) -> Path:
+    """Checks the path of a file to be read and returns it.
 
     Raises:
-        RoverGymError: `path` is no path, or the file is longer or no such text.
-        OSError: The file cannot be read.
+        RoverGymError: `path` is no path, or that of a directory, a pipe or the like.
+        OSError: There is no such file.
     """
     if not isinstance(path, (str, os.PathLike)):
         refuse(error, "path", path, "must be a path")
     place = Path(os.fsdecode(path))
+    try:
+        is_regular = stat.S_ISREG(place.stat().st_mode)
+    except ValueError:  # a name that no file can have
+        refuse(error, "path", str(place), "must be the path of a file")
+    if not is_regular:  # opening a pipe would wait for its writer
+        refuse(error, "path", str(place), "must be the path of a regular file")
+    return place
+
+
+def text_of_file(path: object, most_bytes: int, *, error: type[RoverGymError]) -> str:
+    """Reads a file of UTF-8 text, of which no more than `most_bytes` are read.
+
+    Raises:
+        RoverGymError: `path` is not that of a regular file, or the file is longer or no such text.
+        OSError: The file cannot be read.
+    """
+    place = regular_file(path, error=error)
     with place.open("rb") as file:
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:

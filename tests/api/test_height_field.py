@@ -4,6 +4,7 @@ A step moved the chassis by 0.13 m where the wheel was 0.03 m deep: the far face
 as an overlap.
 """
 
+import copy
 import json
 import pickle
 import struct
@@ -11,6 +12,7 @@ import tracemalloc
 import zlib
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from refusals import refused
@@ -19,6 +21,7 @@ from rover_gym.env.arguments import check_terrain
 from rover_gym.maps import read_map
 from rover_gym.mechanics import (
     HeightField,
+    OptionError,
     Plane,
     RoverModel,
     Simulation,
@@ -288,6 +291,95 @@ def test_a_geotiff_of_several_bands_is_refused_unless_one_is_chosen(tmp_path: Pa
         assert HeightField.from_file(path, band=band, datum=0.0).grid[0, 0] == 10.0 * band
 
 
+def a_geotiff(path: Path, heights: np.ndarray, **changes: object) -> Path:
+    """A map in metres whose first cell has its corner at 400 000 east and 5 000 000 north."""
+    rasterio = pytest.importorskip("rasterio")
+    shape = {"height": heights.shape[0], "width": heights.shape[1]}
+    profile = {"driver": "GTiff", "count": 1, "dtype": heights.dtype.name, "crs": "EPSG:32633"} | shape
+    profile["transform"] = rasterio.Affine(2.0, 0.0, 4e5, 0.0, -2.0, 5e6)
+    with rasterio.open(path, "w", **{**profile, **changes}) as file:
+        file.write(heights, 1)
+    return path
+
+
+def test_a_geotiff_keeps_its_place_on_the_map(tmp_path: Path) -> None:
+    """Its origin was dropped: starts and goals of a survey had to be converted by hand."""
+    heights = np.zeros((11, 21), np.float32)
+    heights[10, 20] = 5.0
+    field = HeightField.from_file(a_geotiff(tmp_path / "map.tif", heights))
+    # The middle of the map is the world's origin; heights are those of the middles of cells.
+    assert field.map_frame == (400021.0, 4999989.0, 1.0, -1.0)
+    assert field.place_of(400041.0, 4999979.0) == (20.0, 10.0)
+    assert field.coordinates_of(20.0, 10.0) == (400041.0, 4999979.0)
+    again = copy.deepcopy(field)
+    assert again.map_frame == field.map_frame
+    moved = HeightField.from_file(tmp_path / "map.tif", origin=(0.0, 0.0))
+    assert moved.place_of(*field.coordinates_of(20.0, 10.0)) == (40.0, 20.0)
+    assert HeightField(heights, 1.0).map_frame is None
+    for ground in (HeightField(heights, 1.0), HeightField.fractal(5.0, 0.5, 0.1, seed=1)):
+        with refused(TerrainError, "map_frame", "no map coordinates"):
+            ground.place_of(0.0, 0.0)
+    for wrong in ((1.0, 2.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, float("nan")), "north"):
+        with refused(TerrainError, "map_frame"):
+            HeightField(heights, 1.0, map_frame=wrong)  # type: ignore[arg-type]
+
+
+def test_a_map_of_angles_keeps_its_place_too(tmp_path: Path) -> None:
+    rasterio = pytest.importorskip("rasterio")
+    turn = {"crs": "EPSG:4326", "transform": rasterio.Affine(1e-5, 0.0, 10.0, 0.0, -1e-5, 50.0)}
+    path = a_geotiff(tmp_path / "map.tif", np.zeros((3, 3), np.float32), **turn)
+    field = HeightField.from_file(path, spacing=(0.7, 1.1))
+    assert field.coordinates_of(0.7, -1.1) == pytest.approx((10.0 + 2.5e-5, 50.0 - 0.5e-5), abs=1e-12)
+
+
+def test_an_episode_starts_and_ends_at_map_coordinates(tmp_path: Path) -> None:
+    field = HeightField.from_file(a_geotiff(tmp_path / "map.tif", np.zeros((41, 41), np.float32)))
+    env = gym.make("Rover-v0", terrain=field)
+    start, goal = field.coordinates_of(-5.0, 4.0), field.coordinates_of(12.0, 3.0)
+    env.reset(seed=0, options={"map_position": start, "map_goal": goal})
+    assert env.unwrapped.goal == pytest.approx((12.0, 3.0))
+    assert env.unwrapped.simulation.q[[0, 2]] == pytest.approx((-5.0, 4.0))
+    with refused(OptionError, "options.position", "must not be given together with map_position"):
+        env.reset(options={"map_position": start, "position": (0.0, 0.0)})
+    with refused(OptionError, "options.map_goal", "needs a ground with map coordinates"):
+        gym.make("Rover-v0").reset(options={"map_goal": goal})
+
+
+@pytest.mark.parametrize(("marker", "dtype"), [(-9999, "float32"), (-32768, "int16"), (-999, "float64")])
+def test_a_lone_extreme_minimum_is_refused_with_its_cell(marker: int, dtype: str, tmp_path: Path) -> None:
+    """An undeclared -9999 became the lowest height, and with it the datum: a pit of ten kilometres."""
+    heights = np.add.outer(np.arange(4), np.arange(5)).astype(dtype) + 200
+    heights[2, 3] = marker
+    path = a_geotiff(tmp_path / "map.tif", heights)
+    with refused(TerrainError, "path", rf"height \[2, 3\] is {marker}, far below all others.*give nodata={marker}"):
+        HeightField.from_file(path)
+    grid = HeightField.from_file(path, nodata=marker).grid
+    assert np.argwhere(np.isnan(grid)).tolist() == [[2, 3]]
+    assert np.nanmin(grid) == 0.0
+    assert HeightField.from_file(path, nodata=float("nan")).grid[0, 0] == 200 - marker
+    np.save(tmp_path / "map.npy", heights)
+    with refused(TerrainError, "path", rf"height \[2, 3\] is {marker}"):
+        HeightField.from_file(tmp_path / "map.npy", spacing=1.0)
+    assert np.isnan(HeightField.from_file(tmp_path / "map.npy", spacing=1.0, nodata=marker).grid[2, 3])
+
+
+@pytest.mark.parametrize(
+    "depths", [(-1200.0, -900.0, -1100.0, -1000.0), (-3.0, 0.0, 0.0, 0.0), (-1000.5, 0.0, 0.0, 0.0)]
+)
+def test_deep_ground_without_a_marker_is_read(depths: tuple[float, ...], tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", np.array(depths).reshape(2, 2))
+    field = HeightField.from_file(tmp_path / "map.npy", spacing=1.0)
+    np.testing.assert_array_equal(field.grid, np.array(depths, np.float32).reshape(2, 2))
+
+
+def test_a_spacing_beside_that_of_a_geotiff_is_refused(tmp_path: Path) -> None:
+    """It replaced the file's in silence, though the help says where it applies."""
+    path = a_geotiff(tmp_path / "map.tif", np.zeros((3, 3), np.float32))
+    with refused(TerrainError, "spacing", r"map\.tif states it, 2 m by 2 m: leave it out"):
+        HeightField.from_file(path, spacing=1.0)
+    assert HeightField.from_file(path).spacing == (2.0, 2.0)
+
+
 def test_a_mesh_of_triangles_with_their_own_corners_is_the_mesh_of_shared_ones() -> None:
     """The arrays of an STL repeat every corner: each edge was a free border, and wheels on flat ground met 18 kN."""
     x, z = (a.ravel() for a in np.meshgrid(np.arange(-2.0, 2.01, 0.25), np.arange(-2.0, 2.01, 0.25)))
@@ -448,7 +540,8 @@ def test_reading_a_map_takes_little_more_than_the_map(ending: str, most: float, 
         profile = {"driver": "GTiff", "height": 2048, "width": 2048, "count": 1, "dtype": "float32"}
         with rasterio.open(path, "w", transform=rasterio.Affine(1, 0, 0, 0, -1, 9), crs="EPSG:32633", **profile) as out:
             out.write(grid, 1)
-    options = {"spacing": (1.0, 1.0), "scale": 1e-3 if ending == "png" else 1.0}
+    options = {"scale": 1e-3 if ending == "png" else 1.0}
+    options |= {} if ending == "tif" else {"spacing": (1.0, 1.0)}
     read_map(path, **options)  # loads the reader's package
     tracemalloc.start()
     heights, *_ = read_map(path, **options)

@@ -52,7 +52,7 @@ def sliding() -> Simulation:
     return sim
 
 
-def on_rocks(stabilisation: str = "none") -> Simulation:
+def on_rocks(stabilisation: str = "none", steps: int = 170) -> Simulation:
     rng = np.random.default_rng(3)
     centres = np.column_stack([rng.uniform(-2, 4, 400), np.zeros(400), rng.uniform(-2, 2, 400)])
     radii = rng.uniform(0.05, 0.25, 400)
@@ -62,7 +62,7 @@ def on_rocks(stabilisation: str = "none") -> Simulation:
     q[1] = 0.55
     sim.set_state(q)
     sim.set_wheel_torques(np.full(6, 10.0))
-    sim.step(150)
+    sim.step(steps)
     return sim
 
 
@@ -141,7 +141,7 @@ def test_dry_friction_in_joints_is_a_contact_that_sticks_or_slips():
 
 
 def test_a_projection_is_differentiated():
-    sim = on_rocks("projection")
+    sim = on_rocks("projection", 142)
     linear = sim.linearise(check=True)
     assert linear.is_projected
     assert linear.holds.sum() >= 40

@@ -10,6 +10,7 @@ from models.robot_files import rover as robot_text
 from models.robot_files import write
 
 from rover_gym import RoverModel
+from rover_gym.models import RobotFileWarning
 
 rover = partial(commands.rover, "model")
 
@@ -87,7 +88,7 @@ def test_a_robot_without_wheels_is_warned_of(tmp_path: Path) -> None:
         (["show", "rover", "--picture", "rover.gif"], "png"),
         (["check", "rover", "--friction", "0"], "friction"),
         (["import", "rover"], "only URDF and MJCF"),
-        (["import", "nothing.urdf", "--wheel", "a=b"], "the radius must be a number"),
+        (["import", "nothing.urdf", "--wheel", "a=b"], "must be NAME=NUMBER"),
         (["import", "nothing.urdf", "--wheel", "a=1", "--wheel", "b"], "all names or all"),
         (["import", "nothing.urdf"], "nothing.urdf"),
         (["import", "nothing.urdf", "--package-path", "nowhere"], "--package-path"),
@@ -117,10 +118,13 @@ def test_a_model_without_wheels_stands_on_nothing(tmp_path: Path) -> None:
 def test_a_refused_import_recommends_options_of_the_command(tmp_path: Path) -> None:
     pytest.importorskip("yourdfpy")
     pytest.importorskip("matplotlib")
-    rough = robot_text().replace("</robot>", '<gazebo><joint name="loop"/></gazebo></robot>')
+    rough = robot_text().replace(
+        "</robot>", '<gazebo><joint name="loop"><parent>a</parent><child>b</child></joint></gazebo></robot>'
+    )
     path, out = write(tmp_path, rough), tmp_path / "out.toml"
     result = rover("import", path, "--output", out)
     assert result.exit_code == 2
     assert '--ignore "closed loops" leaves it out' in result.stderr
-    told = rover("import", path, "--output", out, "--ignore", "closed loops")
+    with pytest.warns(RobotFileWarning, match="stays open"):
+        told = rover("import", path, "--output", out, "--ignore", "closed loops")
     assert told.exit_code == 0, told.output

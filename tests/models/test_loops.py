@@ -5,6 +5,7 @@ import pytest
 from models.robot_files import rover, write
 
 from rover_gym import ModelError, RoverModel, Simulation, StateError
+from rover_gym.models import RobotFileWarning
 
 mujoco = pytest.importorskip("mujoco")
 try:
@@ -253,6 +254,7 @@ def test_every_kind_of_loop_has_derivatives(tmp_path, what):
 @pytest.mark.parametrize("what", EQUALITIES)
 def test_a_loop_is_left_out_by_word(tmp_path, what):
     path = write(tmp_path, linkage(what), "linkage.xml")
-    model = RoverModel.from_mjcf(path, wheels=[], ignore=["closed loops"])
+    with pytest.warns(RobotFileWarning, match="this loop stays open"):
+        model = RoverModel.from_mjcf(path, wheels=[], ignore=["closed loops"])
     assert model.loops == []
     assert any("left out because of `ignore`" in entry for entry in model.import_report.left_out)

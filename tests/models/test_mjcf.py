@@ -14,7 +14,7 @@ CART = """
   <default><joint damping="0.1" armature="0.02"/></default>
   <worldbody>
     <geom type="plane" size="1 1 1"/>
-    <body name="chassis" pos="0 0 1" euler="0 0 90">
+    <body name="chassis" pos="0 0 1" euler="0 0 30">
       <freejoint/>
       <geom type="box" size="0.5 0.3 0.1" mass="10"/>
       <body name="arm" pos="0.2 0 0.1" euler="10 20 30">

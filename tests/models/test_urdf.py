@@ -75,6 +75,7 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     assert any("torque limit" in entry for entry in report.assumed)
     assert any("yields 0.03 mm" in entry for entry in report.assumed)
     given = {"torque_limit": 12.0, "steering_stiffness": 300.0, "steering_damping": 4.0, "steering_limit": 0.3}
+    given |= {"brake_stiffness": 700.0, "brake_damping": 9.0}
     model = RoverModel.from_urdf(path, wheel_stiffness=0.0, **given)
     assert model.to_dict()["wheels"][0]["stiffness"] == 0.0
     soft = RoverModel.from_urdf(path, wheel_stiffness=2e5).to_dict()["wheels"][0]
@@ -85,6 +86,8 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     assert model.steering_limit == 0.3
     fork = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "left_fork")
     assert fork["hold"] == {"stiffness": 300.0, "damping": 4.0}
+    wheel = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "rear_wheel")
+    assert wheel["hold"] == {"stiffness": 700.0, "damping": 9.0}
 
 
 def test_another_forward_axis_turns_the_machine(tmp_path):
@@ -178,13 +181,13 @@ def test_dry_friction_is_read_or_left_out_by_word(tmp_path):
 
 
 def test_what_is_not_simulated_is_listed(tmp_path):
-    extra = '<gazebo reference="chassis"><mu1>0.9</mu1></gazebo><sensor name="eye"/>'
+    extra = '<gazebo reference="chassis"><kp>1e6</kp></gazebo><sensor name="eye"/>'
     model = RoverModel.from_urdf(
         write(tmp_path, changed(rover(extra=extra), "<box size.*?/>", '<mesh filename="hull.dae"/>'))
     )
     listed = "\n".join(model.import_report.left_out)
     for what in (
-        "<gazebo> of <robot>",
+        "<kp>: gazebo[chassis]",
         "<sensor> of <robot>",
         "a shape that touches is the mesh",
         "hull.dae, which cannot be read",
@@ -350,14 +353,17 @@ def test_substitutions_without_a_value_are_refused(tmp_path, value):
     assert raised.value.value == value
 
 
-def test_a_wheel_that_is_fixed_to_a_link_that_turns_is_refused(tmp_path):
+def test_a_wheel_that_is_fixed_to_a_link_that_turns_makes_one_wheel_with_it(tmp_path):
+    """Such files were refused, and a hub with a round shape of its own gave its radius to the wheel."""
     tyre = body("tyre", mass=1.0, shapes=WHEEL) + joint("glue", "fixed", "rear_hub", "tyre")
     text = rover(extra=tyre).replace("rear_wheel", "rear_hub")
     text = changed(text, r'(name="rear_hub".*?)<collision>.*?</collision>', r"\1")
-    with pytest.raises(ModelError, match=r"link\[tyre\]\.joint: this wheel is fixed to rear_hub, which turns"):
-        RoverModel.from_urdf(write(tmp_path, text))
-    told = {"left_wheel": 0.2, "right_wheel": 0.2, "rear_hub": 0.2}
-    assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=told).wheel_names == list(told)
+    model = RoverModel.from_urdf(write(tmp_path, text))
+    assert model.wheel_names == ["left_wheel", "right_wheel", "rear_hub"]
+    assert model.wheel_radii.tolist() == [0.2] * 3
+    assert "tyre" in model.tags(np.zeros(model.nq))
+    told = ["left_wheel", "right_wheel", "tyre"]
+    assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=told) == model
 
 
 def test_a_motor_with_a_leg_is_no_wheel(tmp_path):

@@ -80,6 +80,11 @@ def pole(shapes):
     return text + f'<body name="pole"><joint name="hinge" axis="0 1 0"/>{shapes}</body></body></worldbody></mujoco>'
 
 
+def flat(text):
+    """The cart so low that a hub about its middle reaches the ground."""
+    return text.replace('size="0.3 0.2 0.1"', 'size="0.3 0.2 0.01"')
+
+
 HUB = '<geom type="cylinder" fromto="0 -0.03 0 0 0.03 0" size="0.021" mass="0.1"/>'
 
 
@@ -98,9 +103,9 @@ def test_a_pendulums_pole_and_a_fingers_spinner_are_no_wheels(tmp_path, rest):
     with pytest.warns(RobotFileWarning, match=r"pole reaches 0\.\d+ m from its axis, beyond its round shape"):
         model = RoverModel.from_mjcf(write(tmp_path, pole(HUB + rest), "pole.xml"))
     assert model.wheel_names == []
-    disc = HUB + '<geom type="sphere" pos="0 0 0" size="0.02"/>'
-    assert RoverModel.from_mjcf(write(tmp_path, pole(disc), "disc.xml")).wheel_names == ["pole"]
-    named = pole(HUB + rest).replace('"hinge"', '"pole_wheel"')
+    disc = flat(pole(HUB + '<geom type="sphere" pos="0 0 0" size="0.02"/>'))
+    assert RoverModel.from_mjcf(write(tmp_path, disc, "disc.xml")).wheel_names == ["pole"]
+    named = flat(pole(HUB + rest)).replace('"hinge"', '"pole_wheel"')
     assert RoverModel.from_mjcf(write(tmp_path, named, "named.xml")).wheel_radii.tolist() == [0.021]
 
 

@@ -12,4 +12,5 @@ mod limits;
 mod loops;
 mod machines;
 mod several_trees;
+mod stand;
 mod wrenches;

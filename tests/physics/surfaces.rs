@@ -10,3 +10,5 @@ mod first_touch;
 mod flat;
 mod maps;
 mod meshes;
+mod seams;
+mod supports;

@@ -33,6 +33,8 @@ from rover_gym.cli.options import (
     FilmSize,
     HeightRange,
     ModelName,
+    NoData,
+    OnMap,
     Spacing,
     Start,
     TerrainName,
@@ -45,6 +47,7 @@ from rover_gym.cli.options import (
     named_driver,
     named_ground,
     named_model,
+    place_on,
     warn_of_slope,
 )
 from rover_gym.cli.tape import Tape, Watched
@@ -101,12 +104,14 @@ def drive(
     terrain: TerrainName = None,
     spacing: Spacing = None,
     height_range: HeightRange = None,
+    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     difficulty: Difficulty = None,
     slope: Slope = None,
     uphill: Uphill = None,
     heading: Heading = None,
     start: Start = None,
+    map_coordinates: OnMap = False,
     goal: Goal = None,
     policy: Driver = "pd",
     friction: Friction = 0.7,
@@ -140,9 +145,12 @@ def drive(
     angles = {"slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading}
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
     scene |= _given({"difficulty": difficulty, **angles})
-    options = _given({"position": start, "goal": goal})
     named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
-    rover, ground = named_model(model), named_ground(terrain, spacing, height_range)
+    named |= _given({"nodata": "nan" if nodata is not None and math.isnan(nodata) else nodata})
+    rover, ground = named_model(model), named_ground(terrain, spacing, height_range, nodata)
+    start = place_on(ground, "start", start, map_coordinates=map_coordinates)
+    goal = place_on(ground, "goal", goal, map_coordinates=map_coordinates)
+    options = _given({"position": start, "goal": goal})
     chosen = named_driver(policy, rover)
     as_given = {**scene, **named, **chosen.arguments}
     arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments}

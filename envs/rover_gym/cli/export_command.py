@@ -15,6 +15,8 @@ from rover_gym.cli.options import (
     FRICTION,
     HeightRange,
     ModelName,
+    NoData,
+    OnMap,
     Spacing,
     Start,
     TerrainName,
@@ -23,6 +25,7 @@ from rover_gym.cli.options import (
     named_driver,
     named_ground,
     named_model,
+    place_on,
     warn_of_slope,
 )
 from rover_gym.exports.fmu import fmu_library, write_fmu
@@ -89,6 +92,7 @@ def fmu(
     terrain: TerrainName = None,
     spacing: Spacing = None,
     height_range: HeightRange = None,
+    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
         float | None, typer.Option(help="Difficulty of rocks and hills, from 0 to 2. It implies rocks.")
@@ -96,6 +100,7 @@ def fmu(
     slope: Annotated[float | None, typer.Option(help="Slope of the ground, degrees.")] = None,
     heading: Annotated[float | None, typer.Option(help="Start heading, degrees to the left of x.")] = None,
     start: Start = None,
+    map_coordinates: OnMap = False,
     friction: Annotated[float, typer.Option(help="Friction coefficient.")] = FRICTION,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
     seed: Annotated[int, typer.Option(min=0, help="Seed of ground and start.")] = 0,
@@ -114,8 +119,9 @@ def fmu(
     arguments |= {} if heading is None else {"heading_deg": heading}
     if (rover := named_model(model)) is not None:
         arguments["model"] = rover
-    if (ground := named_ground(terrain, spacing, height_range)) is not None:
+    if (ground := named_ground(terrain, spacing, height_range, nodata)) is not None:
         arguments["terrain"] = ground
+    start = place_on(ground, "start", start, map_coordinates=map_coordinates)
     env = gym.make("Rover-v0", **arguments)
     env.reset(seed=seed, options=None if start is None else {"position": start})
     simulation = env.unwrapped.simulation  # type: ignore[attr-defined]

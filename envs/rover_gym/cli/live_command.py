@@ -15,6 +15,7 @@ from rover_gym.cli.options import (
     FRICTION,
     HeightRange,
     ModelName,
+    NoData,
     OpenIt,
     Spacing,
     TerrainName,
@@ -40,6 +41,7 @@ def live(
     terrain: TerrainName = None,
     spacing: Spacing = None,
     height_range: HeightRange = None,
+    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
         float | None,
@@ -77,7 +79,7 @@ def live(
     choices, scene = LiveChoices(), LiveScene()
     named = chosen_terrain(terrain, difficulty)
     grounds: dict[str, str | Terrain] = dict(choices.grounds)
-    if (ground := named_ground(named, spacing, height_range)) is not None:
+    if (ground := named_ground(named, spacing, height_range, nodata)) is not None:
         named = Path(named).name
         grounds[named] = ground
     models, rover = dict(choices.models), model

@@ -33,6 +33,9 @@ Picture = Annotated[Path | None, typer.Option(dir_okay=False, help="Picture to w
 AS_OPTIONS = (
     (r'ignore=\["([\w ]+)"\]', r'--ignore "\1"'),
     (r"free_base=False", "--fixed-base"),
+    (r'forward="(-?\w)"', r"--forward \1"),
+    (r"wheels=\{name: radius\}", "--wheel NAME=RADIUS"),
+    (r"wheels=\[\.\.\.\]", "--wheel NAME"),
     (r"steering=\[\]", "--steering none"),
     (r"steering=\['([^']+)', \.\.\.\]", r"--steering \1"),
     (r"wheels=\{'([^']+)': radius\}", r"--wheel \1=RADIUS"),
@@ -65,6 +68,9 @@ def import_model(
             help="Stiffness of every wheel where it touches, N/m; 0 for rigid wheels. By default it yields 0.03 mm."
         ),
     ] = None,
+    mass: Annotated[
+        list[str] | None, typer.Option(help="A link's mass, NAME=KG, for files that only draw; repeat for each.")
+    ] = None,
     ignore: Annotated[
         list[str] | None, typer.Option(help="What to leave out although it changes the motion, such as friction.")
     ] = None,
@@ -85,6 +91,8 @@ def import_model(
     options: dict[str, object] = {"forward": forward, "ignore": ignore or ()}
     options |= {"torque_limit": torque_limit, "wheel_width": wheel_width, "wheel_stiffness": wheel_stiffness}
     options |= {"wheels": _radii(wheel), "steering": _pairs(steering)}
+    if mass:
+        options["masses"] = _numbers(_pairs(mass, "mass"), "mass")
     if package_path:
         options["package_paths"] = package_path
     if fixed_base:
@@ -157,8 +165,8 @@ def check(
         results.show(table)
         if statics.undetermined_loads:
             results.show(
-                "these loads are one answer of many, and micrometres decide which: more rigid wheels than the chassis "
-                "needs; give them a stiffness"
+                "these loads are those of equal springs, one answer of many, and micrometres change them: more rigid "
+                "wheels than the chassis needs; give them a stiffness"
             )
         for line in _statics(statics):
             results.show(line)
@@ -209,15 +217,20 @@ def _say_solids(results: Results, found: RoverModel) -> None:
 
 def _radii(given: list[str] | None) -> list[str] | dict[str, float] | None:
     pairs = _pairs(given, "wheel")
+    return _numbers(pairs, "wheel") if isinstance(pairs, dict) else pairs
+
+
+def _numbers(pairs: list[str] | dict[str, str] | None, option: str) -> dict[str, float]:
+    """Numbers by name, of an option that is given as NAME=NUMBER."""
     if not isinstance(pairs, dict):
-        return pairs
-    radii = {}
-    for name, radius in pairs.items():
+        refuse(OptionError, option, pairs, "must be NAME=NUMBER")
+    found = {}
+    for name, text in pairs.items():
         try:
-            radii[name] = float(radius)
+            found[name] = float(text)
         except ValueError:
-            refuse(OptionError, "wheel", f"{name}={radius}", "the radius must be a number")
-    return radii
+            refuse(OptionError, option, f"{name}={text}", "must be NAME=NUMBER")
+    return found
 
 
 def _pairs(given: list[str] | None, option: str = "steering") -> list[str] | dict[str, str] | None:

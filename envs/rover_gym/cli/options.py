@@ -12,6 +12,7 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from rover_gym.env.arguments import ARGUMENTS, TERRAINS, terrain_name
+from rover_gym.env.episode_scene import map_place
 from rover_gym.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
 from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
@@ -121,6 +122,14 @@ HeightRange = Annotated[
     tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Heights of black and white in a PNG, m.")
 ]
 
+NoData = Annotated[
+    float | None, typer.Option("--nodata", help="Number that means missing data in a map; nan if none does.")
+]
+
+OnMap = Annotated[
+    bool, typer.Option("--map-coordinates", help="Start and goal are easting and northing of the GeoTIFF.")
+]
+
 Start = Annotated[tuple[float, float] | None, typer.Option(metavar="X Z", help="Start on the map, m. Default: 0 0.")]
 
 OpenIt = Annotated[
@@ -175,7 +184,10 @@ def named_model(name: str) -> RoverModel | None:
 
 
 def named_ground(
-    terrain: str, spacing: float | None, height_range: tuple[float, float] | None
+    terrain: str,
+    spacing: float | None,
+    height_range: tuple[float, float] | None,
+    nodata: float | None = None,
 ) -> HeightField | TriangleMesh | None:
     """The map or mesh of an option `--terrain`; None if it does not name a file.
 
@@ -184,12 +196,23 @@ def named_ground(
         TerrainError: The file is damaged or does not say enough.
         OSError: It cannot be read.
     """
-    given: dict[str, Any] = {"spacing": spacing, "height_range": height_range}
+    given: dict[str, Any] = {"spacing": spacing, "height_range": height_range, "nodata": nodata}
     given = {name: value for name, value in given.items() if value is not None}
     if not terrain.lower().endswith(MAP_ENDINGS):
         for name, value in given.items():
             refuse(OptionError, name, value, "needs a map's file as terrain")
     return open_terrain(terrain, **given) if is_terrain_file(terrain) else None
+
+
+def place_on(
+    ground: object, option: str, place: tuple[float, float] | None, *, map_coordinates: bool
+) -> tuple[float, float] | None:
+    """A place of an option as (x, z), m; with `map_coordinates` it was given as easting and northing.
+
+    Raises:
+        OptionError: The ground has no map coordinates.
+    """
+    return map_place(ground, option, place) if map_coordinates and place is not None else place
 
 
 DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on policies."

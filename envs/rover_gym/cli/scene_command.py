@@ -16,11 +16,14 @@ from rover_gym.cli.options import (
     BUILT_IN,
     HeightRange,
     ModelName,
+    NoData,
+    OnMap,
     Spacing,
     Start,
     complete_terrain,
     named_ground,
     named_model,
+    place_on,
     warn_of_slope,
 )
 from rover_gym.economy.economies import Economy, measure_economies
@@ -50,8 +53,10 @@ def scene(
     ] = "plane",
     spacing: Spacing = None,
     height_range: HeightRange = None,
+    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     start: Start = None,
+    map_coordinates: OnMap = False,
     slope: Annotated[float, typer.Option(help="Slope of the plane or rocks, degrees, rising along x.")] = 0.0,
     heading: Annotated[float, typer.Option(help="Start heading, degrees to the left of x.")] = 0.0,
     straight: Annotated[
@@ -80,7 +85,8 @@ def scene(
     """
     number("torque", torque)
     rover = named_model(model) or RoverModel()
-    ground: Terrain | None = named_ground(terrain, spacing, height_range)
+    ground: Terrain | None = named_ground(terrain, spacing, height_range, nodata)
+    start = place_on(ground, "start", start, map_coordinates=map_coordinates)
     if slope and (ground is not None or terrain == "rug"):
         refuse(OptionError, "slope", slope, "cannot be chosen: the ground defines its slope")
     if ground is None:

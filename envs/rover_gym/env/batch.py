@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple, Unpack
 
 import gymnasium as gym
 import numpy as np
+import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments
@@ -38,6 +39,7 @@ from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.reward_terms import earn, total
 from rover_gym.env.task import Task, check_actions, make_task
 from rover_gym.mechanics import (
+    CommandError,
     DrawnEpisodes,
     EpisodeBatch,
     EpisodeRun,
@@ -152,6 +154,8 @@ class RoverBatch:
         self.episodes = self.make_episodes()
         #: What the functions of `reward_terms` gave in the last control period of each rover.
         self._terms: dict[str, Array] = {name: np.zeros(self.n) for name in self.task.reward_terms}
+        #: Entries of the last action of each rover that were clipped to [-1, 1].
+        self._clipped = np.zeros(self.n, np.int64)
         #: Generators of the rovers before their first episodes; afterwards the core has them.
         self._generators: Rows = np.zeros((self.n, 4), np.uint64)
         #: Generators that were handed out; they hold their rovers' states.
@@ -255,6 +259,7 @@ class RoverBatch:
         chosen, episodes = drawn.chosen, drawn.episodes
         self.begin_drawn(chosen, episodes)
         self._begun[chosen] = True
+        self._clipped[chosen] = 0
         for term in self._terms.values():
             term[chosen] = 0.0
         for i, seed in zip(chosen, drawn.seeds, strict=True):
@@ -269,7 +274,7 @@ class RoverBatch:
         """Applies actions `(n, n_actions)` for one control period.
 
         Args:
-            actions: Within [-1, 1].
+            actions: Finite; they are clipped to [-1, 1], and `info["clipped_actions"]` counts the entries that were.
             active: `(n,)` mask of the rovers to move; the others keep the values of their last period. None for all.
             has_scan: Whether the height scan is taken. Without, only observations of episodes that end here have new
                 heights; the others keep the last ones.
@@ -279,15 +284,25 @@ class RoverBatch:
             have reached the time limit, and the indices of those that are over, one way or the other.
 
         Raises:
-            CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
-                has changed.
+            CommandError: The actions have a wrong shape or an entry that is not finite; nothing has changed.
             OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: A rover has not been reset.
         """
         self._check_begun(actions)
         before = self.episodes.observations() if self._terms else None
         with self._lending(self._lent if self.task.is_noisy else ()):
-            stepped = self.episodes.step(actions, active, has_scan=has_scan, among=self.movers)
+            # The core refuses what is outside [-1, 1] before anything moves: actions within pay for no check here.
+            beyond: npt.NDArray[np.int64] | None = None
+            try:
+                stepped = self.episodes.step(actions, active, has_scan=has_scan, among=self.movers)
+            except CommandError:
+                given = check_actions(actions, (self.n, self.task.n_actions))
+                beyond, actions = (np.abs(given) > 1.0).sum(axis=1), np.clip(given, -1.0, 1.0)
+                if not beyond.any():
+                    raise
+                stepped = self.episodes.step(actions, active, has_scan=has_scan, among=self.movers)
+        moved = slice(None) if active is None else np.asarray(active)
+        self._clipped[moved] = 0 if beyond is None else beyond[moved]
         if before is not None:
             self._earn(before, actions, stepped, np.ones(self.n, np.bool_) if active is None else np.asarray(active))
         return stepped
@@ -365,6 +380,7 @@ class RoverBatch:
         """The info of rover i's last period or reset, as `RoverEnv` returns it."""
         info = self.episodes.info(i)
         info["reward_terms"] |= {name: float(term[i]) for name, term in self._terms.items()}
+        info["clipped_actions"] = int(self._clipped[i])
         return info
 
     def infos(self) -> dict[str, Any]:
@@ -372,6 +388,7 @@ class RoverBatch:
         infos = self.episodes.infos()
         for name, term in self._terms.items():
             infos["reward_terms"] |= {name: term.copy(), f"_{name}": np.ones(self.n, np.bool_)}
+        infos |= {"clipped_actions": self._clipped.copy(), "_clipped_actions": np.ones(self.n, np.bool_)}
         return infos
 
     def snapshot(self) -> BatchSnapshot:

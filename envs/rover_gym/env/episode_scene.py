@@ -16,7 +16,15 @@ from rover_gym.env.observation import Array
 from rover_gym.env.start import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Domain, Rocks, Start
 from rover_gym.env.task import Task
 from rover_gym.ground import plane_of
-from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, OptionError, Plane, StateError, Terrain
+from rover_gym.mechanics import (
+    DrawnEpisodes,
+    EpisodeBatch,
+    HeightField,
+    OptionError,
+    Plane,
+    StateError,
+    Terrain,
+)
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
 
 RESET_OPTIONS = (
@@ -28,6 +36,8 @@ RESET_OPTIONS = (
     "heading_deg",
     "goal",
     "goals",
+    "map_position",
+    "map_goal",
     "q",
     "v",
 )
@@ -102,6 +112,7 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
     """Checks the options of `reset(options=...)`; `field` is their name in errors."""
     given = mapping(field, options)
     known_keys(field, given, RESET_OPTIONS)
+    given = _from_map(task, given, field)
     fixed: dict[str, Any] = {}
     if "difficulty" in given:
         difficulty = fixed["difficulty"] = number(
@@ -150,6 +161,33 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
                 reason = f"must be within {MAX_GOAL_DISTANCE:g} m of the start"
                 refuse(OptionError, f"{field}.{name}", given[name], reason)
     return ResetOptions(fixed)
+
+
+def _from_map(task: Task, given: Mapping[str, Any], field: str) -> dict[str, Any]:
+    """Reset options with places in map coordinates converted to places (x, z), m."""
+    converted = dict(given)
+    for name in ("position", "goal"):
+        if f"map_{name}" not in given:
+            continue
+        if name in given:
+            refuse(OptionError, f"{field}.{name}", given[name], f"must not be given together with map_{name}")
+        easting, northing = vector(f"{field}.map_{name}", converted.pop(f"map_{name}"), 2)
+        converted[name] = map_place(task.ground, f"{field}.map_{name}", (easting, northing))
+    return converted
+
+
+def map_place(ground: object, field: str, place: tuple[float, float]) -> tuple[float, float]:
+    """Place (x, z), m, of easting and northing on a ground that was read from a GeoTIFF.
+
+    Raises:
+        OptionError: The ground has no map coordinates.
+    """
+    parts = ground if isinstance(ground, (list, tuple)) else (ground,)
+    maps = [part for part in parts if isinstance(part, HeightField) and part.map_frame is not None]
+    if not maps:
+        reason = "needs a ground with map coordinates: HeightField.from_file of a GeoTIFF"
+        refuse(OptionError, field, list(place), reason)
+    return maps[0].place_of(*place)
 
 
 def _place(field: str, value: object) -> tuple[float, ...]:

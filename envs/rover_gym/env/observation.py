@@ -132,4 +132,5 @@ def info_table() -> list[tuple[str, ...]]:
     return [
         ("key", "unit", "meaning"),
         *((f"`{name}`", unit, meaning) for name, unit, meaning in EpisodeRules.info_rows()),
+        ("`clipped_actions`", "-", "entries of the last action that were clipped to [-1, 1]; 0 after a reset"),
     ]

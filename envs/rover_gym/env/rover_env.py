@@ -37,8 +37,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Action
 
-    `Box(-1, 1, (12,), float32)`. An action that is outside the box or not finite is refused with
-    `CommandError`, and nothing changes.
+    `Box(-1, 1, (12,), float32)`. A finite action is clipped to the box, as MuJoCo's environments do, and
+    `info["clipped_actions"]` counts the entries that were. One that is not finite is refused with `CommandError`, and
+    nothing changes.
 
     | index | meaning                                             | range   | one stands for      | unit |
     |-------|-----------------------------------------------------|---------|---------------------|------|
@@ -143,7 +144,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     `reset` raises `TerrainError`. A refused reset, whatever the reason, changes nothing.
 
     `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
-    `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
+    `heading_deg`, `goal` (x, z), these two in map coordinates as `map_position` and `map_goal` (easting, northing) on a
+    GeoTIFF's ground, or the whole state as `q` (21,) with `v` (21,), as
     `Simulation.set_state` takes them; the `goals` of a course, one (x, z) a waypoint; and `field_seed`, a whole number from
     0, by which the rocks are drawn and the piece of hills is cut: with equal starts and goals, equal fields. Unknown names
     are refused with `OptionError`.
@@ -421,8 +423,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """Applies an action for one control period.
 
         Raises:
-            CommandError: The action has a wrong shape or an entry that is not finite or outside
-                [-1, 1]; nothing has changed.
+            CommandError: The action has a wrong shape or an entry that is not finite; nothing has
+                changed. Finite entries outside [-1, 1] are clipped.
             OptionError: A function of `reward_terms` fails; the period has been taken.
             ResetNeeded: The environment has not been reset.
         """

@@ -303,15 +303,13 @@ def _steering_limit(rover: RoverModel, steering: Steering, asked_deg: float | No
 
 
 def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """Checks actions `(n_actions,)` or `(n, n_actions)` within [-1, 1] and returns a float64 copy."""
+    """Checks that actions `(n_actions,)` or `(n, n_actions)` are finite and returns a float64 copy."""
     commands = array("action", actions, error=CommandError)
     if commands.shape != shape:
         refuse(CommandError, "action", commands.shape, f"must have shape {shape}")
-    # `not ... <=` refuses NaN too.
-    if not np.abs(commands).max() <= 1.0:
-        for index, entry in np.ndenumerate(commands):
-            if not abs(entry) <= 1.0:
-                refuse(CommandError, f"action[{', '.join(map(str, index))}]", entry, "must be within [-1, 1]")
+    if not np.isfinite(commands).all():
+        index = tuple(int(k) for k in np.argwhere(~np.isfinite(commands))[0])
+        refuse(CommandError, f"action[{', '.join(map(str, index))}]", commands[index], "must be finite")
     return commands
 
 

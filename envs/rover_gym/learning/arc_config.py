@@ -16,7 +16,7 @@ import yaml
 from rover_gym.env.arguments import ARGUMENTS
 from rover_gym.learning.configuration import build, plain
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import known_keys, mapping, number, refuse
+from rover_gym.validation import known_keys, mapping, number, refuse, regular_file
 
 #: Teachers: the planner alone, or with a learned forecast.
 TEACHERS = ("scan", "foresight")
@@ -202,9 +202,10 @@ def read_arc_config(path: str | Path) -> ArcConfig:
 
     Raises:
         OptionError: A key is unknown or missing, or a value is of the wrong kind or out of range; `field` names it.
+            Or `path` is not that of a regular file.
     """
     try:
-        given = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        given = yaml.safe_load(regular_file(path, error=OptionError).read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         refuse(OptionError, "config", str(path), f"is not YAML: {error}")
     return build(ArcConfig, given, "")

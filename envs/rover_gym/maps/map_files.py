@@ -11,7 +11,7 @@ import os
 import struct
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from rover_gym.extras import require
 from rover_gym.mechanics import HeightField, TerrainError, TriangleMesh
-from rover_gym.validation import number, refuse
+from rover_gym.validation import number, refuse, regular_file
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,10 @@ class GroundFile:
         """The file at a path.
 
         Raises:
-            TerrainError: `path` is not a path.
+            TerrainError: `path` is not that of a regular file.
             OSError: There is no file, or it may not be read.
         """
-        try:
-            place = Path(path)  # type: ignore[arg-type]
-        except TypeError:
-            refuse(TerrainError, "path", path, "must be a path")
+        place = regular_file(path, error=TerrainError)
         with place.open("rb") as file:
             return cls(place, file.seek(0, 2))
 
@@ -64,6 +61,8 @@ Heights: TypeAlias = npt.NDArray[np.float32]
 
 Pair: TypeAlias = tuple[float, float]
 
+Frame: TypeAlias = tuple[float, float, float, float]
+
 #: Endings of the formats.
 MAP_ENDINGS = (".tif", ".tiff", ".png", ".npy")
 
@@ -78,6 +77,9 @@ CACHE = 16
 
 #: Numbers of a GeoTIFF beyond this mean missing data, for files that mark it by an undeclared extreme number.
 NUMBERS_END = 1e30
+
+#: Numbers from here downwards may mark missing data that a file does not declare: -999, -9999, -32768 are used.
+MARKER = -999.0
 
 #: Range of the distance of columns and rows, m.
 SPACINGS = (1e-4, 1e6)
@@ -110,6 +112,7 @@ class _Numbers:
         factor: As above.
         offset: As above.
         end: Larger heights mean missing data.
+        nodata: A number that means missing data, or NaN.
     """
 
     values: npt.NDArray[Any]
@@ -117,6 +120,7 @@ class _Numbers:
     factor: float = 1.0
     offset: float = 0.0
     end: float = np.inf
+    nodata: float = np.nan
 
     def chunks(self) -> Iterator[slice]:
         """Rows, some at a time."""
@@ -129,8 +133,39 @@ class _Numbers:
         meaning = self.values[rows].astype(np.float64) * self.factor + self.offset
         if self.missing is not None:
             meaning[self.missing[rows]] = np.nan
+        if not np.isnan(self.nodata):
+            # In the type of the file: 1e-3 in single precision is not 1e-3.
+            meaning[self.values[rows] == np.float64(self.nodata).astype(self.values.dtype)] = np.nan
         meaning[np.abs(meaning) > self.end] = np.nan
         return meaning
+
+    def check_lone_minimum(self, file: GroundFile) -> None:
+        """Rejects a lowest number that looks like a marker of missing data.
+
+        Such a number is whole and at most `MARKER`, and farther below all others than these differ.
+
+        Raises:
+            TerrainError: There is one; the message gives its first cell.
+        """
+        plain = replace(self, factor=1.0, offset=0.0)
+        lowest = plain.lowest()
+        if not (lowest <= MARKER and lowest == round(lowest)):
+            return
+        next_low, high = np.inf, -np.inf
+        cell = None
+        for rows in self.chunks():
+            numbers = plain.at(rows)
+            is_lowest = numbers == lowest
+            if cell is None and is_lowest.any():
+                row, column = (int(k) for k in np.argwhere(is_lowest)[0])
+                cell = rows.start + row, column
+            others = numbers[~is_lowest & ~np.isnan(numbers)]
+            if others.size:
+                next_low, high = min(next_low, float(others.min())), max(high, float(others.max()))
+        if next_low - lowest > high - next_low:
+            where = f"height {list(cell or ())} is {lowest:g}, far below all others, {next_low:g} to {high:g}"
+            choice = f"give nodata={lowest:g} if it means missing data, nodata=nan if it is a height"
+            file.refuse(f"{where}: {choice}", lowest)
 
     def lowest(self) -> float:
         """The lowest height; NaN if all data are missing."""
@@ -172,17 +207,21 @@ def read_map(
     scale: object = None,
     datum: object = None,
     band: object = None,
-) -> tuple[Heights, Pair, Pair]:
+    nodata: object = None,
+) -> tuple[Heights, Pair, Pair, Frame | None]:
     """Reads a map with the arguments of `HeightField.from_file`.
 
     Returns:
-        Heights `(n_z, n_x) float32` (m, NaN where unknown), spacing and origin (m).
+        Heights `(n_z, n_x) float32` (m, NaN where unknown), spacing and origin (m), and the `map_frame` of a GeoTIFF.
 
     Raises:
         TerrainError: The file is not a map, or a required argument is missing.
         OSError: The file cannot be read.
         MissingExtraError: The extra `maps` is not installed.
     """
+    if nodata is not None and not (isinstance(nodata, (float, np.floating)) and np.isnan(nodata)):
+        nodata = number("nodata", nodata, error=TerrainError)
+    marker = None if nodata is None else float(nodata)
     factor, zero = (
         None if value is None else number(name, value, error=TerrainError)
         for name, value in (("scale", scale), ("datum", datum))
@@ -194,11 +233,11 @@ def read_map(
         file.refuse(f"a map's file ends in {', '.join(MAP_ENDINGS)}")
     _check_suited(file, height_range=height_range, scale=scale, datum=datum, band=band)
     if file.ending == ".npy":
-        heights, own = _read_npy(file, factor, zero), None
+        heights, own, corner = _read_npy(file, factor, zero, marker), None, None
     elif file.ending == ".png":
-        heights, own = _read_png(file, height_range, factor, zero), None
+        heights, own, corner = _read_png(file, height_range, factor, zero, marker), None, None
     else:
-        heights, own = _read_geotiff(file, band, factor, zero, knows_spacing=spacing is not None)
+        heights, own, corner = _read_geotiff(file, band, factor, zero, marker, given=spacing)
     step = spacing or own
     if step is None:
         refuse(TerrainError, "spacing", spacing, f"must be given: {file.path} does not contain it")
@@ -207,7 +246,12 @@ def read_map(
     if origin is None:
         rows, columns = heights.shape
         origin = (-0.5 * step[0] * (columns - 1), -0.5 * step[1] * (rows - 1))
-    return heights, step, origin
+    frame = None
+    if corner is not None:
+        first, per_cell = corner
+        per_x, per_z = per_cell[0] / step[0], per_cell[1] / step[1]
+        frame = (first[0] - per_x * origin[0], first[1] - per_z * origin[1], per_x, per_z)
+    return heights, step, origin, frame
 
 
 def _check_suited(file: GroundFile, *, height_range: object, scale: object, datum: object, band: object) -> None:
@@ -238,7 +282,15 @@ def _guarded(file: GroundFile, read: Callable[[], Any], *wrong: type[Exception])
         file.refuse(f"is damaged or not a {file.ending} file ({why})")
 
 
-def _read_npy(file: GroundFile, scale: float | None, datum: float | None) -> Heights:
+def _marked(file: GroundFile, numbers: _Numbers, nodata: float | None) -> _Numbers:
+    """The numbers with those missing that the user marks; without a mark they are checked for one."""
+    if nodata is None:
+        numbers.check_lone_minimum(file)
+        return numbers
+    return replace(numbers, nodata=nodata)
+
+
+def _read_npy(file: GroundFile, scale: float | None, datum: float | None, nodata: float | None) -> Heights:
     def read() -> Any:
         return np.load(file.path, mmap_mode="r", allow_pickle=False)
 
@@ -246,10 +298,12 @@ def _read_npy(file: GroundFile, scale: float | None, datum: float | None) -> Hei
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         file.refuse("must hold an array of numbers")
     _check_shape(file, values.shape)
-    return _heights(file, _Numbers(values), 1.0 if scale is None else scale, datum or 0.0)
+    return _heights(file, _marked(file, _Numbers(values), nodata), 1.0 if scale is None else scale, datum or 0.0)
 
 
-def _read_png(file: GroundFile, height_range: object, scale: float | None, datum: float | None) -> Heights:
+def _read_png(
+    file: GroundFile, height_range: object, scale: float | None, datum: float | None, nodata: float | None
+) -> Heights:
     image = require("PIL.Image", "maps")
     low, high = (0.0, 0.0) if scale is not None else _range(file, height_range)
 
@@ -263,8 +317,8 @@ def _read_png(file: GroundFile, height_range: object, scale: float | None, datum
     wrong = (OSError, ValueError, SyntaxError, EOFError, image.DecompressionBombError, MemoryError, OverflowError)
     values, white = _guarded(file, read, *wrong)
     if scale is not None:
-        return _heights(file, _Numbers(values), scale, datum or 0.0)
-    return _heights(file, _Numbers(values, factor=(high - low) / white, offset=low))
+        return _heights(file, _marked(file, _Numbers(values), nodata), scale, datum or 0.0)
+    return _heights(file, _marked(file, _Numbers(values, factor=(high - low) / white, offset=low), nodata))
 
 
 def _range(file: GroundFile, height_range: object) -> Pair:
@@ -279,9 +333,18 @@ def _range(file: GroundFile, height_range: object) -> Pair:
 
 
 def _read_geotiff(
-    file: GroundFile, band: object, scale: float | None, datum: float | None, *, knows_spacing: bool
-) -> tuple[Heights, Pair | None]:
-    """Heights, and the spacing of the file unless the caller gives one."""
+    file: GroundFile,
+    band: object,
+    scale: float | None,
+    datum: float | None,
+    nodata: float | None,
+    *,
+    given: Pair | None,
+) -> tuple[Heights, Pair | None, tuple[Pair, Pair] | None]:
+    """Heights, the spacing of the file unless the caller gives one, and its map coordinates.
+
+    The coordinates are those of the first height, and their change from a column and a row to the next.
+    """
     rasterio = require("rasterio", "maps")
     index = None if band is None else number("band", band, at_least=1, error=TerrainError)
 
@@ -299,12 +362,32 @@ def _read_geotiff(
     numbers, unit, transform, crs = _guarded(file, read, *wrong)
     if unit and unit.lower() not in UNITS and scale is None:
         file.refuse(f"the unit of its heights, {unit!r}, is unknown: give scale", unit)
+    metres = UNITS.get((unit or "m").lower(), 1.0) if scale is None else scale
+    if given is not None and _states_metres(transform, crs):
+        own = _spacing(file, transform, crs) or given
+        reason = f"{file.path} states it, {own[0]:.6g} m by {own[1]:.6g} m: leave it out"
+        refuse(TerrainError, "spacing", list(given), reason)
+    step = None if given is not None else _spacing(file, transform, crs)
+    numbers = _marked(file, numbers, nodata)
     lowest = numbers.lowest()
     if np.isnan(lowest):
         file.refuse("has no data at all")
-    metres = UNITS.get((unit or "m").lower(), 1.0) if scale is None else scale
     heights = _heights(file, numbers, metres, lowest if datum is None else datum)
-    return heights, None if knows_spacing else _spacing(file, transform, crs)
+    return heights, step, _corner(transform)
+
+
+def _states_metres(transform: Any, crs: Any) -> bool:
+    """Whether a GeoTIFF states the distance of its columns and rows as lengths."""
+    is_plain = not transform.is_identity and transform.b == 0.0 and transform.d == 0.0
+    return bool(is_plain and (crs is None or not crs.is_geographic))
+
+
+def _corner(transform: Any) -> tuple[Pair, Pair] | None:
+    """Map coordinates of the middle of the first cell, and their change by column and row; None if there are none."""
+    if transform.is_identity or transform.b != 0.0 or transform.d != 0.0 or transform.a * transform.e == 0.0:
+        return None
+    a, e = float(transform.a), float(transform.e)
+    return (float(transform.c) + 0.5 * a, float(transform.f) + 0.5 * e), (a, e)
 
 
 def _index(file: GroundFile, count: int, band: float | None) -> int:

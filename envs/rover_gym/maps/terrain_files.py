@@ -59,22 +59,25 @@ def height_field_from_file(
     scale: float | None = None,
     datum: float | None = None,
     band: int | None = None,
+    nodata: float | None = None,
     material: str = "ground",
 ) -> HeightField:
     """Reads a map from a GeoTIFF, a PNG or a .npy file.
 
     Columns run along x and rows along z; of a map with north up, x is east and z south. A GeoTIFF contains its spacing,
-    its unit and its marker for missing data.
+    its unit, its marker for missing data and its place: `HeightField.place_of` converts map coordinates.
 
     Args:
         path: Path of the file; its ending determines the format.
-        spacing: Distance of columns and of rows, m; needed unless the file gives it.
+        spacing: Distance of columns and of rows, m; needed where the file does not give it, and refused where it does.
         origin: Place (x, z) of the first height, m; by default the middle of the map is at the world's origin.
         height_range: Of a PNG: heights of black and white, (2,), m.
         scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
         datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
             its lowest, otherwise 0.
         band: Band of a GeoTIFF, from 1; needed if the file has several.
+        nodata: The number of the file that means missing data, besides the one that a GeoTIFF declares. NaN if no
+            number does. By default a lowest number that looks like such a marker is refused.
         material: Name of its material.
 
     Raises:
@@ -90,8 +93,10 @@ def height_field_from_file(
         scale=scale,
         datum=datum,
         band=band,
+        nodata=nodata,
     )
-    return HeightField(*read, material)
+    heights, step, place, frame = read
+    return HeightField(heights, step, place, material, frame)
 
 
 def triangle_mesh_from_file(

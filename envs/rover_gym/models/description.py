@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rover_gym.models.drawings import Drawer
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.loop_description import describe_loops
 from rover_gym.models.meshes import MeshOptions, hulls_of
@@ -22,6 +23,12 @@ TORQUE_SHARE = 1.0
 #: the weight times its radius, 1/rad, and damping relative to stiffness, s.
 STEERING_STIFFNESS, STEERING_TIME = 10.0, 0.0133
 STEERING_LIMIT = 0.7  # rad, where the file states none
+#: Gains with which a wheel is braked if the file has none, as for the rovers of the gallery: stiffness relative to the
+#: wheel's share of the weight times its radius, 1/rad, and damping relative to stiffness, s.
+BRAKE_STIFFNESS, BRAKE_TIME = 100.0, 0.02
+#: Largest friction that is read, and least share of it along a wheel. A wheel at 10 holds on slopes of 84 degrees, and
+#: files write 1e5 for "does not slip".
+MOST_FRICTION, LEAST_SHARE = 10.0, 0.01
 #: Compression of a wheel under its share of the weight, m, and damping relative to stiffness, s: critical for that
 #: share.
 YIELD = 3e-5
@@ -40,6 +47,8 @@ class WheelOptions:
         steering_stiffness: N m/rad.
         steering_damping: N m s/rad.
         steering_limit: rad.
+        brake_stiffness: With which a wheel is braked, N m/rad.
+        brake_damping: N m s/rad.
         wheel_width: Of a wheel, m.
         wheel_stiffness: Contact stiffness of a wheel, N/m; 0: rigid.
     """
@@ -48,6 +57,8 @@ class WheelOptions:
     steering_stiffness: float | None = None
     steering_damping: float | None = None
     steering_limit: float | None = None
+    brake_stiffness: float | None = None
+    brake_damping: float | None = None
     wheel_width: float | None = None
     wheel_stiffness: float | None = None
 
@@ -79,19 +90,28 @@ def describe(
     weight = sum(link.mass for link in tree.links.values()) * GRAVITY / max(len(roles), 1)
     steering = {role.steering: role for role in roles if role.steering is not None}
     solids, tags = [], []
+    materials, drawer = Materials(tree), Drawer(tree)
     for link in _followed_first(tree):
+        A, anchor, role = axes[link.name], anchors[link.name], wheels.get(link.name)
         solids.append(_solid(tree, link, anchors, axes, P))
-        shapes = _shapes(tree, link, axes[link.name], anchors[link.name], wheels.get(link.name), meshes)
+        drawings = drawer.drawings(link, A, anchor, is_drawn=role is None or role.is_drawn)
+        shapes = _shapes(tree, link, A, anchor, role, meshes, materials, has_drawings=bool(drawings))
         if shapes:
             solids[-1]["shapes"] = shapes
-        _add_control(tree, link, solids[-1], steering.get(link.name), weight, options, is_wheel=link.name in wheels)
-        for name, point in link.points:
-            place = _numbers(axes[link.name] @ (point - anchors[link.name]))
-            tags.append({"name": name, "solid": link.name, "position": place})
+        if drawings:
+            solids[-1]["drawings"] = drawings
+        _add_control(tree, link, solids[-1], steering.get(link.name), role, weight, options)
+        for name, point, turn in link.points:
+            tag = {"name": name, "solid": link.name, "position": _numbers(A @ (point - anchor))}
+            # Its axes are x forward, y up and z right where the file's are x forward, y left and z up.
+            rotation = rotation_vector(A @ turn @ Z_UP_TO_Y_UP.T)
+            tags.append(tag | ({"rotation": _numbers(rotation)} if np.linalg.norm(rotation) > 1e-15 else {}))
     description: dict[str, Any] = {"name": tree.name, "solids": solids}
-    description["wheels"] = [_wheel(tree, role, axes[role.link], weight, options) for role in roles]
+    description["wheels"] = [_wheel(tree, role, axes[role.link], weight, options, materials) for role in roles]
     if tags:
         description["tags"] = tags
+    if materials.entries:
+        description["materials"] = materials.entries
     if loops := describe_loops(tree, anchors, axes, P):
         description["loops"] = loops
     return description
@@ -143,10 +163,9 @@ def _add_control(
     link: FileLink,
     solid: dict[str, Any],
     steered: WheelRole | None,
+    wheel: WheelRole | None,
     weight: float,
     options: WheelOptions,
-    *,
-    is_wheel: bool,
 ) -> None:
     joint = link.joint
     if joint.kind not in ("revolute", "prismatic") or joint.follows is not None:
@@ -157,15 +176,44 @@ def _add_control(
         stiffness, damping = _steering_gains(tree, link, steered, weight, options)
         solid["hold"] = {"stiffness": stiffness, "damping": damping}
         return
-    if joint.hold is not None:
+    if wheel is not None and not wheel.is_caster:
+        stiffness, damping = _brake_gains(tree, link, wheel, weight, options)
+        solid["hold"] = {"stiffness": stiffness, "damping": damping}
+    elif joint.hold is not None:
         solid["hold"] = {"stiffness": float(joint.hold[0]), "damping": float(joint.hold[1])}
-    if joint.is_driven and not is_wheel:
+    if joint.is_driven and wheel is None:
         if joint.kind == "prismatic":
             tree.left_out.append(f"joint[{joint.name}]: its motor, since only revolute joints have drives")
+        elif joint.torque_limit == 0.0:
+            warn_of_no_torque(tree, joint)
         else:
-            solid["drive"] = {"torque_limit": float(joint.torque_limit or UNLIMITED)}
-            if not joint.torque_limit:
+            limit = UNLIMITED if joint.torque_limit is None else joint.torque_limit
+            solid["drive"] = {"torque_limit": float(limit)}
+            if joint.torque_limit is None:
                 tree.assumed.append(f"joint {joint.name}: torque limit {UNLIMITED:g} N m, since the file states none")
+
+
+def warn_of_no_torque(tree: RobotTree, joint: FileJoint) -> None:
+    """Lists and warns of a motor whose largest torque is 0."""
+    tree.left_out.append(f"joint[{joint.name}]: its motor, whose largest torque the file states as 0")
+    reason = "the file states a largest torque of 0 (effort), so its motor does nothing"
+    tree.warnings.append(f"{tree.path}: joint[{joint.name}]: {reason}; for wheels, torque_limit= gives another")
+
+
+def _brake_gains(
+    tree: RobotTree, link: FileLink, wheel: WheelRole, weight: float, options: WheelOptions
+) -> tuple[float, float]:
+    """Stiffness, N m/rad, and damping, N m s/rad, of a braked wheel: the given ones, the file's, or assumed ones."""
+    stated = link.joint.hold or (0.0, 0.0)
+    stiffness, damping = options.brake_stiffness, options.brake_damping
+    if stiffness is None:
+        stiffness = stated[0] or float(f"{BRAKE_STIFFNESS * weight * wheel.radius:.2g}")
+    if damping is None:
+        damping = stated[1] or float(f"{BRAKE_TIME * stiffness:.2g}")
+    if None in (options.brake_stiffness, options.brake_damping) and not any(stated):
+        gains = f"{stiffness:g} N m/rad and {damping:g} N m s/rad"
+        tree.assumed.append(f"wheel {link.name}: a brake holds it with {gains}")
+    return float(stiffness), float(damping)
 
 
 def _steering_gains(
@@ -185,7 +233,9 @@ def _steering_gains(
     return stiffness, chosen("damping", options.steering_damping, stated_damping, usual, "N m s/rad")
 
 
-def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: WheelOptions) -> dict[str, Any]:
+def _wheel(
+    tree: RobotTree, role: WheelRole, A: Array, weight: float, options: WheelOptions, materials: Materials
+) -> dict[str, Any]:
     joint = tree.links[role.link].joint
     limit = options.torque_limit if options.torque_limit is not None else joint.torque_limit
     if role.is_caster:
@@ -196,6 +246,8 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: W
         tree.assumed.append(
             f"wheel {role.link}: torque limit {limit:.4g} N m, its share of the weight times the radius"
         )
+    elif limit == 0.0 and not role.is_caster and options.torque_limit is None:
+        warn_of_no_torque(tree, joint)
     wheel = {
         "name": role.link,
         "solid": role.link,
@@ -204,6 +256,8 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: W
         "torque_limit": float(limit),
         "drive_sign": 1.0 if role.is_forward else -1.0,
     }
+    if (material := materials.of_wheel(role, joint.axis)) is not None:
+        wheel["material"] = material
     if role.width > 0.0:
         wheel["width"] = float(role.width)
     wheel |= _yielding(tree, role, weight, options)
@@ -236,32 +290,104 @@ def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOpt
     return {"stiffness": stiffness, "damping": float(f"{YIELDING_TIME * stiffness:.2g}")}
 
 
+class Materials:
+    """The materials of a robot's parts: one for each friction that its file states.
+
+    Args:
+        tree: The robot.
+    """
+
+    def __init__(self, tree: RobotTree) -> None:
+        self.tree = tree
+        self.entries: list[dict[str, Any]] = []
+
+    def of_wheel(self, role: WheelRole, axis: Array) -> str | None:
+        """Name of a wheel's material, or None where the file states no friction."""
+        if role.friction is None:
+            return None
+        along, across = role.friction.first, role.friction.second
+        if role.friction.direction is not None and abs(float(np.array(role.friction.direction) @ axis)) > 0.5**0.5:
+            along, across = across, along
+        return self._named(f"wheel {role.link}", along, across)
+
+    def of_shape(self, link: FileLink, shape: FileShape) -> str | None:
+        """Name of the material of a shape that is no wheel, or None where the file states no friction."""
+        if shape.friction is None:
+            return None
+        low, high = sorted((shape.friction.first, shape.friction.second))
+        if low != high:
+            reason = "differs by direction, which only wheels have: the smaller value is read"
+            warning = f"{self.tree.path}: link[{link.name}]: its friction (mu1, mu2) {reason}"
+            if warning not in self.tree.warnings:
+                self.tree.warnings.append(warning)
+        return self._named(f"link[{link.name}]", low, low)
+
+    def _named(self, where: str, along: float, across: float) -> str:
+        stated = (along, across)
+        along, across = min(along, MOST_FRICTION), min(across, MOST_FRICTION)
+        along = max(along, LEAST_SHARE * across)
+        name = f"mu {along:g}" if along == across else f"mu {along:g} along, {across:g} across"
+        if (along, across) != stated:
+            self.tree.assumed.append(f"{where}: friction of {stated[0]:g} along and {stated[1]:g} across is {name[3:]}")
+        self.tree.assumed.append(f"{where}: friction {name[3:]}, as its material {name!r}")
+        entry: dict[str, Any] = {"name": name, "friction": float(along)}
+        entry |= {} if along == across else {"friction_across": float(across)}
+        if entry not in self.entries:
+            self.entries.append(entry)
+        return name
+
+
 def _shapes(
-    tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None, meshes: MeshOptions
+    tree: RobotTree,
+    link: FileLink,
+    A: Array,
+    anchor: Array,
+    role: WheelRole | None,
+    meshes: MeshOptions,
+    materials: Materials,
+    *,
+    has_drawings: bool,
 ) -> list[dict[str, Any]]:
     """The shapes of a link. Wheels collide as discs with a width, and meshes as convex hulls."""
     found: list[dict[str, Any]] = []
-    is_drawn = any(shape.visible and shape.mesh is None for shape in link.shapes)
+    is_drawn = has_drawings or any(shape.visible and shape.kind in SOLID for shape in link.shapes)
+    # Of a wheel either what the file draws is drawn, or the model's own wheel.
+    draws_own_wheel = role is not None and not (role.is_drawn and is_drawn)
+    if draws_own_wheel and is_drawn:
+        tree.left_out.append(f"link[{link.name}]: what is drawn of a wheel, since the wheel is of another radius")
     for shape in link.shapes:
         if role is not None and shape.name.endswith(THIN_DISC):
             continue  # the disc below stands for it
+        if not shape.size_is_positive() and (shape.visible or not any(shape.size)):
+            size = " ".join(f"{size:g}" for size in shape.size)
+            tree.left_out.append(f"link[{link.name}]: a {shape.kind} of size {size}")
+            continue
         if reason := _left_out(shape, role):
             tree.left_out.append(f"link[{link.name}]: a {shape.kind} {reason}")
         collides = shape.collides and role is None
-        visible = shape.visible or not is_drawn
+        visible = (shape.visible or not is_drawn) and not draws_own_wheel
+        material = materials.of_shape(link, shape) if collides else None
+        own: list[dict[str, Any]] = []
         if shape.kind in SOLID and (collides or visible):
-            found.append(_shape(shape, A, anchor, collides=collides, visible=visible))
+            own = [_shape(shape, A, anchor, collides=collides, visible=visible)]
         elif shape.mesh is not None and collides:
-            found += _hulls(tree, link, shape, A, anchor, meshes, visible=not is_drawn)
+            own = _hulls(tree, link, shape, A, anchor, meshes, visible=not is_drawn)
+        look: dict[str, Any] = {} if material is None else {"material": material}
+        look |= {} if shape.colour is None else {"colour": list(shape.colour)}
+        found += [made | look for made in own]
     if role is not None:
         turn = rotation_vector(turn_z_to(A @ link.joint.axis))
         disc: dict[str, Any] = {"kind": "disc", "radius": float(role.radius)}
-        found.append(disc | ({"rotation": _numbers(turn)} if np.any(turn) else {}))
+        disc |= {"rotation": _numbers(turn)} if np.any(turn) else {}
+        found.append(disc | ({} if draws_own_wheel else {"visible": False}))
     return found
 
 
 def _left_out(shape: FileShape, role: WheelRole | None) -> str | None:
-    """The properties of a shape that are not simulated, in words, or None. Of meshes that touch, `_hulls` tells."""
+    """The properties of a shape that are not simulated, in words, or None.
+
+    Of meshes that touch, `_hulls` tells, and of those that are drawn, `Drawer`.
+    """
     if shape.collides and role is not None:
         rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
         is_rim = shape.kind == "cylinder" and shape.size == (role.radius, role.width)
@@ -270,7 +396,7 @@ def _left_out(shape: FileShape, role: WheelRole | None) -> str | None:
         return None
     if shape.collides:
         return "that touches, since this kind cannot"
-    return "that is drawn" if shape.visible else None
+    return "that is drawn" if shape.visible and shape.mesh is None else None
 
 
 def _hulls(

@@ -247,10 +247,16 @@ def write_mjcf(model: RoverModel, path: str | os.PathLike[str]) -> None:
         _add_equality(equality, loop, bodies)
     for tag in description.get("tags") or ():
         x, y, z = tag["position"]
-        ET.SubElement(bodies[tag["solid"]], "site", name=tag["name"], pos=text_of((x, -z, y)))
+        site = {"name": tag["name"], "pos": text_of((x, -z, y)), "quat": _quaternion(_turn_of(tag))}
+        ET.SubElement(bodies[tag["solid"]], "site", site)
     if not len(asset):
         root.remove(asset)
     write_xml(root, path)
+
+
+def _turn_of(tag: dict[str, Any]) -> Array:
+    """Rotation (3, 3) of a tag in the frame of its solid, both in the axes of robot files."""
+    return np.asarray(_TO_FILE @ rotation_matrix(tag.get("rotation") or (0.0, 0.0, 0.0)) @ _TO_FILE.T)
 
 
 def _add_equality(equality: ET.Element, loop: dict[str, Any], bodies: dict[str | None, ET.Element]) -> None:
@@ -397,7 +403,8 @@ def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Colle
         ET.SubElement(robot, "link", name=tag["name"])
         joint = ET.SubElement(robot, "joint", name=f"{tag['name']}_fixed", type="fixed")
         x, y, z = tag["position"]
-        ET.SubElement(joint, "origin", xyz=text_of((x, -z, y)), rpy="0 0 0")
+        rpy = text_of(roll_pitch_yaw(_turn_of(tag)))
+        ET.SubElement(joint, "origin", xyz=text_of((x, -z, y)), rpy=rpy)
         ET.SubElement(joint, "parent", link=tag["solid"])
         ET.SubElement(joint, "child", link=tag["name"])
     for name in [*wheels, *(name for name, limit in drives.items() if limit is not None)]:

@@ -53,10 +53,11 @@ class MeshOptions:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Vertices (n, 3), m, and triangles (m, 3)."""
+    """Vertices (n, 3), m, triangles (m, 3), and the colour in its file (red, green, blue, 0 to 1) or None."""
 
     vertices: Array
     faces: npt.NDArray[np.int64]
+    colour: tuple[float, float, float] | None = None
 
 
 def load_mesh(
@@ -70,6 +71,7 @@ def load_mesh(
         scale: Factors of its coordinates.
         searched: Folders in which there is no such file.
     """
+    colour = None
     if isinstance(source, np.ndarray):
         points, corners = source, np.zeros((0, 3), dtype=np.int64) if faces is None else faces
     elif searched:
@@ -83,11 +85,25 @@ def load_mesh(
             read = loader.load_mesh(source)
             points = np.asarray(read.vertices, dtype=np.float64)
             corners = np.asarray(read.faces, dtype=np.int64)
+            colour = _colour(read)
         except Exception as error:  # whatever a parser of meshes makes of a damaged file
             return None, f"is the mesh {source}, which cannot be read ({type(error).__name__}: {error})"
     if len(points) < 3 or not np.all(np.isfinite(points)):
         return None, f"is the mesh {source}, which has no surface"
-    return Mesh(points * (np.ones(3) if scale is None else scale), corners), ""
+    return Mesh(points * (np.ones(3) if scale is None else scale), corners, colour), ""
+
+
+def _colour(mesh: Any) -> tuple[float, float, float] | None:
+    """The main colour of a mesh's file, or None if it states none."""
+    try:
+        visual = mesh.visual
+        if not visual.defined:
+            return None
+        material = getattr(visual, "material", None)
+        red, green, blue = (int(x) for x in (material if material is not None else visual).main_color[:3])
+    except Exception:
+        return None
+    return red / 255.0, green / 255.0, blue / 255.0
 
 
 def hulls_of(mesh: Mesh, options: MeshOptions) -> tuple[list[Array], str]:

@@ -477,6 +477,7 @@ class _Reader:
         collides = bool(m.geom_contype[geom] or m.geom_conaffinity[geom])
         name = self.mujoco.mj_id2name(m, self.mujoco.mjtObj.mjOBJ_GEOM, geom) or ""
         made = FileShape("mesh", (), p, R, collides, bool(m.geom_rgba[geom, 3] > 0.0), name)
+        made.colour = self._colour(geom)
         match int(m.geom_type[geom]):
             case kinds.mjGEOM_BOX:
                 made.kind, made.size = "box", (2.0 * size[0], 2.0 * size[1], 2.0 * size[2])
@@ -497,6 +498,16 @@ class _Reader:
             case other:
                 made.kind = kinds(other).name.removeprefix("mjGEOM_").lower()
         return made
+
+    def _colour(self, geom: int) -> tuple[float, float, float] | None:
+        """Colour of a shape: that of its material or its own; None for MuJoCo's default."""
+        m = self.model
+        material = int(m.geom_matid[geom])
+        rgba = m.mat_rgba[material] if material >= 0 else m.geom_rgba[geom]
+        if material < 0 and np.allclose(rgba, (0.5, 0.5, 0.5, 1.0)):
+            return None
+        red, green, blue = (float(np.clip(x, 0.0, 1.0)) for x in rgba[:3])
+        return red, green, blue
 
     def _name(self, kind: Any, index: int) -> str:
         return self.mujoco.mj_id2name(self.model, kind, index) or str(index)

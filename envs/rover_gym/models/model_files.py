@@ -63,8 +63,11 @@ def from_urdf(
     steering_stiffness: float | None = None,
     steering_damping: float | None = None,
     steering_limit: float | None = None,
+    brake_stiffness: float | None = None,
+    brake_damping: float | None = None,
     wheel_width: float | None = None,
     wheel_stiffness: float | None = None,
+    masses: Mapping[str, float] | None = None,
     mesh_parts: int = 8,
     mesh_vertices: int = 32,
     ignore: Collection[str] = (),
@@ -77,20 +80,26 @@ def from_urdf(
 
     Args:
         path: Path of the file.
-        wheels: Names of the wheels' links or joints, or a mapping of names to radii, m. By default wheels are found
-            from shapes and names. An empty list means no wheels.
+        wheels: Names of the wheels' links or joints, or a mapping of names to radii, m. A link that is fixed to a
+            turning one stands for that. By default wheels are found from shapes and names. An empty list means no
+            wheels.
         steering: Names of the steering links or joints, or a mapping from wheel names to them. By default they are
             found from their axes. An empty list means no steering.
         free_base: Whether the root link moves freely. Otherwise it is fixed to the world.
         forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
-        torque_limit: Largest torque of every wheel, N m; by default the file's.
+        torque_limit: Largest torque of every wheel, N m; by default the file's, which may be 0.
         steering_stiffness: Stiffness of every steering controller, N m/rad.
         steering_damping: Damping of every steering controller, N m s/rad.
         steering_limit: Largest steering set-point, rad; by default the joint's stop.
+        brake_stiffness: Stiffness with which `brake` holds every wheel, N m/rad; by default 100 per radian of what its
+            share of the weight exerts at its radius.
+        brake_damping: Damping with which `brake` holds every wheel, N m s/rad; by default 0.02 s times the stiffness.
         wheel_width: Width of every wheel, m; 0 for thin discs, which cost less to simulate. By default the width of the
             wheel's collision cylinder in the file, or 0.
         wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
             compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+        masses: Masses of links by their names, kg, for files that only draw. A link that has no mass in the file gets
+            the inertia of its shapes.
         mesh_parts: Most convex parts into which a concave collision mesh is divided. With 1 a mesh collides as its
             convex hull, with 0 not at all. `import_report` states the error in volume.
         mesh_vertices: Largest number of vertices of a part, from 4 to 64.
@@ -119,8 +128,11 @@ def from_mjcf(
     steering_stiffness: float | None = None,
     steering_damping: float | None = None,
     steering_limit: float | None = None,
+    brake_stiffness: float | None = None,
+    brake_damping: float | None = None,
     wheel_width: float | None = None,
     wheel_stiffness: float | None = None,
+    masses: Mapping[str, float] | None = None,
     mesh_parts: int = 8,
     mesh_vertices: int = 32,
     ignore: Collection[str] = (),
@@ -138,14 +150,19 @@ def from_mjcf(
             found from their axes. An empty list means no steering.
         free_base: Whether the root body moves freely. By default as in the file.
         forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
-        torque_limit: Largest torque of every wheel, N m; by default the file's.
+        torque_limit: Largest torque of every wheel, N m; by default the file's, which may be 0.
         steering_stiffness: Stiffness of every steering controller, N m/rad.
         steering_damping: Damping of every steering controller, N m s/rad.
         steering_limit: Largest steering set-point, rad; by default the joint's stop.
+        brake_stiffness: Stiffness with which `brake` holds every wheel, N m/rad; by default 100 per radian of what its
+            share of the weight exerts at its radius.
+        brake_damping: Damping with which `brake` holds every wheel, N m s/rad; by default 0.02 s times the stiffness.
         wheel_width: Width of every wheel, m; 0 for thin discs, which cost less to simulate. By default the width of the
             wheel's collision cylinder in the file, or 0.
         wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
             compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+        masses: Masses of links by their names, kg, for files that only draw. A link that has no mass in the file gets
+            the inertia of its shapes.
         mesh_parts: Most convex parts into which a concave collision mesh is divided. With 1 a mesh collides as its
             convex hull, with 0 not at all. `import_report` states the error in volume.
         mesh_vertices: Largest number of vertices of a part, from 4 to 64.

@@ -6,20 +6,20 @@ import functools
 import os
 import re
 import warnings
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.import_report import ImportReport, RobotFileWarning, axes_of, check_folders, solid_rows, together
 from rover_gym.models.loop_description import close_distant_couplings
+from rover_gym.models.masses import state_masses
 from rover_gym.models.meshes import MOST_PARTS, MOST_VERTICES, MeshOptions
 from rover_gym.models.mjcf import read_mjcf_tree
 from rover_gym.models.robot_tree import (
     IGNORABLE,
     RobotTree,
     check_kinds,
-    checked_path,
     drop_distant_limits,
     join_rigid_groups,
     move_limits_to_followed_joints,
@@ -27,7 +27,7 @@ from rover_gym.models.robot_tree import (
 )
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
-from rover_gym.validation import number, refuse, whole
+from rover_gym.validation import number, refuse, regular_file, whole
 
 SOLID = re.compile(r"(solids|wheels|tags|loops)\[(\d+)\]")
 
@@ -54,13 +54,14 @@ def _read(
     steering: Steering = None,
     forward: str = "x",
     ignore: Collection[str] = (),
+    masses: Mapping[str, float] | None = None,
     mesh_parts: int = MeshOptions.parts,
     mesh_vertices: int = MeshOptions.vertices,
     frames: int = 3,
     **limits: float | None,
 ) -> tuple[RoverModel, ImportReport]:
     """Reads a file; `frames`: calls from here to the user's, whose line a warning names; `limits`: of wheels."""
-    place = checked_path(path)
+    place = regular_file(path, error=ModelError)
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
     P = axes_of(forward)
@@ -73,6 +74,7 @@ def _read(
         whole("mesh_vertices", mesh_vertices, at_least=4, at_most=MOST_VERTICES, error=ModelError),
     )
     tree = reader(place, ignore=ignored)
+    state_masses(tree, masses)
     drop_distant_limits(tree)
     join_rigid_groups(tree, free_base=bool(free_base))
     for link in tree.links.values():

@@ -19,7 +19,7 @@ import itertools
 import math
 import os
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from pathlib import Path
 from typing import NoReturn
@@ -32,7 +32,7 @@ from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, move_ends
 from rover_gym.models.meshes import Mesh, load_mesh
 from rover_gym.rotations import turn_z_to
-from rover_gym.validation import refuse, shown
+from rover_gym.validation import refuse, regular_file, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
 MAX_LINKS = 2000
@@ -45,6 +45,21 @@ IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "flu
 
 #: Ending of the name of a cylinder that represents a wheel without width.
 THIN_DISC = "thin_disc"
+
+
+@dataclass(frozen=True)
+class FileFriction:
+    """Friction that a file states for a link.
+
+    Attributes:
+        first: Coefficient along the first direction, `mu1`.
+        second: Coefficient across it, `mu2`.
+        direction: The first direction in the link's frame (3,), or None where the file states none.
+    """
+
+    first: float
+    second: float
+    direction: tuple[float, float, float] | None = None
 
 
 @dataclass
@@ -64,6 +79,8 @@ class FileShape:
         faces: Triangles (m, 3) of a mesh that is given by its vertices.
         scale: Factors of the mesh's coordinates.
         searched: Folders in which there is no such file.
+        colour: Red, green, blue, 0 to 1, or None.
+        friction: What the file states for its link, or None.
     """
 
     kind: str
@@ -77,6 +94,12 @@ class FileShape:
     scale: Array | None = None
     searched: tuple[str, ...] = ()
     faces: npt.NDArray[np.int64] | None = None
+    colour: tuple[float, float, float] | None = None
+    friction: FileFriction | None = None
+
+    def size_is_positive(self) -> bool:
+        """Whether every size is a length that a shape can have; a mesh has none."""
+        return all(1e-6 <= size <= 1e6 for size in self.size)
 
 
 @dataclass
@@ -95,7 +118,7 @@ class FileJoint:
         stiffness: Of its spring, N m/rad or N/m.
         rest: Coordinate at which its spring is relaxed, rad or m.
         follows: Name of the joint that it follows, ratio and offset.
-        torque_limit: Largest torque that the file states, N m.
+        torque_limit: Largest torque that the file states, N m; 0 is stated, too.
         hold: Gains of a position controller: stiffness and damping.
         is_driven: Whether the file gives it a motor.
     """
@@ -130,7 +153,8 @@ class FileLink:
         centre: Mass centre in its frame (3,), m.
         inertia: About the mass centre in the axes of its frame (3, 3), kg m².
         shapes: Its shapes.
-        points: Named points in its frame: the origins of links without mass that are fixed to it.
+        points: Named frames on it, each with its origin (3,), m, and its rotation to the link's frame (3, 3): those of
+            links that were joined with it.
     """
 
     name: str
@@ -142,7 +166,7 @@ class FileLink:
     centre: Array = field(default_factory=lambda: np.zeros(3))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     shapes: list[FileShape] = field(default_factory=list)
-    points: list[tuple[str, Array]] = field(default_factory=list)
+    points: list[tuple[str, Array, Array]] = field(default_factory=list)
 
 
 @dataclass
@@ -185,17 +209,49 @@ class RobotTree:
         if kind not in self.ignore:
             self.refuse(where, value, f'{reason}; ignore=["{kind}"] leaves it out', row=row)
         self.left_out.append(f"{where}: {reason} (left out because of `ignore`)")
+        if kind == "closed loops":
+            self.warn_of_a_loop(where)
+
+    def warn_of_a_loop(self, where: str) -> None:
+        """Warns of a closed loop that the user leaves out."""
+        self.warnings.append(f'{self.path}: {where}: this loop stays open, because of ignore=["closed loops"]')
 
     def close(self, where: str, loop: FileLoop) -> None:
         """Adds a closed loop, or lists it as left out if `ignore` says so."""
         if "closed loops" in self.ignore:
             self.left_out.append(f"{where}: {loop.name} (left out because of `ignore`)")
+            self.warn_of_a_loop(where)
         else:
             self.loops.append(loop)
 
     def children(self, name: str) -> list[FileLink]:
         """The links that a link carries."""
         return [link for link in self.links.values() if link.parent == name]
+
+    def as_one(self, name: str, *, only: str | None = None) -> FileLink:
+        """A link with the shapes of all links that are fixed to it, directly or through others.
+
+        Args:
+            name: Its name.
+            only: The one of these links whose shapes count; by default all.
+        """
+        link = self.links[name]
+        shapes = list(link.shapes) if only in (None, name) else []
+        for child in self.children(name):
+            if child.joint.kind == "fixed":
+                R, p = child.rotation, child.position
+                shapes += [_moved(replace(shape), R, p) for shape in self.as_one(child.name, only=only).shapes]
+        return replace(link, shapes=shapes)
+
+    def fixed_to(self, name: str) -> list[FileLink]:
+        """The links that are fixed to a link, directly or through others."""
+        direct = [child for child in self.children(name) if child.joint.kind == "fixed"]
+        return [one for child in direct for one in (child, *self.fixed_to(child.name))]
+
+    def join_fixed(self, name: str, reason: str) -> None:
+        """Joins a link with all links that are fixed to it; their frames remain as named points."""
+        for child in reversed(self.fixed_to(name)):
+            _join(self, child, self.links[str(child.parent)], reason)
 
     def poses(self) -> dict[str, tuple[Array, Array]]:
         """Rotation (3, 3) and origin (3,), m, of every link in the world: joints at zero, roots as in the file."""
@@ -253,9 +309,10 @@ def is_urdf(path: Path) -> bool:
     """Whether a file is a URDF, judged by its beginning.
 
     Raises:
+        ModelError: It is no regular file.
         OSError: The file cannot be read.
     """
-    with path.open("rb") as file:
+    with regular_file(path, error=ModelError).open("rb") as file:
         start = file.read(1 << 16)
     place = start.find(b"<robot")
     return place >= 0 and b"<mujoco" not in start[:place]
@@ -306,9 +363,21 @@ def _is_body(link: FileLink) -> bool:
     return bool(principal[0] > 0.0 and principal[2] <= (principal[0] + principal[1]) * (1.0 + 1e-9))
 
 
-def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
+#: Why links are joined that cannot move by themselves.
+NO_BODY = "because one of them alone has no physical mass and inertia"
+
+
+def _moved(shape: FileShape, R: Array, p: Array) -> FileShape:
+    """Moves a shape into the frame of another link, in which its own link has the pose `R` (3, 3), `p` (3,), m."""
+    shape.position, shape.rotation = p + R @ shape.position, R @ shape.rotation
+    if shape.friction is not None and shape.friction.direction is not None:
+        x, y, z = R @ np.array(shape.friction.direction)
+        shape.friction = replace(shape.friction, direction=(float(x), float(y), float(z)))
+    return shape
+
+
+def _join(tree: RobotTree, link: FileLink, other: FileLink, reason: str = NO_BODY) -> None:
     if link.mass > 0.0:
-        reason = "because one of them alone has no physical mass and inertia"
         tree.assumed.append(f"link[{link.name}]: joined with {other.name}, {reason}")
     R, p = link.rotation, link.position
     other.inertia = other.inertia + R @ link.inertia @ R.T  # a file may state an inertia without a mass
@@ -319,11 +388,9 @@ def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
         for m, c in ((other.mass, other.centre), (link.mass, centre)):
             other.inertia = other.inertia + m * _steiner(c - together)
         other.mass, other.centre = mass, together
-    for shape in link.shapes:
-        shape.position, shape.rotation = p + R @ shape.position, R @ shape.rotation
-        other.shapes.append(shape)
-    other.points.append((link.name, p))
-    other.points += [(name, p + R @ point) for name, point in link.points]
+    other.shapes += [_moved(shape, R, p) for shape in link.shapes]
+    other.points.append((link.name, p, R))
+    other.points += [(name, p + R @ point, R @ turn) for name, point, turn in link.points]
     move_ends(tree.loops, link.name, other.name, R, p)
     for child in tree.children(link.name):
         child.parent = other.name
@@ -407,6 +474,22 @@ def drop_distant_limits(tree: RobotTree) -> None:
             tree.assumed.append(f"{stated} are {lower:g} and {upper:g}")
 
 
+def reverse_axis(tree: RobotTree, joint: FileJoint) -> None:
+    """Reverses the axis of a joint, with all that depends on the sign of its coordinate."""
+    joint.axis, joint.rest = -joint.axis, -joint.rest
+    if joint.limits is not None:
+        joint.limits = (-joint.limits[1], -joint.limits[0])
+    if joint.follows is not None:
+        followed, ratio, offset = joint.follows
+        joint.follows = (followed, -ratio, -offset)
+    for other in tree.links.values():
+        if other.joint.follows is not None and other.joint.follows[0] == joint.name:
+            followed, ratio, offset = other.joint.follows
+            other.joint.follows = (followed, -ratio, offset)
+    for loop in tree.loops:
+        loop.reverse(joint.name)
+
+
 def turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None:
     """Reverses steering joints whose axis points down, so that positive angles always turn left.
 
@@ -420,19 +503,7 @@ def turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None
         link = tree.links[name]
         if float(poses[name][0] @ link.joint.axis @ up) > 0.0:
             continue
-        joint = link.joint
-        joint.axis, joint.rest = -joint.axis, -joint.rest
-        if joint.limits is not None:
-            joint.limits = (-joint.limits[1], -joint.limits[0])
-        if joint.follows is not None:
-            followed, ratio, offset = joint.follows
-            joint.follows = (followed, -ratio, -offset)
-        for other in tree.links.values():
-            if other.joint.follows is not None and other.joint.follows[0] == joint.name:
-                followed, ratio, offset = other.joint.follows
-                other.joint.follows = (followed, -ratio, offset)
-        for loop in tree.loops:
-            loop.reverse(joint.name)
+        reverse_axis(tree, link.joint)
         tree.assumed.append(f"steering {name}: its axis points down and is reversed: positive turns to the left")
 
 
@@ -477,31 +548,58 @@ OUTLINE = 1.5
 
 @dataclass(frozen=True)
 class Outline:
-    """Outline of a mesh about an axis.
+    """Outline of a shape or a mesh about an axis.
 
     Attributes:
-        radius: Largest distance of a vertex from the axis, m.
-        centre: Middle of the mesh along the axis, m.
+        radius: Largest distance from the axis, m.
+        centre: Middle along the axis, m.
         is_round: Whether the outline is nearly a circle.
+        shape: The shape that it belongs to.
     """
 
     radius: float
     centre: float
     is_round: bool
+    shape: FileShape
 
 
-def round_shape(link: FileLink) -> FileShape | None:
-    """The largest cylinder or sphere about a link's axis, among collision shapes if there are any."""
-    best: FileShape | None = None
-    for shape in sorted(link.shapes, key=lambda shape: not shape.collides):
-        if shape.kind not in ("cylinder", "sphere") or (best is not None and not shape.collides):
+def _coaxial(link: FileLink) -> list[FileShape]:
+    """The cylinders and spheres about a link's axis."""
+    found = []
+    for shape in link.shapes:
+        if shape.kind not in ("cylinder", "sphere") or not shape.size_is_positive():
             continue
         off = shape.position - link.joint.anchor - along(link, shape) * link.joint.axis
         is_coaxial = shape.kind == "sphere" or abs(float(shape.rotation[:, 2] @ link.joint.axis)) > 1.0 - 1e-6
-        is_centred = np.linalg.norm(off) <= ECCENTRIC * shape.size[0]
-        if is_coaxial and is_centred and (best is None or shape.size[0] > best.size[0]):
-            best = shape
-    return best
+        if is_coaxial and np.linalg.norm(off) <= ECCENTRIC * shape.size[0]:
+            found.append(shape)
+    return found
+
+
+#: Two round shapes of one link are two wheels if the smaller radius is at least this share of the larger one.
+EQUAL = 0.95
+
+
+def wheels_of(link: FileLink) -> list[list[FileShape]]:
+    """The round shapes of a link that stand on the ground, grouped by the wheels that they form along its axis."""
+    found = _coaxial(link)
+    shapes = [shape for shape in found if shape.collides] or found
+    largest = max((shape.size[0] for shape in shapes), default=0.0)
+    groups: list[list[FileShape]] = []
+    end = -math.inf
+    for shape in sorted(shapes, key=lambda shape: along(link, shape) - _half_width(shape)):
+        if shape.size[0] < EQUAL * largest:
+            continue
+        if along(link, shape) - _half_width(shape) > end:
+            groups.append([])
+        groups[-1].append(shape)
+        end = max(end, along(link, shape) + _half_width(shape))
+    return groups
+
+
+def _half_width(shape: FileShape) -> float:
+    """Half of the length of a cylinder, or the radius of a sphere, m."""
+    return 0.5 * shape.size[1] if shape.kind == "cylinder" else shape.size[0]
 
 
 def along(link: FileLink, shape: FileShape) -> float:
@@ -511,18 +609,33 @@ def along(link: FileLink, shape: FileShape) -> float:
 
 def width(link: FileLink) -> float:
     """Width of a wheel's collision cylinder, m; 0 if it represents a thin disc or is missing."""
-    shape = round_shape(link)
+    largest = largest_round(link)[0]
+    shape = None if largest is None else largest.shape
     if shape is None or shape.kind != "cylinder" or not shape.collides or shape.name.endswith(THIN_DISC):
         return 0.0
     return shape.size[1]
 
 
-def mesh_outline(link: FileLink) -> tuple[Outline | None, str]:
-    """Outline of a link's mesh, preferably a collision mesh; or None and the reason."""
+def largest_round(link: FileLink) -> tuple[Outline | None, str]:
+    """The largest round shape or mesh about a link's axis, among collision shapes if there are any; or the reason."""
     meshes = [shape for shape in link.shapes if shape.mesh is not None]
-    if not meshes:
-        return None, "has no cylinder or sphere about its axis"
-    points, reason = _points(link, min(meshes, key=lambda shape: not shape.collides))
+    reasons = [] if meshes else ["has no cylinder or sphere about its axis"]
+    for collides in (True, False):
+        of_shapes = [shape for shape in _coaxial(link) if shape.collides is collides]
+        found = [Outline(shape.size[0], along(link, shape), True, shape) for shape in of_shapes]
+        for shape in meshes:
+            if shape.collides is collides:
+                outline, reason = _mesh_outline(link, shape)
+                found += [outline] if outline is not None else []
+                reasons += [] if outline is not None else [reason]
+        if found:
+            return max(found, key=lambda outline: outline.radius), ""
+    return None, reasons[0]
+
+
+def _mesh_outline(link: FileLink, shape: FileShape) -> tuple[Outline | None, str]:
+    """Outline of a mesh of a link; or None and the reason."""
+    points, reason = _points(link, shape)
     if points is None:
         return None, reason
     placed = points @ turn_z_to(link.joint.axis)  # the axis is z
@@ -536,29 +649,37 @@ def mesh_outline(link: FileLink) -> tuple[Outline | None, str]:
     turns = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
     reach = (across @ np.stack([np.cos(turns), np.sin(turns)])).max(axis=0)
     centre = float(placed[:, 2].max() + placed[:, 2].min()) / 2.0
-    return Outline(radius, centre, bool(reach.min() >= ROUND * radius)), ""
+    return Outline(radius, centre, bool(reach.min() >= ROUND * radius), shape), ""
+
+
+def unread_meshes(link: FileLink) -> list[str]:
+    """Why collision meshes of a link cannot be read."""
+    meshes = [shape for shape in link.shapes if shape.mesh is not None and shape.collides]
+    return [reason for shape in meshes if (reason := _points(link, shape)[1])]
 
 
 def round_radius(link: FileLink) -> tuple[float | None, str]:
     """Radius of a link that is a round solid, m; or None and the reason."""
-    shape = round_shape(link)
-    if shape is not None:
-        radius = shape.size[0]
-    else:
-        outline, reason = mesh_outline(link)
-        if outline is None:
-            return None, reason if link.shapes else "has no shape"
-        if not outline.is_round:
-            return None, "is a mesh that is not round about its axis"
-        radius = outline.radius
+    outline, reason = largest_round(link)
+    if outline is None:
+        return None, reason if link.shapes else "has no shape"
+    if not outline.is_round:
+        return None, "is a mesh that is not round about its axis"
+    radius = outline.radius
     farthest = max((_reach(link, shape) for shape in link.shapes), default=0.0)
     if farthest > OUTLINE * radius:
         return None, f"reaches {farthest:.3g} m from its axis, beyond its round shape of radius {radius:.3g} m"
     return radius, ""
 
 
-def _reach(link: FileLink, shape: FileShape) -> float:
-    """Largest distance of a shape from its link's axis, m; 0 for meshes that are only drawn and for unknown shapes."""
+def drawn_radius(link: FileLink) -> float:
+    """Largest distance of what the file draws of a link from its axis, m; 0 where it draws nothing."""
+    drawn = [shape for shape in link.shapes if shape.visible and shape.size_is_positive()]
+    return max((_reach(link, shape, drawn=True) for shape in drawn), default=0.0)
+
+
+def _reach(link: FileLink, shape: FileShape, *, drawn: bool = False) -> float:
+    """Largest distance of a shape from its link's axis, m; 0 for unknown shapes and, unless `drawn`, drawn meshes."""
     margin = 0.0
     match shape.kind:
         case "box":
@@ -574,7 +695,7 @@ def _reach(link: FileLink, shape: FileShape) -> float:
             rim = shape.size[0] * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
             corners = np.concatenate([rim + np.array([0.0, 0.0, z * shape.size[1]]) for z in (-0.5, 0.5)])
         case _:
-            points = _points(link, shape)[0] if shape.mesh is not None and shape.collides else None
+            points = _points(link, shape)[0] if shape.mesh is not None and (shape.collides or drawn) else None
             return 0.0 if points is None else _farthest(link, points)
     placed = corners @ shape.rotation.T + shape.position - link.joint.anchor
     return _farthest(link, placed) + margin

@@ -26,8 +26,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
+from rover_gym.models.ground_reach import above_the_ground
 from rover_gym.models.import_report import Array
-from rover_gym.models.robot_tree import FileLink, RobotTree, round_radius
+from rover_gym.models.robot_tree import FileLink, RobotTree, largest_round, round_radius
 from rover_gym.rotations import rotation_matrix
 from rover_gym.validation import number, refuse
 
@@ -47,8 +48,9 @@ class Statics:
 
     Attributes:
         loads: Normal force of the ground on each wheel, (n_wheels,).
-        undetermined_loads: Degree of static indeterminacy, see `StepReport.undetermined_loads`. If it is not 0, the
-            loads are one of many possible distributions.
+        undetermined_loads: Degree of static indeterminacy: number of independent sets of normal forces that balance one
+            another. 0 means that equilibrium determines the loads. Otherwise they are those of equal springs, and
+            micrometres of height change them. Friction is not considered.
         rest_speed: Largest remaining velocity when the loads were read, m/s and rad/s.
         attitude: Roll and pitch at rest.
         wheelbase: Distance between the foremost and the hindmost axle.
@@ -76,6 +78,13 @@ class Statics:
     friction: float
 
 
+def _indeterminacy(sim: Simulation) -> int:
+    """Number of independent sets of normal forces of the pressed contacts that balance one another."""
+    pressed = 3 * np.flatnonzero(sim.contacts.impulses[:, 0] > 0.0)
+    normal = sim.last_problem()[0][np.ix_(pressed, pressed)]
+    return len(pressed) - int(np.linalg.matrix_rank(normal, tol=1e-9 * normal.max(initial=0.0), hermitian=True))
+
+
 def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     """Sets a rover on level ground, brakes and steering held, and reads loads and geometry.
 
@@ -93,7 +102,7 @@ def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     sim = Simulation(model, friction=friction)
     sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
     while sim.time < PATIENCE:
-        report = sim.step(100)
+        sim.step(100)
         if float(np.abs(sim.v).max()) < AT_REST:
             break
     q = sim.q
@@ -115,7 +124,7 @@ def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
     height, is_wall = _step(model, loads, front, friction)
     return Statics(
         loads,
-        report.undetermined_loads,
+        _indeterminacy(sim),
         float(np.abs(sim.v).max()),
         (float(q[3]), float(q[5])),
         float(np.ptp(x)),
@@ -225,20 +234,33 @@ def search_wheels(tree: RobotTree, poses: Poses, up: Array) -> list[str]:
         ModelError: The choice is ambiguous.
     """
     carriers = _moving_carriers(tree)
-    reasons = {link.name: _why_not(link, poses, up, carriers) for link in tree.links.values()}
+    reasons = {link.name: _why_not(tree, link, poses, up, carriers) for link in tree.links.values()}
     candidates = [link for link in tree.links.values() if reasons[link.name] is None]
-    named = [one for one in candidates if _is_named(one)]
-    named = [one for one in named if not NOT_NAMED.search(one.name)] or named
+    named = [one for one in candidates if _is_named(tree, one)]
+    named = [one for one in named if _is_clearly_named(tree, one)] or named
     round_ones: dict[str, float] = {}
     for one in candidates:
-        radius, reasons[one.name] = round_radius(one)
-        if one not in named and tree.children(one.name):
+        radius, reasons[one.name] = round_radius(tree.as_one(one.name))
+        if one not in named and (odd := _not_round(tree, one)) is not None:
             # A motor with its leg, for example.
-            reasons[one.name] = f"carries {tree.children(one.name)[0].name}, and its name does not say wheel"
+            reasons[one.name] = f"carries {odd}, and its name does not say wheel"
         elif radius is not None:
             round_ones[one.name] = radius
     chosen = [one.name for one in named] or list(round_ones)
-    _refuse_fixed_wheels(tree, candidates, chosen)
+    leaders = {link.joint.name: link.name for link in tree.links.values()}
+    if not named:
+        for name in list(chosen):
+            follows = tree.links[name].joint.follows
+            if follows is not None and leaders.get(follows[0]) not in chosen:
+                chosen.remove(name)
+                reasons[name] = f"its joint follows {follows[0]}, which carries no wheel"
+    if not named:
+        outlines = {name: largest_round(tree.as_one(name))[0] for name in chosen}
+        found = [(name, one.radius, one.centre) for name, one in outlines.items() if one is not None]
+        for name, reason in above_the_ground(tree, found, up).items():
+            chosen.remove(name)
+            del round_ones[name]
+            reasons[name] = reason
     doubtful = _on_the_same_ground(poses, up, round_ones, chosen)
     if doubtful:
         likely = f"{', '.join(doubtful)} may be wheels of {tree.path} like {', '.join(chosen)}"
@@ -248,23 +270,42 @@ def search_wheels(tree: RobotTree, poses: Poses, up: Array) -> list[str]:
     return chosen
 
 
-def _is_named(link: FileLink) -> bool:
-    return NAMED.search(f"{link.name} {link.joint.name}") is not None
+def _names(tree: RobotTree, link: FileLink) -> list[str]:
+    """Names of a link, its joint and the links that are fixed to it."""
+    return [link.name, link.joint.name, *(one.name for one in tree.fixed_to(link.name))]
 
 
-def _why_not(link: FileLink, poses: Poses, up: Array, carriers: dict[str, str]) -> str | None:
+def _is_named(tree: RobotTree, link: FileLink) -> bool:
+    return any(NAMED.search(name) for name in _names(tree, link))
+
+
+def _is_clearly_named(tree: RobotTree, link: FileLink) -> bool:
+    """Whether the link, or one that is fixed to it, is called a wheel and not its hub or its motor."""
+    links = [link.name, *(one.name for one in tree.fixed_to(link.name))]
+    if not NOT_NAMED.search(link.name) and NAMED.search(f"{link.name} {link.joint.name}"):
+        return True
+    return any(NAMED.search(name) and not NOT_NAMED.search(name) for name in links)
+
+
+def _not_round(tree: RobotTree, link: FileLink) -> str | None:
+    """A link with a mass that is fixed to this one and is not round about its axis, or None."""
+    for child in tree.fixed_to(link.name):
+        if child.mass > 0.0 and round_radius(tree.as_one(link.name, only=child.name))[0] is None:
+            return child.name
+    return None
+
+
+def _why_not(tree: RobotTree, link: FileLink, poses: Poses, up: Array, carriers: dict[str, str]) -> str | None:
     """The reason why a link's joint cannot carry a wheel; None if it can."""
     joint = link.joint
     if joint.kind != "revolute":
         return f"its joint is {joint.kind}"
-    if joint.follows is not None:
-        return f"its joint follows {joint.follows[0]}"
     if link.name in carriers:
         return f"carries {carriers[link.name]}, which moves"
     rise = abs(float(poses[link.name][0] @ joint.axis @ up))
     if not rise < TILT:
         return f"its axis rises by {math.degrees(math.asin(min(rise, 1.0))):.0f} degrees"
-    if joint.limits is not None and not (_is_named(link) and round_radius(link)[0] is not None):
+    if joint.limits is not None and not (_is_named(tree, link) and round_radius(tree.as_one(link.name))[0] is not None):
         return f"its joint has stops at {joint.limits[0]:.4g} and {joint.limits[1]:.4g} rad"
     return None
 
@@ -283,23 +324,13 @@ def _none_found(tree: RobotTree, carriers: dict[str, str], reasons: dict[str, st
     candidates = [
         link
         for link in tree.links.values()
-        if (link.joint.kind == "revolute" and link.name not in carriers) or (link.parent and _is_named(link))
+        if (link.joint.kind == "revolute" and link.name not in carriers) or (link.parent and _is_named(tree, link))
     ]
     listed = [f"{link.name} {reasons[link.name]}" for link in candidates[:SHOWN_LINKS]]
     if len(candidates) > SHOWN_LINKS:
         listed.append(f"and {len(candidates) - SHOWN_LINKS} others")
     why = "; ".join(listed) or "no link at the end of a branch turns"
     return f"{tree.path}: no wheel was found ({why}). Give wheels=[...] with the wheels' names, or wheels=[] for none"
-
-
-def _refuse_fixed_wheels(tree: RobotTree, candidates: list[FileLink], chosen: list[str]) -> None:
-    """Rejects a link named as a wheel that is fixed to a rotating link: only the rotating link can be the wheel."""
-    for carrier in candidates:
-        for link in tree.children(carrier.name) if carrier.name not in chosen else ():
-            is_round = any(shape.collides and shape.kind in ("cylinder", "sphere") for shape in link.shapes)
-            if is_round and NAMED.search(link.name) and not NOT_NAMED.search(link.name):
-                reason = f"this wheel is fixed to {carrier.name}, which turns: join the two links in the file"
-                tree.refuse(f"link[{link.name}].joint", link.joint.kind, f"{reason}, or give the links that are wheels")
 
 
 def _moving_carriers(tree: RobotTree) -> dict[str, str]:

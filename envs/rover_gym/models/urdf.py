@@ -13,6 +13,7 @@ import numpy as np
 from rover_gym.extras import require
 from rover_gym.models.import_report import Array, find_file
 from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree, refuse_in
+from rover_gym.models.urdf_extras import UrdfExtras
 from rover_gym.models.urdf_schema import parse
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
@@ -45,9 +46,12 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str], package_paths: tuple[
         refuse_in(path, "robot", path.name, f"cannot be read ({type(error).__name__}: {error})")
     tree = RobotTree(path, robot.name or path.stem, {}, ignore, checked.left_out(), checked.assumed)
     _check_names(path, robot)
-    for element in checked.root.findall("gazebo"):
-        if any("joint" in str(one.tag) for one in element.iter()):
-            tree.leave_out("closed loops", "gazebo", element.get("reference"), "closes a loop by a joint", row="gazebo")
+    extras = checked.extras
+    for closing in extras.joints:
+        tree.leave_out("closed loops", closing.where, list(closing.links), "closes a loop by a joint", row="gazebo")
+    for what in {**extras.link_colours, **extras.frictions}:
+        if what not in {link.name for link in robot.links}:
+            tree.left_out.append(f"gazebo[{what}]: there is no such link")
     carriers = {joint.child: joint for joint in robot.joints}
     links = {link.name: link for link in robot.links}
     driven = {joint.name for transmission in robot.transmission for joint in transmission.joints}
@@ -63,8 +67,19 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str], package_paths: tuple[
             for ones, collides in ((links[name].collisions, True), (links[name].visuals, False))
             for one in ones
         ]
+        _add_extras(link, extras)
         tree.links[name] = link
     return tree
+
+
+def _add_extras(link: FileLink, extras: UrdfExtras) -> None:
+    """Gives the shapes of a link their colours and its friction."""
+    colours = iter(extras.colours.get(link.name, ()))
+    for shape in link.shapes:
+        if shape.visible:
+            shape.colour = next(colours, None) or extras.link_colours.get(link.name)
+        elif link.name in extras.frictions:
+            shape.friction = extras.frictions[link.name]
 
 
 def _check_names(path: Path, robot: Any) -> None:
@@ -134,7 +149,7 @@ def _joint(tree: RobotTree, source: Any) -> FileJoint:
         elif not joint.limits[0] < joint.limits[1]:
             tree.refuse(f"{at}.limit", list(joint.limits), "the lower limit must be below the upper one")
     if source.limit is not None:
-        joint.torque_limit = source.limit.effort or None
+        joint.torque_limit = source.limit.effort
         if source.limit.velocity:
             tree.left_out.append(f"{at}: a limit of its speed")
     if source.dynamics is not None:

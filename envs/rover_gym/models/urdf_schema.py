@@ -14,6 +14,7 @@ from typing import Any
 
 from rover_gym.extras import require
 from rover_gym.models.robot_tree import MAX_LINKS, check_size, refuse_in, right_angle
+from rover_gym.models.urdf_extras import UrdfExtras, read_extras
 
 #: Largest number of elements.
 MAX_ELEMENTS = 200_000
@@ -54,8 +55,8 @@ ATTRIBUTES: dict[str, dict[str, Any]] = {
     "transmission/joint": {"name!": str},
 }
 SHAPES = ("box", "cylinder", "sphere", "mesh")
-#: Elements whose content does not affect the motion.
-APPEARANCE = ("material", "verbose", "contact_coefficients")
+#: Elements that `urdf_extras` reads, or that say nothing of their own.
+READ_ELSEWHERE = ("material", "gazebo", "type", "actuator")
 #: Elements that their parent has at most once.
 ONCE = ("inertial", "origin", "mass", "inertia", "geometry", "parent", "child", "axis", "limit", "dynamics", "mimic")
 REQUIRED = {
@@ -75,16 +76,19 @@ class CheckedUrdf:
         root: Its root element, without elements that do not belong to URDF.
         others: Elements that do not belong to URDF, with their numbers.
         assumed: Assumed values that the file does not state.
+        extras: Colours, and what the file says to Gazebo.
     """
 
     path: Path
     root: Any
+    extras: UrdfExtras = field(default_factory=UrdfExtras)
     others: Counter[str] = field(default_factory=Counter)
     assumed: list[str] = field(default_factory=list)
 
     def left_out(self) -> list[str]:
-        """Elements that do not belong to URDF, with their numbers, as text."""
-        return [f"{what}, {count} times" if count > 1 else what for what, count in self.others.items()]
+        """Elements that nobody reads, with their numbers, as text."""
+        counted = self.others + self.extras.unread
+        return [f"{what}, {count} times" if count > 1 else what for what, count in counted.items()]
 
 
 def parse(path: Path) -> CheckedUrdf:
@@ -114,7 +118,7 @@ def parse(path: Path) -> CheckedUrdf:
     n_links = len(root.findall("link"))
     if n_links > MAX_LINKS:
         refuse_in(path, "robot", n_links, f"must have at most {MAX_LINKS} links")
-    checked = CheckedUrdf(path, root)
+    checked = CheckedUrdf(path, root, read_extras(path, root))
     _check(checked, root, "robot", "robot")
     return checked
 
@@ -156,10 +160,11 @@ def _check(checked: CheckedUrdf, element: Any, key: str, where: str) -> None:
             name = child.get("name")
             _check(checked, child, below, f"{child.tag}[{name}]" if name else at)
             continue
-        if child.tag not in APPEARANCE and element.tag != "transmission":
+        if child.tag not in READ_ELSEWHERE:
             checked.others[f"<{child.tag}> of <{element.tag}>"] += 1
-        if child.tag != "gazebo":  # the reader looks into it for loops
-            element.remove(child)
+        for inner in child if child.tag == "actuator" and len(child) else ():
+            checked.others[f"<{inner.tag}> of <actuator>"] += 1
+        element.remove(child)
     for name in REQUIRED.get(element.tag, ()) if key != "transmission/joint" else ():
         if name not in seen:
             refuse_in(path, f"{line}, {where}.{name}", None, "is missing")

@@ -103,6 +103,11 @@ def check_commands(actions: object, shape: tuple[int, ...]) -> Array:
     return commands
 
 
+def _n_clipped(commands: Array) -> npt.NDArray[np.int64]:
+    """How many entries of each command (n, 3) are outside [-1, 1], (n,)."""
+    return np.asarray((np.abs(commands) > 1.0).sum(axis=1))
+
+
 class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Observations]):
     """Holds each command for several steps of the rover and sums the rewards.
 
@@ -150,6 +155,7 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
         """
         command = check_commands(action, (N_COMMANDS,))[None]
         (reward,), (terminated,), (truncated,) = self._held.hold(command, np.ones(1, np.bool_), self._step)
+        self._info["clipped_actions"] = int(_n_clipped(command)[0])
         return self._held.observe()[0], float(reward), bool(terminated), bool(truncated), self._info
 
     def _step(self, actions: Observations, _: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
@@ -206,6 +212,7 @@ class CommandVectorEnv(VectorWrapper):
         self.repeat = self.held.repeat
         self._over: Mask = np.zeros(self.num_envs, np.bool_)
         self._forces: Array = np.zeros((self.num_envs, 3))
+        self._clipped = np.zeros(self.num_envs, np.int64)
         self.single_action_space = self.held.action_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.show(self.held.observation_space)
@@ -264,11 +271,14 @@ class CommandVectorEnv(VectorWrapper):
         moved, self._over = ~self._over, np.zeros(self.num_envs, np.bool_)
         self._forces[~moved] = 0.0
         rewards, terminated, truncated = self.held.hold(commands, moved, self._step)
+        self._clipped = np.where(moved, _n_clipped(commands), 0)
         self._over = terminated | truncated
         last = self.observe()
         rewards = self.reward(rewards, last, moved)
         finals = self._begin_next(last) if self.rovers.autoreset_mode == AutoresetMode.SAME_STEP else {}
         infos = self.rovers.batch.infos()
+        infos["clipped_actions"] = self._clipped.copy()
+        infos["clipped_actions"][list(finals)] = 0
         if self._pushes is not None:
             infos["push"] = self._forces.copy()
         for i, final in finals.items():
@@ -304,7 +314,7 @@ class CommandVectorEnv(VectorWrapper):
 
     def _final_info(self, i: int) -> dict[str, Any]:
         pushed = {} if self._pushes is None else {"push": self._forces[i].copy()}
-        return self.rovers.batch.info(i) | pushed
+        return self.rovers.batch.info(i) | {"clipped_actions": int(self._clipped[i])} | pushed
 
 
 def _row(observations: Any, i: int) -> Any:
@@ -359,7 +369,8 @@ class RoverCommandEnv(DriveByCommand):
     ## Action
 
     `Box(-1, 1, (3,), float32)`, held for `repeat` control periods, or until the episode ends. Entries outside the box
-    are clipped. If a number is not finite, a `CommandError` is raised and nothing changes.
+    are clipped, and `info["clipped_actions"]` counts them. If a number is not finite, a `CommandError` is raised and
+    nothing changes.
 
     | index | meaning                                        | one stands for | unit |
     |-------|------------------------------------------------|----------------|------|

@@ -7,7 +7,7 @@ part is fixed to one solid: the world position of a point `x` of the part is `o 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -95,21 +95,21 @@ PLATE = 0.012  # m, thickness of what is laid on a surface, and of the forks' pl
 
 @dataclass(frozen=True)
 class Part:
-    """A box, a cylinder, a sphere, an ellipsoid or a convex hull on a solid.
+    """A box, a cylinder, a sphere, an ellipsoid, a convex hull or a mesh on a solid.
 
     Attributes:
         solid: The solid it is fixed to, a key of `RoverModel.poses`.
-        kind: "box", "cylinder", "sphere", "ellipsoid" or "hull".
+        kind: "box", "cylinder", "sphere", "ellipsoid", "hull" or "mesh".
         size: m. A box: edge lengths along the part's x, y, z. A cylinder: radius, and height along the part's y. A
             ball: radius. An ellipsoid: semi-axes along x, y, z. A hull: the coordinates of its points, one after the
-            other.
+            other. A mesh: those of the corners of its triangles.
         position: Centre in the solid's frame, m.
         rotation: (3, 3), columns are the part's axes in the solid's frame.
         colour: Red, green, blue, 0 to 1.
     """
 
     solid: str
-    kind: Literal["box", "cylinder", "sphere", "ellipsoid", "hull"]
+    kind: Literal["box", "cylinder", "sphere", "ellipsoid", "hull", "mesh"]
     size: tuple[float, ...]
     position: Vector
     rotation: npt.NDArray[np.float64]
@@ -117,7 +117,7 @@ class Part:
 
 
 def rover_parts(model: RoverModel) -> tuple[Part, ...]:
-    """The parts of a rover: the shapes of its solids, and marks that show its front and the rotation of its wheels.
+    """The parts of a rover: the shapes and drawings of its solids, and marks that show its front and its wheels' turns.
 
     Solids without a visible shape are not drawn, unless a wheel is fixed to them. Wheels have the contact radius; a
     wheel whose disc is listed among the solid's shapes as not visible is not drawn.
@@ -138,6 +138,7 @@ def rover_parts(model: RoverModel) -> tuple[Part, ...]:
         for shape in shapes:
             if shape.visible:
                 parts += _shape_parts(solid, shape)
+        parts += [_drawing_part(solid, drawing) for drawing in solid.get("drawings", ())]
     return tuple(parts)
 
 
@@ -162,6 +163,9 @@ def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64]
         return vertices * part.size, triangles
     if part.kind == "hull":
         return hull_mesh(np.reshape(part.size, (-1, 3)))
+    if part.kind == "mesh":
+        corners = np.reshape(np.array(part.size, dtype=np.float64), (-1, 3))
+        return corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
     radius, height = part.size
     return _cylinder_mesh(radius, height, resolution)
 
@@ -299,7 +303,30 @@ def _is_disc_about(placed: _PlacedShape, axle: Sequence[float]) -> bool:
     return bool(np.linalg.norm(across) < 1e-9 and off < 1e-9 * placed.shape["radius"])
 
 
+def _drawing_part(solid: Mapping[str, Any], drawing: Mapping[str, Any]) -> Part:
+    """A drawing of a solid, whose triangles have corners of their own, so that its edges stay sharp."""
+    vertices = np.reshape(np.array(drawing["vertices"], dtype=np.float64), (-1, 3))
+    corners = vertices[np.reshape(np.array(drawing["faces"], dtype=np.int64), -1)]
+    colour = _own_colour(drawing) or (BOGIE_COLOUR if "parent" in solid else TRUNK_COLOUR)
+    return Part(solid["name"], "mesh", tuple(corners.ravel().tolist()), (0.0, 0.0, 0.0), np.eye(3), colour)
+
+
+def _own_colour(entry: Mapping[str, Any]) -> Colour | None:
+    """The colour that a shape or a drawing states, or None."""
+    if entry.get("colour") is None:
+        return None
+    red, green, blue = entry["colour"]
+    return float(red), float(green), float(blue)
+
+
 def _shape_parts(solid: Mapping[str, Any], placed: _PlacedShape) -> Iterator[Part]:
+    """The parts of a shape, in the colour that it states or in that of its kind."""
+    colour = _own_colour(placed.shape)
+    for part in _plain_parts(solid, placed):
+        yield part if colour is None else replace(part, colour=colour)
+
+
+def _plain_parts(solid: Mapping[str, Any], placed: _PlacedShape) -> Iterator[Part]:
     name, shape, centre, rotation = solid["name"], placed.shape, placed.position, placed.rotation
     if shape["kind"] == "box":
         size = tuple(shape["size"])

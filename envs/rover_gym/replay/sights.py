@@ -134,9 +134,10 @@ class Sights:
             scene.arrays["scan-grid"] = ("f4", self.scan.ravel())
         for name in self.readings:
             sensor = sensor_of(name, model)
-            along = sensor.directions.reshape(-1, 3) @ sensor.mount.rotation.T
+            place, rotation = sensor.mount.pose_on(model)
+            along = sensor.directions.reshape(-1, 3) @ rotation.T
             scene.arrays[f"{name}-rays"] = ("f4", along.ravel())
-            scene.facts[name] = {"origin": list(sensor.mount.position), "range": sensor.max_range}
+            scene.facts[name] = {"origin": place.tolist(), "range": sensor.max_range}
         if self.arcs is not None:
             scene.arrays["arcs"] = ("f4", self.arcs.ravel())
             scene.facts["arcs"] = self.arcs.shape[1]

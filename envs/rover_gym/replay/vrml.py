@@ -145,7 +145,7 @@ def _part(part: Part) -> str:
         geometry = f"Box {{ size {_numbers(part.size)} }}"
     elif part.kind == "sphere":
         geometry = f"Sphere {{ radius {_numbers(part.size)} }}"
-    elif part.kind in ("ellipsoid", "hull"):
+    elif part.kind in ("ellipsoid", "hull", "mesh"):
         vertices, triangles = part_mesh(part)
         points = ", ".join(_numbers(vertex) for vertex in vertices)
         corners = ", ".join(f"{a} {b} {c} -1" for a, b, c in triangles)

@@ -4,13 +4,14 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import GrainSimulation, OptionError, RoverModel, Simulation, SphereField
+from rover_gym.rotations import rotation_matrix
 from rover_gym.validation import Range, number, refuse, span, vector
 
 Array = npt.NDArray[np.float64]
@@ -21,14 +22,15 @@ MAX_OFFSET = 1e3
 
 @dataclass(frozen=True, kw_only=True)
 class Mount:
-    """The pose of a sensor on a solid of the rover.
+    """The pose of a sensor on a solid or a tag of the rover.
 
     The sensor's frame is x forward, y up, z to the right, as the trunk's. It is turned by its heading, then by its
     pitch, then by its roll.
 
     Args:
-        solid: Name of the solid; None for the model's first, the trunk.
-        position: In the solid's frame, (3,), m.
+        solid: Name of the solid, or of a tag, such as a frame of a robot file; None for the model's first solid, the
+            trunk.
+        position: In the frame of the solid or tag, (3,), m.
         heading_deg: Turn about the solid's y axis, positive to the left, deg.
         pitch_deg: Turn about the sensor's z axis, positive looks up, deg.
         roll_deg: Turn about the sensor's x axis, positive leans to the right, deg.
@@ -52,17 +54,21 @@ class Mount:
             number(name, getattr(self, name))
 
     def solid_of(self, model: RoverModel) -> str:
-        """The name of its solid of a model.
+        """The name of the solid of a model that carries it.
 
         Raises:
-            OptionError: The model has no such solid.
+            OptionError: The model has no such solid or tag.
         """
-        names = model.solid_names
-        if self.solid is None:
-            return names[0]
-        if self.solid not in names:
-            refuse(OptionError, "mount.solid", self.solid, f"unknown; known are {', '.join(names)}")
-        return self.solid
+        return _frame_of(model, self.solid).solid
+
+    def pose_on(self, model: RoverModel) -> tuple[Array, Array]:
+        """Place (3,), m, and rotation matrix (3, 3) of the sensor in the frame of the solid that carries it.
+
+        Raises:
+            OptionError: The model has no such solid or tag.
+        """
+        frame = _frame_of(model, self.solid)
+        return frame.place + frame.rotation @ np.asarray(self.position), frame.rotation @ self.rotation
 
     @property
     def rotation(self) -> Array:
@@ -74,6 +80,32 @@ class Mount:
         about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
         turned: Array = about_y @ about_z @ about_x
         return turned
+
+
+@dataclass(frozen=True)
+class _MountedFrame:
+    """A frame that carries sensors: its solid, and its place (3,), m, and rotation (3, 3) there."""
+
+    solid: str
+    place: Array
+    rotation: Array
+
+
+@lru_cache(maxsize=256)
+def _frame_of(model: RoverModel, name: str | None) -> _MountedFrame:
+    """The solid or the tag of this name; the first solid for None.
+
+    Raises:
+        OptionError: The model has neither.
+    """
+    names = model.solid_names
+    if name is None or name in names:
+        return _MountedFrame(names[0] if name is None else name, np.zeros(3), np.eye(3))
+    tags = {tag["name"]: tag for tag in model.to_dict().get("tags", ())}
+    if name not in tags:
+        refuse(OptionError, "mount.solid", name, f"unknown; known are {', '.join([*names, *tags])}")
+    rotation = rotation_matrix(tags[name].get("rotation") or (0.0, 0.0, 0.0))
+    return _MountedFrame(tags[name]["solid"], np.array(tags[name]["position"]), rotation)
 
 
 class Moment:
@@ -117,7 +149,8 @@ class Moment:
     def frame(self, mount: Mount) -> tuple[Array, Array]:
         """Place (3,), m, and rotation matrix (3, 3) of a sensor, world frame."""
         origin, rotation = self.poses[mount.solid_of(self.model)]
-        return origin + rotation @ np.asarray(mount.position), rotation @ mount.rotation
+        place, turn = mount.pose_on(self.model)
+        return origin + rotation @ place, rotation @ turn
 
     def distances(self, mount: Mount, directions: Array, max_range: float, *, sees_rover: bool) -> Array:
         """Distances (n,), m, to the first hit of rays from a sensor; infinite without a hit.

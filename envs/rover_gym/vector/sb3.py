@@ -142,7 +142,8 @@ class RoverVecEnv(VecEnv):
         If a next episode cannot begin, the following step refuses it before any rover moves.
 
         Raises:
-            CommandError: The actions have a wrong shape or an entry outside [-1, 1]; nothing has changed.
+            CommandError: The actions have a wrong shape or an entry that is not finite; nothing has changed. Finite
+                entries outside [-1, 1] are clipped.
             TerrainError: A rover's next episode cannot begin (see `RoverEnv.reset`); nothing has changed. Reset with
                 another seed or other options.
         """

@@ -123,8 +123,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         step refuses it.
 
         Raises:
-            CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
-                has changed.
+            CommandError: The actions have a wrong shape or an entry that is not finite; nothing has changed. Finite
+                entries outside [-1, 1] are clipped.
             TerrainError: A rover's next episode cannot begin (see `RoverEnv.reset`); nothing has changed. Reset with
                 another seed or other options.
             ResetNeeded: A rover has not been reset, or autoreset is disabled and its episode has ended.

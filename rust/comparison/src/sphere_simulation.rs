@@ -81,7 +81,12 @@ impl Scene for Bodies {
     }
 
     /// The potential is 0 with all centres in the plane.
-    fn energy(&self, options: &StepOptions, state: &State<Placement>) -> Energy {
+    fn energy(
+        &self,
+        options: &StepOptions,
+        state: &State<Placement>,
+        _command: &Self::Command,
+    ) -> Energy {
         let mut energy = Energy::default();
         for (body, centre) in state.configuration.centres.iter().enumerate() {
             let masses = self.masses(body);

@@ -11,7 +11,7 @@
 //!
 //! Chapters, each using only those above it:
 //!
-//! - `pool`: threads that survive a fork;
+//! - [`caught`]: panics that become errors; `pool`: threads that survive a fork;
 //! - [`quantity`]: admissible numbers of a description; [`scalar`]: one rover or several to a
 //!   register; [`spatial`]: rotations and inertias;
 //! - [`cone`], [`law`]: the friction cone and the contact laws, one contact at a time;
@@ -34,6 +34,7 @@
 
 pub use nalgebra;
 
+pub mod caught;
 pub mod cone;
 pub mod contact;
 pub mod draw;

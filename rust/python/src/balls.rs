@@ -17,6 +17,7 @@ use crate::arrays::{Array, fresh, fresh_rows, triple};
 use crate::bed_arguments::{self, Usual, check_rows, grain_error, rows};
 use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
+use crate::shared::Release;
 use crate::terrain::parse;
 use crate::vessels::Vessel;
 
@@ -28,7 +29,7 @@ pub type Packed = (Array, Array, Array);
 
 /// Grains of a packing, built with the interpreter free for others.
 pub fn packed<const D: usize>(py: Python<'_>, packing: &Packing<D>) -> Result<Packed> {
-    let built = py.detach(|| packing.build());
+    let built = py.release(|| packing.build())?;
     let (grains, q) = built.map_err(|e| grain_error(&e))?;
     let centres: Vec<f64> = q
         .chunks_exact(COORDINATES)

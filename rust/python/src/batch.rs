@@ -11,7 +11,7 @@ use crate::arrays::{Array, array};
 use crate::episode::{GivenSimulation, simulation};
 use crate::errors::{Kind, Result, Value};
 use crate::reading::{place, scan_points, slices};
-use crate::shared::{Open, Shared, Watch};
+use crate::shared::{Open, Release, Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
 /// Steps many rovers on several threads. Each gives the same bits as it would alone.
@@ -148,9 +148,9 @@ impl SimulationBatch {
         let width = inner.layout().size();
         let mut rows = vec![0.0; n_rovers * width];
         let (mut watch, active, out) = (Watch::new(), active.as_deref(), &mut rows[..]);
-        let done = py.detach(|| {
+        let done = py.release(|| {
             inner.step_while(&torques, &set_points, n, active, out, &mut || watch.go_on())
-        });
+        })?;
         watch.result(done)?;
         let errors = PyDict::new(py);
         for (index, error) in inner.errors().iter().enumerate() {

@@ -102,6 +102,8 @@ pub struct Contacts {
 
 impl Contacts {
     pub fn new(model: &Model, active: &[ActiveContact<Contact>]) -> Self {
+        let unit_axes = active.iter().map(|own| own.with_unit_axes(model));
+        let active = &unit_axes.collect::<Vec<_>>()[..];
         let parts = active.iter().map(|a| &a.contact.part);
         let told = |part: &Part| match part {
             Part::Wheel(i) => ("wheel", i64::try_from(*i).unwrap_or(-1)),

@@ -16,7 +16,7 @@ use crate::errors::{Kind, Result};
 use crate::generators::generators;
 use crate::options::SolverWords;
 use crate::reading::points;
-use crate::shared::Watch;
+use crate::shared::{Release, Watch};
 use crate::simulation::{Origin, Simulation};
 use crate::terrain;
 
@@ -176,11 +176,11 @@ impl EpisodeDistribution {
             })
             .collect();
         let mut watch = Watch::new();
-        let drawn = py.detach(|| {
+        let drawn = py.release(|| {
             batch.draw(&self.inner, &orders, request.attempts, &mut || {
                 watch.go_on()
             })
-        });
+        })?;
         Ok(DrawnEpisodes {
             drawn: watch.result(drawn)?.unwrap_or_default(),
             words: self.words.clone(),

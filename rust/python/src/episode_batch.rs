@@ -17,7 +17,7 @@ use crate::generators::generators;
 use crate::infos::{Told, info, infos};
 use crate::options::SolverWords;
 use crate::rover_grains::{RoverGrainSimulation, Together};
-use crate::shared::{Open, Shared, Watch};
+use crate::shared::{Open, Release, Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 use crate::union;
 
@@ -228,13 +228,13 @@ impl EpisodeBatch {
         });
         let (mut rows, mut watch) = (vec![0.0; n * size], Watch::new());
         let out = &mut rows[..];
-        let done = py.detach(|| match &mut parts {
+        let done = py.release(|| match &mut parts {
             None => batch.step_while(&given, active, has_scan, out, &mut || watch.go_on()),
             Some(parts) => batch.step_among(&given, active, has_scan, out, &mut |i, rover, n| {
                 let (link, grains) = &mut parts[i];
                 link.step(rover, grains, n, &mut || watch.go_on()).map(drop)
             }),
-        });
+        })?;
         let Stepped {
             rewards,
             ended,

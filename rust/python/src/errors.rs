@@ -6,9 +6,11 @@ use std::fmt::Display;
 
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
+use pyo3::panic::PanicException;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyTuple, PyType};
+use pyo3::types::{PyDict, PyList, PyTuple, PyType};
+use rover_core::caught::Fault;
 use rover_core::draw::{DrawError, PlacementError, Unsuitable};
 use rover_core::episode::EpisodeError;
 use rover_core::geometry::TerrainError;
@@ -42,6 +44,7 @@ pub enum Kind {
     Problem,
     Step,
     Busy,
+    Internal,
 }
 
 /// Name and docstring of each exception, in the order of [`Kind`].
@@ -53,7 +56,11 @@ OptionError: An option or another argument is invalid or out of range.
 CommandError: A torque, a set-point or an action is invalid.
 ProblemError: A friction-contact problem has a wrong shape or an invalid entry.
 StepError: A time step failed. The state is the one before that step.
-BusyError: An object was used while another call on it was still running. Nothing has changed.";
+BusyError: An object was used while another call on it was still running. Nothing has changed.
+InternalError: A fault of rover-gym. Please report it, with what led to it and the message, which names the place.";
+
+/// What is asked of whoever meets a fault.
+const REPORT: &str = "This is a fault of rover-gym. Please report it, with what led to it.";
 
 /// What was given where something else was needed.
 #[derive(Debug)]
@@ -99,6 +106,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         body.set_item("__doc__", doc)?;
         body.set_item("field", py.None())?;
         body.set_item("value", py.None())?;
+        body.set_item("__slots__", PyTuple::empty(py))?; // instances are Python's own, as bases must be
         let class = py
             .get_type::<PyType>()
             .call1((name, bases, body))?
@@ -111,7 +119,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let root = root.bind(py);
     let one = |line: &str| {
         let (name, doc) = line.split_once(": ").unwrap_or_default();
-        let is_event = matches!(name, "StepError" | "BusyError");
+        let is_event = matches!(name, "StepError" | "BusyError" | "InternalError");
         let builtin = if is_event {
             py.get_type::<PyRuntimeError>()
         } else {
@@ -119,8 +127,19 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         };
         make(name, PyTuple::new(py, [root.clone(), builtin])?, doc)
     };
-    let _ = MADE.set(py, CLASSES.lines().map(one).collect::<PyResult<_>>()?);
+    let made: Vec<Py<PyType>> = CLASSES.lines().map(one).collect::<PyResult<_>>()?;
+    adopt_panics(made[Kind::Internal as usize].bind(py))?;
+    let _ = MADE.set(py, made);
     Ok(())
+}
+
+/// Makes the exception of a panic that nothing else has caught one of ours. pyo3 raises it under
+/// `BaseException`, past every `except Exception`.
+fn adopt_panics(internal: &Bound<'_, PyType>) -> PyResult<()> {
+    let py = internal.py();
+    let panics = py.get_type::<PanicException>();
+    panics.setattr("__bases__", PyTuple::new(py, [internal])?)?;
+    panics.setattr("__notes__", PyList::new(py, [REPORT])?)
 }
 
 impl From<BorderError> for PyErr {
@@ -316,6 +335,10 @@ impl From<CommandError> for BorderError {
                 value,
                 ..
             } => (*field, Some(index), Value::Number(*value)),
+            CommandError::NoGains { solid, name } => {
+                let field = format!("solids[{solid}].hold");
+                return Kind::Command.of(&e, field, Value::Text(name.clone()));
+            }
             CommandError::Negative { field, value } => (*field, None, Value::Number(*value)),
             CommandError::UnknownJoint { field, name }
             | CommandError::UnknownSolid { field, name } => {
@@ -422,8 +445,15 @@ impl From<StepError> for BorderError {
             StepError::NoGround { x, z, .. } => {
                 Kind::Step.of(&e, "terrain", Value::Numbers(vec![x, z]))
             }
+            StepError::Internal { .. } => Kind::Internal.refusal(e.to_string(), Value::Nothing),
             _ => Kind::Step.refusal(e.to_string(), Value::Nothing),
         }
+    }
+}
+
+impl From<Fault> for BorderError {
+    fn from(e: Fault) -> Self {
+        Kind::Internal.refusal(format!("{e}. {REPORT}"), Value::Nothing)
     }
 }
 

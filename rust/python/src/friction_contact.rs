@@ -12,6 +12,7 @@ use crate::arrays::Array;
 use crate::errors::{Kind, Result, Value};
 use crate::given_problem::{Delassus, coefficients, flat, with_hint};
 use crate::options::solver_options;
+use crate::shared::Release;
 
 /// Result report of the contact solver.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
@@ -188,7 +189,7 @@ pub fn solve_friction_contact(
     }
     let mut u = vec![0.0; q.len()];
     let mut workspace = SolverWorkspace::default();
-    let inner = py.detach(|| solve(&problem, &options, &mut p, &mut u, &mut workspace));
+    let inner = py.release(|| solve(&problem, &options, &mut p, &mut u, &mut workspace))?;
     let shape = [mu.len(), dimension];
     let iterates = workspace.history().iter();
     Ok(FrictionContactSolution {

@@ -13,7 +13,7 @@ use crate::balls::{self, Balls, Packed};
 use crate::bed_arguments::{self, grain_error, setup_error};
 use crate::contacts::GrainContacts;
 use crate::errors::{BorderError, Kind, Result};
-use crate::shared::{Open, Shared};
+use crate::shared::{Open, Release, Shared};
 use crate::stepping::AnySimulation;
 use crate::union;
 use crate::vessels::{Drum, Silo, Vessel};
@@ -408,7 +408,7 @@ pub fn arrange_balls(
     let radii = vector(radius, Kind::Model, "radius")?;
     let q = radius
         .py()
-        .detach(|| arranged::<3>(&radii, corner, sides, seed));
+        .release(|| arranged::<3>(&radii, corner, sides, seed))?;
     Ok(balls::centres(
         &q.map_err(|e| grain_error(&e))?,
         radii.len(),

@@ -8,10 +8,11 @@ use pyo3::types::PyDict;
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::{HeightField as CoreField, Terrain as _};
 
-use crate::arguments::{Given, refused};
-use crate::arrays::{Array, check_size, one_or_two, two};
+use crate::arguments::{Given, number, refused};
+use crate::arrays::{Array, check_size, one_or_two, two, vector};
 use crate::errors::{Kind, Result, Value};
 use crate::materials;
+use crate::shared::Release;
 use crate::terrain::Terrain;
 
 /// A height map as ground: two triangles in each cell, solid below. Immutable.
@@ -28,13 +29,26 @@ use crate::terrain::Terrain;
 ///     origin: Place (x, z) of the first height, m. By default the middle of the map is at the
 ///         world's origin.
 ///     material: Name of its material, for the laws of a `Simulation` by pair of materials.
+///     map_frame: Easting and northing of the world's origin in the coordinates of a map, and
+///         their change per metre along x and along z, (4,). `from_file` reads it from a GeoTIFF.
 ///
 /// Raises:
 ///     TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
-///         has data, or the spacing is not positive.
+///         has data, the spacing is not positive, or a change per metre is 0.
 #[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
 pub struct HeightField {
     pub inner: Arc<CoreField>,
+    map_frame: Option<[f64; 4]>,
+}
+
+/// Checks the four numbers of a map's frame.
+fn frame_of(given: &Bound<'_, PyAny>) -> Result<[f64; 4]> {
+    let numbers = vector(given, Kind::Terrain, "map_frame")?;
+    let what = "four finite numbers, of which the last two are not 0";
+    match <[f64; 4]>::try_from(numbers) {
+        Ok(frame) if frame[2] * frame[3] != 0.0 && frame.iter().all(|x| x.is_finite()) => Ok(frame),
+        _ => Err(refused(given, Kind::Terrain, "map_frame", what)),
+    }
 }
 
 /// Numbers of two dimensions in single precision.
@@ -71,21 +85,33 @@ fn table(value: &Bound<'_, PyAny>) -> Result<(Vec<f32>, [usize; 2])> {
 impl HeightField {
     /// A map of the core, for Python.
     pub fn of(inner: Arc<CoreField>) -> PyClassInitializer<Self> {
-        Terrain::base(DrawnGround::Map(inner.clone())).add_subclass(Self { inner })
+        Self::placed(inner, None)
+    }
+
+    fn placed(inner: Arc<CoreField>, map_frame: Option<[f64; 4]>) -> PyClassInitializer<Self> {
+        Terrain::base(DrawnGround::Map(inner.clone())).add_subclass(Self { inner, map_frame })
+    }
+
+    /// The frame of its map; an error without one.
+    fn frame(&self) -> Result<[f64; 4]> {
+        let message = "map_frame: this ground has no map coordinates; a GeoTIFF gives them";
+        self.map_frame
+            .ok_or_else(|| Kind::Terrain.error("map_frame", message.to_owned(), Value::Nothing))
     }
 }
 
 #[pymethods]
 impl HeightField {
     #[new]
-    #[pyo3(signature = (heights, spacing, origin = None, material = Given::MISSING),
-        text_signature = "(heights, spacing, origin=None, material='ground')")]
+    #[pyo3(signature = (heights, spacing, origin = None, material = Given::MISSING, map_frame = None),
+        text_signature = "(heights, spacing, origin=None, material='ground', map_frame=None)")]
     fn new(
         py: Python<'_>,
         heights: &Bound<'_, PyAny>,
         spacing: &Bound<'_, PyAny>,
         origin: Option<&Bound<'_, PyAny>>,
         material: Given<'_>,
+        map_frame: Option<&Bound<'_, PyAny>>,
     ) -> Result<PyClassInitializer<Self>> {
         let material = materials::name(material)?;
         let (heights, shape) = table(heights)?;
@@ -95,11 +121,56 @@ impl HeightField {
             Some(origin) => two(origin, Kind::Terrain, "origin")?,
             None => [middle(shape[1], spacing[0]), middle(shape[0], spacing[1])],
         };
-        let mut field = py.detach(|| CoreField::new(heights, shape, spacing, origin))?;
+        let mut field = py.release(|| CoreField::new(heights, shape, spacing, origin))??;
         if let Some(material) = material {
             field = field.with_material(&material);
         }
-        Ok(Self::of(Arc::new(field)))
+        let map_frame = map_frame.map(frame_of).transpose()?;
+        Ok(Self::placed(Arc::new(field), map_frame))
+    }
+
+    /// Easting and northing of the world's origin, and their change per metre; None without a map.
+    ///
+    /// Four numbers: the last two are the changes of easting along x and of northing along z.
+    #[getter]
+    fn map_frame(&self) -> Option<(f64, f64, f64, f64)> {
+        self.map_frame.map(Into::into)
+    }
+
+    /// Place (x, z), m, of a point in map coordinates.
+    ///
+    /// Args:
+    ///     easting: Easting, in the unit of the map.
+    ///     northing: Northing, in the unit of the map.
+    ///
+    /// Raises:
+    ///     TerrainError: The ground has no map coordinates, or a number is not finite.
+    fn place_of(
+        &self,
+        easting: &Bound<'_, PyAny>,
+        northing: &Bound<'_, PyAny>,
+    ) -> Result<(f64, f64)> {
+        let [e, n, per_x, per_z] = self.frame()?;
+        let easting = number(easting, Kind::Terrain, "easting")?;
+        let northing = number(northing, Kind::Terrain, "northing")?;
+        Ok(((easting - e) / per_x, (northing - n) / per_z))
+    }
+
+    /// Easting and northing of a place, in the unit of the map.
+    ///
+    /// Args:
+    ///     x: Along x, m.
+    ///     z: Along z, m.
+    ///
+    /// Raises:
+    ///     TerrainError: The ground has no map coordinates, or a number is not finite.
+    fn coordinates_of(&self, x: &Bound<'_, PyAny>, z: &Bound<'_, PyAny>) -> Result<(f64, f64)> {
+        let [e, n, per_x, per_z] = self.frame()?;
+        let (x, z) = (
+            number(x, Kind::Terrain, "x")?,
+            number(z, Kind::Terrain, "z")?,
+        );
+        Ok((e + per_x * x, n + per_z * z))
     }
 
     /// Name of its material.
@@ -146,7 +217,22 @@ impl HeightField {
         format!("HeightField({rows} x {columns} heights, spacing=({dx}, {dz}))")
     }
 
-    fn __getnewargs__(&self) -> (Array<f32>, (f64, f64), (f64, f64), &str) {
-        (self.grid(), self.spacing(), self.origin(), self.material())
+    #[allow(clippy::type_complexity)] // the arguments of `new`
+    fn __getnewargs__(
+        &self,
+    ) -> (
+        Array<f32>,
+        (f64, f64),
+        (f64, f64),
+        &str,
+        Option<(f64, f64, f64, f64)>,
+    ) {
+        (
+            self.grid(),
+            self.spacing(),
+            self.origin(),
+            self.material(),
+            self.map_frame(),
+        )
     }
 }

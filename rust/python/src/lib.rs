@@ -77,6 +77,7 @@ fn choose_instructions() -> errors::Result<()> {
 /// instructions that this machine does not have.
 pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    rover_core::caught::remember_places();
     errors::register(module)?;
     choose_instructions()?;
     module.add_class::<model::RoverModel>()?;

@@ -19,6 +19,7 @@ use crate::errors::{Kind, Result, Value};
 use crate::loops;
 use crate::machines;
 use crate::motor::{self, Motor};
+use crate::shared::Release;
 use crate::terrain::parse;
 
 /// A pair of new vectors.
@@ -694,7 +695,7 @@ impl RoverModel {
         let surface = ground.terrain();
         let q = terrain
             .py()
-            .detach(|| resting_on(&self.inner, &*surface, place, heading));
+            .release(|| resting_on(&self.inner, &*surface, place, heading))?;
         Ok(q?.into())
     }
 

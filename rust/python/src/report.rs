@@ -39,6 +39,12 @@ pub struct StepReport {
     /// Largest number of contacts in a step.
     #[pyo3(get)]
     n_contacts: usize,
+    /// Largest number of contacts in a step along whose normal closed loops let nothing move.
+    ///
+    /// Example: the wheels of a machine that is welded to a stand. Such a contact bears no load,
+    /// unless its wheel is elastic, and an overlap there cannot be removed.
+    #[pyo3(get)]
+    immovable_contacts: usize,
     /// Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.
     ///
     /// Above 1e-6 the status is "not_converged".
@@ -62,7 +68,16 @@ pub struct StepReport {
     /// Spurious energy gain of the scheme that the audit removed, summed over the steps, J.
     #[pyo3(get)]
     energy_removed: f64,
-    /// Energy dissipated by friction and impacts, summed over the steps, J.
+    /// Work of torques, motors and wrenches, summed over the steps, J.
+    #[pyo3(get)]
+    energy_supplied: f64,
+    /// Energy that commands since the last call have added to held joints, J.
+    ///
+    /// `Simulation.energy` contains it from the command on, so it is not part of the change over
+    /// the call. 0 in the first call after the state was set or restored.
+    #[pyo3(get)]
+    energy_of_set_points: f64,
+    /// Energy dissipated by friction, impacts, dampers and sand, summed over the steps, J.
     ///
     /// It can be negative with Newton's law of restitution and friction. A new contact counts as an
     /// impact if it closes faster than gravity explains.
@@ -70,14 +85,16 @@ pub struct StepReport {
     energy_dissipated: f64,
     /// Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
     ///
-    /// The change of the energy is the work of the actuators minus `energy_dissipated`,
-    /// `energy_lost` and `energy_removed`, plus `energy_lifted` and `energy_released`.
+    /// The change of the energy over the call is `energy_supplied` plus `energy_lifted` and
+    /// `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
     /// `energy_lost` therefore contains the errors of the time stepping and the work of reactions
     /// in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
     /// 0 for grains and planar soils, whose energy is not audited.
     #[pyo3(get)]
     energy_lost: f64,
-    /// Energy gained by removing penetration, less the actuators' work, sum of the steps, J.
+    /// Work against gravity and springs by removing penetration, summed over the steps, J.
+    ///
+    /// The work of the actuators on the way is part of `energy_supplied`.
     #[pyo3(get)]
     energy_lifted: f64,
     /// Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
@@ -88,12 +105,14 @@ pub struct StepReport {
     /// again.
     #[pyo3(get)]
     energy_released: f64,
-    /// Degree of static indeterminacy of the wheel loads in the last step.
+    /// Number of contacts whose impulses the motion of the last step does not determine.
     ///
-    /// 0 means that equilibrium determines the loads. Otherwise many distributions of loads satisfy
-    /// equilibrium, and micrometres of height decide between them: a rigid chassis on four rigid
-    /// wheels has degree 1. Wheels with a `stiffness` always have 0. Friction is not considered. 0
-    /// for machines other than rovers.
+    /// 0 means that the motion determines the impulses of all contacts. Otherwise other impulses
+    /// cause the same motion, and the step returns those of least norm within the cones of friction:
+    /// four corners of a box share its weight like four equal springs. Friction counts: six rigid
+    /// wheels that drive straight could push sideways against each other, so the number is 6.
+    /// Contacts that yield, such as wheels with a `stiffness`, have determined impulses. Always 0 for
+    /// grains. In a group of more than 32 rigid contacts the solver chooses among the impulses.
     #[pyo3(get)]
     undetermined_loads: usize,
 }
@@ -114,11 +133,14 @@ impl From<CoreReport> for StepReport {
             newton_iterations: inner.newton_iterations,
             residual: inner.residual,
             n_contacts: inner.n_contacts,
+            immovable_contacts: inner.immovable_contacts,
             loop_gap: inner.loop_gap,
             retaken: inner.retaken,
             fallbacks: inner.fallbacks,
             energy_gain: inner.energy_gain,
             energy_removed: inner.energy_removed,
+            energy_supplied: inner.energy_supplied,
+            energy_of_set_points: inner.energy_of_set_points,
             energy_dissipated: inner.energy_dissipated,
             energy_lost: inner.energy_lost,
             energy_lifted: inner.energy_lifted,
@@ -129,7 +151,7 @@ impl From<CoreReport> for StepReport {
 }
 
 impl StepReport {
-    /// With the number of sets of loads that equilibrium leaves open.
+    /// With the number of contacts whose impulses the motion leaves open.
     #[must_use]
     pub fn with_undetermined_loads(self, undetermined_loads: usize) -> Self {
         Self {
@@ -164,7 +186,9 @@ impl StepReport {
 pub struct Energy {
     /// Kinetic energy, J.
     kinetic: f64,
-    /// Potential energy in gravity, J, zero at the world's origin.
+    /// Potential energy in gravity, springs and the stiffness of held joints, J.
+    ///
+    /// That in gravity is zero with all mass centres at the world's origin.
     potential: f64,
     /// Sum of both, J.
     total: f64,

@@ -14,7 +14,7 @@ use crate::bed_arguments::grain_error;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::grains::GrainSimulation;
 use crate::report::{Energy, StepReport};
-use crate::shared::{Open, Shared, Watch};
+use crate::shared::{Open, Release, Shared, Watch};
 use crate::simulation::Simulation;
 use crate::snapshot::other_kind;
 use crate::stepping::{AnySimulation, Stepped};
@@ -103,7 +103,7 @@ impl Stepped for Together {
         let (mut link, mut grains) = self.open()?;
         let (moving, mut watch) = (&mut *rover, Watch::new());
         let (link, grains) = (&mut *link, &mut *grains);
-        let report = py.detach(|| link.step(moving, grains, n, &mut || watch.go_on()));
+        let report = py.release(|| link.step(moving, grains, n, &mut || watch.go_on()))?;
         Ok(watch.result(report)?.into())
     }
 

@@ -11,6 +11,7 @@ use crate::arguments::{Given, number, refused, whole};
 use crate::arrays::{Array, fresh, fresh_rows, rows};
 use crate::errors::{BorderError, Kind};
 use crate::planar_ground::quantity;
+use crate::shared::Release;
 
 /// Numbers of a soil by their names.
 struct Numbers<'py>(Bound<'py, PyMapping>);
@@ -252,13 +253,13 @@ impl WheelBed {
     ///     OptionError: `drives` has a wrong shape or an entry that is not finite.
     fn steady(&self, py: Python<'_>, drives: &Bound<'_, PyAny>) -> PyResult<Array> {
         let drives = rows::<5>(drives, "drives")?;
-        let found = py.detach(|| {
+        let found = py.release(|| {
             let runs = drives
                 .iter()
                 .map(|drive| self.bed.steady(&drive_of(*drive)));
             let runs = runs.map(|run| run.map_or([f64::NAN; 5], listed));
             runs.collect::<Vec<_>>()
-        });
+        })?;
         Ok(fresh_rows(found))
     }
 

@@ -5,6 +5,7 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
+use rover_core::caught::caught;
 
 use crate::errors::{BorderError, Result};
 
@@ -31,6 +32,21 @@ impl<T> Open<T> for Shared<T> {
             Err(TryLockError::Poisoned(inner)) => Ok(inner.into_inner()),
             Err(TryLockError::WouldBlock) => Err(BorderError::busy()),
         }
+    }
+}
+
+/// Long work without the interpreter lock.
+pub trait Release {
+    /// Releases the lock for a piece of work.
+    ///
+    /// # Errors
+    /// `InternalError`: it panicked.
+    fn release<T: Send>(self, work: impl FnOnce() -> T + Send) -> Result<T>;
+}
+
+impl Release for Python<'_> {
+    fn release<T: Send>(self, work: impl FnOnce() -> T + Send) -> Result<T> {
+        Ok(self.detach(|| caught(work))?)
     }
 }
 

@@ -27,7 +27,7 @@ use crate::options::{Options, SolverWords, settings};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::sand::sand_to_dict;
-use crate::shared::{Open, Shared, Watch};
+use crate::shared::{Open, Release, Shared, Watch};
 use crate::stepping::{AnySimulation, Problem, problem};
 use crate::{terrain, union};
 
@@ -478,8 +478,9 @@ impl Simulation {
     ///     damping: Damping of the controllers, N m s/rad; the model's by default.
     ///
     /// Raises:
-    ///     CommandError: There is no such joint, the number of set-points differs, or a number is
-    ///         negative or not finite. Nothing has changed.
+    ///     CommandError: There is no such joint, the number of set-points differs, a number is
+    ///         negative or not finite, or neither model nor arguments give a stiffness or a
+    ///         damping. Nothing has changed.
     #[pyo3(signature = (joints, set_points = None, *, stiffness = None, damping = None))]
     fn hold(
         &self,
@@ -514,8 +515,13 @@ impl Simulation {
     }
 
     /// Holds all wheels at their present angles, as `hold` does, and sets their torques to 0.
+    ///
+    /// Raises:
+    ///     CommandError: The model states no gains to hold a wheel. Nothing has changed.
     fn brake(&self) -> Result<()> {
-        self.open()?.brake();
+        let mut open = self.open()?;
+        open.check_brakes()?;
+        open.brake();
         Ok(())
     }
 
@@ -682,7 +688,7 @@ impl Simulation {
         let inner = &*held;
         Ok(met(&origins
             .py()
-            .detach(|| inner.cast(&rays, range, &seen))))
+            .release(|| inner.cast(&rays, range, &seen))?))
     }
 
     /// Momentum of the rover.
@@ -766,8 +772,7 @@ impl Simulation {
         let inner = &*held;
         let parameters = named_parameters(inner, parameters)?;
         let perturbation = check.then_some(perturbation);
-        let found = py.detach(|| inner.linearise(&parameters, perturbation));
-        let found = found?;
+        let found = py.release(|| inner.linearise(&parameters, perturbation))??;
         Ok(Linearisation::new(&self.model, found))
     }
 
@@ -834,7 +839,7 @@ impl Simulation {
             steps: shape[1],
             parameters: &parameters,
         };
-        let found = py.detach(|| batch.take(inner, threads, &mut || watch.go_on()));
+        let found = py.release(|| batch.take(inner, threads, &mut || watch.go_on()))?;
         let found = watch.result(found.map_err(of_trajectory))?;
         let sizes = [nx, nu, parameters.len()];
         Ok(StepDerivatives::new(&found, shape[1], sizes))
@@ -856,7 +861,7 @@ impl Simulation {
         let steps = n.count(1000, Kind::Option, "n")?;
         let (held, mut watch) = (self.open()?, Watch::new());
         let inner = &*held;
-        let stopwatch = py.detach(|| inner.profile(steps, &mut || watch.go_on()));
+        let stopwatch = py.release(|| inner.profile(steps, &mut || watch.go_on()))?;
         let stopwatch = watch.result(stopwatch)?;
         let parts = PyDict::new(py);
         for (phase, microseconds) in stopwatch.microseconds() {

@@ -17,7 +17,7 @@ pub trait KeptScene: Scene {
     fn keep(snapshot: SnapshotOf<Self>) -> AnySnapshot;
     /// The snapshot, if it is of such a scene.
     fn kept(kept: &AnySnapshot) -> Option<&SnapshotOf<Self>>;
-    /// Independent sets of wheel loads that balance one another in the last step.
+    /// Contacts whose impulses the motion of the last step leaves open.
     fn undetermined_loads(_: &Simulation<Self>) -> usize {
         0
     }
@@ -49,7 +49,13 @@ kept_scene!(
         rover.undetermined_loads()
     }
 );
-kept_scene!(PlanarScene, Planar);
+kept_scene!(
+    PlanarScene,
+    Planar,
+    fn undetermined_loads(machine: &Simulation<Self>) -> usize {
+        machine.undetermined_loads()
+    }
+);
 kept_scene!(GrainBed<2>, Disks);
 kept_scene!(GrainBed<3>, Balls);
 

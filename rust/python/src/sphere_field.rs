@@ -14,6 +14,7 @@ use crate::arrays::{Array, fresh_rows, one_or_two, rows, vector};
 use crate::errors::{Kind, Result};
 use crate::materials;
 use crate::plane::Plane;
+use crate::shared::Release;
 use crate::terrain::{Terrain, parse};
 
 /// A plane, or none.
@@ -75,7 +76,7 @@ impl SphereField {
         let centres = rows::<3>(centres, "centres")?;
         let radii = vector(radii, Kind::Terrain, "radii")?;
         let ground = plane(ground)?;
-        let field = py.detach(|| CoreField::new(&centres, &radii, ground))?;
+        let field = py.release(|| CoreField::new(&centres, &radii, ground))??;
         Ok(made(field, material))
     }
 
@@ -152,10 +153,10 @@ impl SphereField {
             ground: plane,
         };
         given.finish()?;
-        let field = py.detach(|| match ground {
+        let field = py.release(|| match ground {
             None | Some(DrawnGround::Plane(_)) => CoreField::rocks(&rocks),
             Some(other) => CoreField::rocks_on(&rocks, &*other.terrain()),
-        })?;
+        })??;
         Ok(Py::new(py, made(field, material))?)
     }
 

@@ -12,7 +12,7 @@ use crate::arguments::count;
 use crate::arrays::{Array, fresh, fresh_matrix};
 use crate::errors::{Kind, Result};
 use crate::report::{Energy, StepReport};
-use crate::shared::{Open, Shared, Watch};
+use crate::shared::{Open, Release, Shared, Watch};
 use crate::snapshot::{KeptScene, Snapshot, other_kind, snapshot};
 
 /// Base class of all simulations. It cannot be instantiated.
@@ -50,7 +50,7 @@ where
     fn step(&self, py: Python<'_>, n: usize) -> Result<StepReport> {
         let mut held = self.open()?;
         let (inner, mut watch) = (&mut *held, Watch::new());
-        let done = py.detach(|| inner.step_while(n, &mut || watch.go_on()));
+        let done = py.release(|| inner.step_while(n, &mut || watch.go_on()))?;
         let report = StepReport::from(watch.result(done)?);
         Ok(report.with_undetermined_loads(S::undetermined_loads(&held)))
     }

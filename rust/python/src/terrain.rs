@@ -11,6 +11,7 @@ use crate::arguments::{Given, refused};
 use crate::arrays::{Array, rows};
 use crate::errors::{Kind, Result};
 use crate::rays::{Met, met, rays};
+use crate::shared::Release;
 
 /// Base class of all grounds. Immutable.
 ///
@@ -98,7 +99,7 @@ impl Terrain {
     ) -> Result<Met> {
         let (terrain, (rays, range)) =
             (self.ground.terrain(), rays(origins, directions, max_range)?);
-        let hits = py.detach(|| ray::cast(&*terrain, &rays, range));
+        let hits = py.release(|| ray::cast(&*terrain, &rays, range))?;
         Ok(met(&hits))
     }
 }

@@ -10,6 +10,7 @@ use crate::arguments::{Given, refused};
 use crate::arrays::{Array, array, fresh_rows, rows};
 use crate::errors::{Kind, Result};
 use crate::materials;
+use crate::shared::Release;
 use crate::terrain::Terrain;
 
 /// A triangle mesh as fixed ground, for instance a rock. Immutable.
@@ -72,7 +73,7 @@ impl TriangleMesh {
         let material = materials::name(material)?;
         let vertices = rows::<3>(vertices, "vertices")?;
         let triangles = indices(triangles)?;
-        let mut mesh = py.detach(|| CoreMesh::new(&vertices, &triangles))?;
+        let mut mesh = py.release(|| CoreMesh::new(&vertices, &triangles))??;
         if let Some(material) = material {
             mesh = mesh.with_material(&material);
         }

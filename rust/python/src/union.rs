@@ -31,7 +31,12 @@ pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> Result<Bound<'py, P
 /// Several terrains combined, for instance a map with rocks on it. Immutable.
 ///
 /// A rover can touch each of them. With a plane the ground is known everywhere; otherwise it is
-/// known where a height field has data.
+/// known where the parts together have it: height fields, and meshes beside them.
+///
+/// Where parts meet, their borders are no edges: a box slides from one to the next, and a ridge
+/// between them is one ridge. Parts meet within 1e-5 of the length of an edge. Where they coincide,
+/// a contact counts once, with the material of the first. What lies inside another part is not
+/// touched.
 ///
 /// Args:
 ///     parts: Terrains of any kind, at least one; at most one of them may have a plane.

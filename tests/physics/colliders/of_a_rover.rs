@@ -33,6 +33,7 @@ fn with_hulls() -> ModelDescription {
             rotation: None,
             collides: true,
             material: None,
+            colour: None,
             visible: true,
             mass: None,
         }];

@@ -36,6 +36,7 @@ pub fn machine(solids: Vec<SolidDescription>) -> ModelDescription {
         tracks: Vec::new(),
         tags: Vec::new(),
         loops: Vec::new(),
+        materials: Vec::new(),
         machines: Vec::new(),
     }
 }

@@ -407,7 +407,11 @@ fn check(model: &Model, rover: &Rover, step: Step, found: &Found) -> bool {
         return false;
     };
     assert!(!found.falls_back);
-    assert_close("geometry", &found.geometry, &right.geometry, 1e-13);
+    // On planes and surfaces one formula serves both: a restored rover, which finds by one way what
+    // it found by the other, once went on with other bits.
+    let is_one = !rover.terrain.can_be_passed();
+    let tolerance = if is_one { 0.0 } else { 1e-13 };
+    assert_close("geometry", &found.geometry, &right.geometry, tolerance);
     assert_close("velocity before", &found.u_before, &right.u_before, 1e-12);
     assert_close("operator", &found.operator, &right.operator, 1e-12);
     assert_close("local velocity", &found.local, &right.local, 1e-12);

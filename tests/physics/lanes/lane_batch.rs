@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use rover_core::geometry::{Plane, SphereField, Terrain};
-use rover_core::integrator::{StepError, StepOptions, moreau_jean::MoreauJean};
+use rover_core::integrator::{StepError, StepOptions, StepReport, moreau_jean::MoreauJean};
 use rover_core::multibody::description::{LoopDescription, LoopKind};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::scalar::Instructions;
@@ -171,6 +171,50 @@ pub fn drive_all(
             assert_eq!(error.is_some(), errors[k].is_some());
             assert_alike(a, b);
         }
+    }
+}
+
+/// Change of the energy that the entries of a report add up to, with that of moved set-points, J.
+fn explained(report: &StepReport) -> f64 {
+    let given = report.energy_supplied + report.energy_of_set_points;
+    let given = given + report.energy_released + report.energy_lifted;
+    given - report.energy_dissipated - report.energy_lost - report.energy_removed
+}
+
+/// Springs, held joints and the work of the actuators were in no entry of the report, and the
+/// projection released what it had stored in springs.
+#[test]
+fn the_entries_of_a_report_add_up_to_the_change_of_the_energy() {
+    for (model, seed) in models().iter().zip(0..) {
+        let mut numbers = Random(seed);
+        let mut rovers: Vec<_> = (0..7).map(|i| rover(i, model, &mut numbers)).collect();
+        let mut batch = LaneBatch::new(Instructions::of_this_machine());
+        let mut before: Vec<Option<f64>> = vec![None; rovers.len()];
+        let mut lifted = 0.0;
+        for _ in 0..6 {
+            for own in &mut rovers {
+                command(own, 60.0, &mut numbers);
+            }
+            let mut errors: Vec<Option<StepError>> = vec![None; rovers.len()];
+            let mut entries: Vec<BatchRover<'_>> = (rovers.iter_mut().zip(&mut errors))
+                .map(|(rover, error)| BatchRover { rover, error })
+                .collect();
+            batch.advance(&mut entries, 10, &mut || true);
+            for ((own, before), error) in rovers.iter().zip(&mut before).zip(&errors) {
+                let (energy, report) = (own.energy(), own.last_report());
+                let size = energy.kinetic + energy.potential.abs() + report.energy_supplied.abs();
+                if let Some(before) = before.filter(|_| error.is_none()) {
+                    let unexplained = energy.total() - before - explained(report);
+                    assert!(
+                        unexplained.abs() < 1e-9 * size,
+                        "{seed}: {unexplained} {report:?}"
+                    );
+                }
+                lifted += report.energy_lifted;
+                *before = Some(energy.total());
+            }
+        }
+        assert!(lifted > 0.0, "{seed}");
     }
 }
 

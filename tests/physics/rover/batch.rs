@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
-use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
-use rover_core::integrator::StepOptions;
+use nalgebra::Vector3;
+use rover_core::geometry::{Hit, Plane, Primitive, Ray, Rocks, Sphere, SphereField, Terrain};
+use rover_core::integrator::{StepError, StepOptions};
 use rover_core::multibody::{Configuration, Model};
+use rover_core::nalgebra;
 use rover_core::simulation::{
     Batch, BatchError, CommandError, ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation,
 };
@@ -287,4 +289,109 @@ fn the_work_of_the_motors_is_the_energy_gained() {
     // The steering joints' PD controllers dissipate less than a hundredth.
     assert!((last.positive_work / gained - 1.0).abs() < 0.01);
     assert!((last.work - last.positive_work).abs() <= 1e-12 * last.work);
+}
+
+/// A plane beside a ball far away that panics when asked for what lies beyond x = 0.5 m.
+struct Mined(SphereField);
+
+impl Mined {
+    fn new() -> Self {
+        let far = [[0.0, -50.0, 0.0]];
+        Self(SphereField::new(&far, &[1.0], Some(Plane::ground())).unwrap())
+    }
+
+    fn check(x: f64) {
+        assert!(x < 0.5, "a mine at x = 0.5");
+    }
+}
+
+impl Terrain for Mined {
+    fn visit_near(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        Self::check(centre.x);
+        self.0.visit_near(centre, reach, visit);
+    }
+
+    fn visit_spheres(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Sphere),
+    ) {
+        Self::check(centre.x);
+        self.0.visit_spheres(centre, reach, visit);
+    }
+
+    fn primitive(&self, id: u32) -> Primitive {
+        self.0.primitive(id)
+    }
+
+    fn n_primitives(&self) -> u32 {
+        self.0.n_primitives()
+    }
+
+    fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        self.0.first_hit(ray, reach)
+    }
+
+    fn height(&self, x: f64, z: f64) -> Option<f64> {
+        self.0.height(x, z)
+    }
+
+    fn ground(&self) -> Option<&Plane> {
+        self.0.ground()
+    }
+}
+
+/// A panic in one rover's step ended the process of all.
+#[test]
+fn a_rover_whose_step_panics_is_reported_and_the_others_of_its_batch_go_on() {
+    let model = Arc::new(Model::rover());
+    let ground: Arc<dyn Terrain> = Arc::new(Mined::new());
+    let made = |i: usize| {
+        let options = StepOptions::default();
+        let mut own = RoverSimulation::new(model.clone(), ground.clone(), options).unwrap();
+        let mut start = Configuration::zero(&model);
+        (start.position.x, start.position.y) = (-0.9 - 0.3 * i as f64, 0.3);
+        let mut v = vec![0.0; model.nv()];
+        v[0] = 3.0;
+        own.set_state(start, v);
+        own
+    };
+    let n = 9;
+    let mut alone: Vec<_> = (0..n).map(made).collect();
+    let rovers: Vec<_> = (0..n).map(made).collect();
+    for threads in [1, 3] {
+        let mut batch = Batch::new(rovers.clone(), SCAN.to_vec(), Some(threads)).unwrap();
+        let mut own = alone.clone();
+        let mut rows = vec![0.0; n * batch.layout().size()];
+        let (torques, set_points) = (vec![20.0; 6 * n], vec![0.0; 6 * n]);
+        for _ in 0..4 {
+            batch
+                .step(&torques, &set_points, 20, None, &mut rows)
+                .unwrap();
+            for (i, own) in own.iter_mut().enumerate() {
+                own.set_wheel_torques(&[20.0; 6]).unwrap();
+                let (taken, found) = (own.step(20), &batch.rovers()[i]);
+                assert_eq!(bits(own.v()), bits(found.v()), "rover {i}");
+                assert_eq!(own.state(), found.state(), "rover {i}");
+                assert_eq!(taken.err(), batch.errors()[i], "rover {i}");
+            }
+        }
+        let failed = |i: usize| match &batch.errors()[i] {
+            Some(StepError::Internal { fault, .. }) => fault.message.contains("a mine"),
+            _ => false,
+        };
+        assert!(failed(0) && !failed(n - 1));
+    }
+    // It goes on elsewhere.
+    let first = &mut alone[0];
+    assert!(first.step(200).is_err());
+    let (q, v) = (made(n).q().clone(), vec![0.0; model.nv()]);
+    first.set_state(q, v);
+    assert!(first.step(20).unwrap().is_converged());
 }

@@ -55,6 +55,7 @@ fn hubbed() -> ModelDescription {
         rotation: None,
         collides: false,
         material: None,
+        colour: None,
         visible: true,
         mass: Some(solid.mass / 4.0),
     };

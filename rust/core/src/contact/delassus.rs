@@ -32,6 +32,12 @@ pub struct ContactSystem {
     spans: Vec<Range<usize>>,
     /// Velocities along the union of two paths, ascending, with Z.
     unions: Vec<(usize, Triple<f64>)>,
+    /// Directions in which closed loops let nothing move each contact; empty if there are none.
+    held: Vec<[bool; 3]>,
+    /// Z over all velocities (n_c, nv), of a machine with loops, and entries of W's diagonal whose
+    /// rows are zero.
+    spread: Vec<Triple<f64>>,
+    closings: Vec<(usize, f64)>,
     /// One entry a velocity (nv), while a union is assembled.
     full: Vec<Triple<f64>>,
 }
@@ -48,6 +54,9 @@ impl ContactSystem {
             bodies: Vec::with_capacity(n),
             spans: Vec::new(),
             unions: Vec::new(),
+            held: Vec::new(),
+            spread: Vec::new(),
+            closings: Vec::new(),
             full: Vec::new(),
         }
     }
@@ -85,7 +94,7 @@ impl ContactSystem {
             match contact.part {
                 Part::Limit(..) => close_stop(&mut own),
                 Part::Friction(_) => joint_friction::close(&mut own),
-                Part::Wheel(_) if rollers::rollers_of(model, contact).is_some() => {
+                Part::Wheel(_) if rollers::has_a_row_of_its_own(model, contact) => {
                     rollers::close(&mut own);
                 }
                 Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) | Part::Collider(_) => {}
@@ -107,10 +116,100 @@ impl ContactSystem {
     pub fn soften(&mut self, diagonal: impl Iterator<Item = f64>) {
         let size = 3 * self.n_contacts();
         for (c, term) in diagonal.enumerate() {
-            for i in 3 * c..3 * (c + 1) {
-                self.W[i * (size + 1)] += term;
+            for k in 0..3 {
+                let own = &mut self.W[(3 * c + k) * (size + 1)];
+                // Of a row that is held only this is left.
+                let is_held = term > 0.0 && self.held.get(c).is_some_and(|held| held[k]);
+                *own = if is_held { term } else { *own + term };
             }
         }
+    }
+
+    /// Begins with Z over all velocities, zero off each contact's path.
+    pub(crate) fn spread(&mut self, model: &Model) {
+        let nv = model.nv();
+        let mut spread = std::mem::take(&mut self.spread);
+        spread.clear();
+        spread.resize(self.n_contacts() * nv, [0.0; 3]);
+        for (c, rows) in spread.chunks_exact_mut(nv).enumerate() {
+            for (k, z) in self.entries(model, c) {
+                rows[k] = *z;
+            }
+        }
+        self.spread = spread;
+    }
+
+    /// The rows of a contact after [`Self::spread`] (nv).
+    pub(crate) fn spread_rows(&mut self, model: &Model, c: usize) -> &mut [Triple<f64>] {
+        &mut self.spread[c * model.nv()..][..model.nv()]
+    }
+
+    /// Squares of their lengths, 1/kg.
+    pub(crate) fn squares(&self, model: &Model, c: usize) -> Triple<f64> {
+        let rows = &self.spread[c * model.nv()..][..model.nv()];
+        [0, 1, 2].map(|k| rows.iter().map(|z| z[k] * z[k]).sum())
+    }
+
+    /// Makes the rows of H zero along directions in which nothing moves a contact. `free`: their
+    /// squares without loops, 1/kg. On its diagonal W has the largest of these there, so that it is
+    /// regular and the impulses are zero.
+    pub(crate) fn hold(&mut self, model: &Model, c: usize, free: &Triple<f64>, held: [bool; 3]) {
+        let (nv, size) = (model.nv(), 3 * self.n_contacts());
+        self.held.push(held);
+        for k in (0..3).filter(|k| held[*k] || free[*k] <= 0.0) {
+            let own = &mut self.W[(3 * c + k) * (size + 1)];
+            self.closings.push((
+                3 * c + k,
+                if held[k] {
+                    free[0].max(free[1]).max(free[2])
+                } else {
+                    *own
+                },
+            ));
+        }
+        if !held.contains(&true) {
+            return;
+        }
+        let (union, path) = match self.spans.get(c) {
+            Some(span) if !span.is_empty() => (span.clone(), 0),
+            _ => (0..0, model.path(self.bodies[c]).len()),
+        };
+        let of_union = self.unions[union].iter_mut().map(|(_, z)| z);
+        let rows = (self.Z[c * self.stride..][..path].iter_mut()).chain(of_union);
+        for z in rows.chain(&mut self.spread[c * nv..][..nv]) {
+            for k in 0..3 {
+                z[k] = if held[k] { 0.0 } else { z[k] };
+            }
+        }
+        for k in (0..3).filter(|k| held[*k]) {
+            self.u[3 * c + k] = 0.0;
+        }
+    }
+
+    /// W of the spread rows, once all have been given to [`Self::hold`].
+    pub(crate) fn multiply_spread(&mut self, model: &Model) {
+        let (nv, n) = (model.nv(), self.n_contacts());
+        let rows = |c: usize| &self.spread[c * nv..][..nv];
+        for c in 0..n {
+            for d in 0..=c {
+                let block = product(0.0, rows(c), rows(d));
+                for (i, row) in block.chunks_exact(3).enumerate() {
+                    for (j, w) in row.iter().enumerate() {
+                        let (i, j) = (3 * c + i, 3 * d + j);
+                        self.W[i * 3 * n + j] = *w;
+                        self.W[j * 3 * n + i] = *w;
+                    }
+                }
+            }
+        }
+        for (i, own) in self.closings.drain(..) {
+            self.W[i * (3 * n + 1)] = own;
+        }
+    }
+
+    /// Whether nothing moves a contact along its normal.
+    pub(crate) fn is_immovable(&self, c: usize) -> bool {
+        self.held.get(c).is_some_and(|held| held[0])
     }
 
     /// [`Self::assemble`] without W, which stays what it was.
@@ -128,6 +227,7 @@ impl ContactSystem {
             kinematics,
             v,
         };
+        self.held.clear();
         self.bodies.clear();
         self.bodies.extend(contacts.iter().map(|c| c.body));
         self.spans.clear();
@@ -284,9 +384,10 @@ impl ContactSystem {
         v: &[f64],
         out: &mut [f64],
     ) {
-        for (contact, values) in contacts.iter().zip(out.chunks_exact_mut(3)) {
+        for (c, (contact, values)) in contacts.iter().zip(out.chunks_exact_mut(3)).enumerate() {
+            let held = self.held.get(c).copied().unwrap_or_default();
             if let Some((k, sign, row)) = limit::joint_row(model, contact) {
-                values[row] += sign * v[k];
+                values[row] += if held[row] { 0.0 } else { sign * v[k] };
                 continue;
             }
             let velocity = relative_velocity(
@@ -297,8 +398,8 @@ impl ContactSystem {
                 },
                 contact,
             );
-            for (value, d) in values.iter_mut().zip(contact.frame.rows()) {
-                *value += velocity.dot(&d);
+            for ((value, d), held) in values.iter_mut().zip(contact.frame.rows()).zip(held) {
+                *value += if held { 0.0 } else { velocity.dot(&d) };
             }
         }
     }

@@ -7,7 +7,7 @@ use super::body_motion::{BodyMotion, Still};
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, ON_SURFACE, Opposite};
 use super::part::{Part, wheel_shape};
-use super::ways_out::{OverSurfaces, WaysOut};
+use super::ways_out::{OverSurfaces, TOUCH, WaysOut};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
     SurfacePoint, box_sphere, disc_sphere, dispatch, is_lowest, roller_sphere, sphere_sphere,
@@ -75,7 +75,7 @@ pub(crate) fn detect_parts<S: BodyMotion>(
     let mut gate = Gate {
         machine,
         activation,
-        reach: activation.reach(),
+        reach: activation.hover,
         can_be_passed: terrain.can_be_passed(),
         unknown: None,
         ways: WaysOut::default(),
@@ -103,6 +103,41 @@ pub fn deepest_overlap(model: &Model, kinematics: &Kinematics, terrain: &dyn Ter
     );
     let gaps = contacts.iter().map(|contact| contact.gap);
     gaps.fold(0.0, f64::min)
+}
+
+/// Distance from the ground up to which a part at the midpoint of its step can be in contact, m.
+///
+/// The forecast follows material points, but only motion of the shape brings it to the ground: a
+/// wheel that spins about its axle stays where it is, and a ball however it turns.
+#[inline]
+fn reach_of<S: BodyMotion>(placed: &Placed<'_>, motion: &S, activation: &Activation) -> f64 {
+    if activation.lead.abs() > 0.0 {
+        let speed = fastest_way(&placed.shape, placed.body, motion);
+        activation.hover.max(activation.lead.abs() * speed)
+    } else {
+        activation.hover
+    }
+}
+
+/// Upper bound on the speed at which any place of the surface of a body's shape moves along its
+/// normal, m/s.
+pub(super) fn fastest_way<S: BodyMotion>(shape: &PlacedShape<'_>, body: usize, motion: &S) -> f64 {
+    let centre = shape.centre();
+    let velocity = motion.point_velocity(body, &centre);
+    let beside = |arm: Vector3<f64>| {
+        (motion.point_velocity(body, &(centre + arm)) - velocity).norm_squared()
+    };
+    let square = match shape {
+        PlacedShape::Disc(disc) => beside(disc.axle),
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => beside(roller.core.axle),
+        PlacedShape::Sphere(_) => 0.0,
+        // Of ω × e along three axes.
+        PlacedShape::Box(_) | PlacedShape::Ellipsoid(_) | PlacedShape::Hull(_) => {
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+            0.5 * axes.into_iter().map(beside).sum::<f64>()
+        }
+    };
+    velocity.norm() + square.sqrt() * shape.bound()
 }
 
 /// Admits the candidates that become contacts.
@@ -220,12 +255,17 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
         shape: part.place_at(model, (&R, &r)),
     };
     let (centre, bound) = (placed.shape.centre(), placed.shape.bound());
+    gate.reach = reach_of(&placed, middle, gate.activation);
     let (half_way, motion) = if gate.can_be_passed {
         let (R_end, r_end) = end.pose(body);
         let half_way = end.origin(body) - base + (r_end + R_end * part.centre(model)) - centre;
         let turning = match &placed.shape {
             // Wheels and balls are treated as round; the sweep of others includes their rotation.
             PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => 0.0,
+            PlacedShape::Cylinder(own) => {
+                let axle = &own.core.axle;
+                (R_end * R.tr_mul(axle) - axle).norm() * bound
+            }
             _ => (R_end - R).norm() * bound,
         };
         (half_way, half_way.norm() + turning)
@@ -242,6 +282,7 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
     let first = gate.out.len();
     let shallow = OverSurfaces::shallow(&placed.shape);
     gate.ways.clear();
+    let may_overlap = terrain.may_overlap();
     terrain.visit_around(&around, &mut |id, primitive| match primitive {
         Primitive::Plane(plane) => {
             dispatch::visit_on_plane(&placed.shape, plane, base, gate.reach, |point| {
@@ -259,8 +300,8 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
             });
         }
         piece => {
-            let piece = (terrain, id, piece);
-            visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
+            let (piece, reach) = ((terrain, id, piece), gate.reach.max(TOUCH));
+            visit_on_surface(&placed.shape, piece, base, reach, |point| {
                 gate.ways.add(id, point, shallow);
                 gate.offer(&placed, &on_surface(point), id);
             });
@@ -275,7 +316,34 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
         };
         gate.keep_ways_out(first, &part);
     }
+    if may_overlap && gate.out.len() - first > 1 {
+        drop_copies(gate.out, first, SAME * bound);
+    }
 }
+
+/// Of the contacts from the `first` on, leaves out those that an earlier one equals, as where parts
+/// of the ground coincide: at the same point and gap, within a distance (m).
+#[cold]
+fn drop_copies(contacts: &mut Vec<Contact>, first: usize, within: f64) {
+    let mut kept = first;
+    for k in first..contacts.len() {
+        let own = contacts[k];
+        let is_same = |other: &Contact| {
+            (own.point - other.point).norm() <= within
+                && (own.gap - other.gap).abs() <= within
+                && (own.frame.n - other.frame.n).norm() <= SAME
+        };
+        if !contacts[first..kept].iter().any(is_same) {
+            contacts[kept] = own;
+            kept += 1;
+        }
+    }
+    contacts.truncate(kept);
+}
+
+/// Difference of two contacts of a part that are the same, in bounding radii, and of their normals:
+/// as parts of a ground meet.
+const SAME: f64 = 1e-5;
 
 /// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
 ///
@@ -296,8 +364,15 @@ pub(crate) fn visit_on_surface(
         terrain,
         base,
     };
-    let overlaps =
-        |point: &SurfacePoint| point.gap >= -shallow || part.overlaps((id, piece), point, &still);
+    let is_covered = |point: &SurfacePoint| {
+        terrain.may_overlap() && {
+            let place = base + point.point - point.n * point.gap;
+            terrain.is_buried(id, &place, &point.n)
+        }
+    };
+    let overlaps = |point: &SurfacePoint| {
+        (point.gap >= -shallow || part.overlaps((id, piece), point, &still)) && !is_covered(point)
+    };
     match piece {
         Primitive::Face(face) => dispatch::visit_on_face(shape, face, base, reach, |point| {
             if overlaps(point) {
@@ -311,7 +386,8 @@ pub(crate) fn visit_on_surface(
         }),
         Primitive::Vertex(vertex) => {
             let near = dispatch::point_at_vertex(shape, vertex, base);
-            let is_near = near.gap <= reach && vertex.admits(&near.n);
+            let is_pushing = near.gap <= reach && dispatch::pushes(vertex, shape, &near.n);
+            let is_near = is_pushing && !is_covered(&near);
             let within = || vertex.place - vertex.inward() * near.gap;
             if is_near && (overlaps(&near) || terrain.is_inside(id, &within())) {
                 visit(&near);

@@ -4,7 +4,9 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::PlacedShape;
+use crate::geometry::query::disc_plane::rolling;
 use crate::geometry::query::{PairPoint, SurfacePoint};
+use crate::scalar::Vec3;
 
 /// Right-handed orthonormal frame in world axes; `b = t × n`, so `(t, n, b)` corresponds to (x, y,
 /// z).
@@ -26,10 +28,9 @@ impl ContactFrame {
     #[inline]
     #[must_use]
     pub fn of_wheel(n: &Vector3<f64>, s: &Vector3<f64>, spoke: &Vector3<f64>) -> Self {
-        let across = n.cross(s);
-        let length = across.norm();
+        let (rolling, length) = rolling(Vec3::from(*n), Vec3::from(*s));
         let t = if length > PARALLEL {
-            across / length
+            rolling.into()
         } else {
             (spoke - n * n.dot(spoke)).normalize()
         };

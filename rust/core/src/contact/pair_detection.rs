@@ -7,6 +7,7 @@
 
 use super::activation::Activation;
 use super::body_motion::{BodyMotion, Still};
+use super::detection::fastest_way;
 use super::frame::ContactFrame;
 use super::jacobian::relative_velocity;
 use super::pair::{Contact, ContactKey, OtherSide};
@@ -50,8 +51,6 @@ fn can_touch(model: &Model, a: Part, b: Part) -> bool {
 
 /// Adds the contacts between bodies of a configuration with velocity `v` (nv) to `out`;
 /// `kinematics` as for [`super::detect`].
-///
-/// `activation.margin` bounds the speed of one body; two come together at up to twice that.
 pub fn detect_pairs(
     model: &Model,
     kinematics: &Kinematics,
@@ -84,22 +83,28 @@ pub(crate) fn detect_pairs_of(
     if parts.is_empty() {
         return;
     }
-    let reach = activation.hover.max(2.0 * activation.margin);
+    let reach = activation.hover;
     let first_origin = motion.origin(parts[0].body(model));
     balls.clear();
     balls.extend(parts.iter().map(|part| {
         let body = part.body(model);
         let shift = motion.origin(body) - first_origin;
         let (R, r) = motion.pose(body);
+        let way = match activation.lead.abs() {
+            lead if lead > 0.0 => lead * fastest_way(&part.place_at(model, (&R, &r)), body, motion),
+            _ => 0.0,
+        };
         Sphere {
             centre: r + R * part.centre(model) + shift,
-            radius: part.bound(model),
+            radius: part.bound(model) + way,
         }
     }));
     let is_wanted = |i: usize, j: usize| can_touch(model, parts[i], parts[j]);
     for &(i, j) in sweep.pairs(balls, reach, is_wanted) {
         // Wheels come first, so a contact that involves a wheel belongs to the wheel.
         let (part, other) = (parts[i as usize], parts[j as usize]);
+        let ways = [i, j].map(|k| balls[k as usize].radius - parts[k as usize].bound(model));
+        let reach = reach.max(ways[0] + ways[1]);
         let other = OtherSide {
             part: other,
             body: other.body(model),

@@ -8,7 +8,8 @@
 //! their depth. The part is moved out along the normal of each that counts, by its depth; a deeper
 //! point that is then no longer in the ground was only in the way. The smallest overlap always
 //! counts. A part that has just touched has overlaps as large as its motion since then, and the
-//! points that count are no deeper.
+//! points that count are no deeper. A place that the part touches without an overlap is a way out
+//! like the others: rounding must not decide whether the part is free there.
 //!
 //! Up is a way out too, whatever the slopes. A point that is out of the ground when the part is
 //! raised by three quarters of the overlap is deep behind a piece that it does not touch, such as
@@ -26,6 +27,10 @@ const MOST: usize = 24;
 /// Depth, in bounding radii of the shape, up to which every point counts.
 pub(crate) const SHALLOW: f64 = 1e-3;
 
+/// Largest gap at which a part touches a surface, m: a point of a part that is no further above the
+/// ground may count as in it by rounding, and what the part touches there is the way out.
+pub(crate) const TOUCH: f64 = 2e-9;
+
 /// How far a part is moved out, in depths: where the other point is much deeper, so far that what
 /// the part overlaps beside the first point is left behind too.
 const OUT: [f64; 2] = [1.001, 3.0];
@@ -41,6 +46,10 @@ const ROUNDING: f64 = 1e-8;
 /// and 8; with a fraction of ½, 33 move further, with 1 a single one. But a point that is nearly as
 /// deep as the part must rise may be the only one that holds it.
 const FAR_UP: f64 = 0.75;
+
+/// Places behind an edge that are looked at for unbroken ground: on spiky maps of single cells the
+/// way behind a steep edge leaves the ground again within a cell or two.
+const PLACES: usize = 12;
 
 /// Bisections for the height by which a part must rise: to 1e-9 of its overlap.
 const BISECTIONS: usize = 30;
@@ -65,6 +74,30 @@ impl OverSurfaces<'_> {
         point: &SurfacePoint,
         shift: &Vector3<f64>,
     ) -> bool {
+        let behind = || self.behind((id, piece), point);
+        self.overlaps_after((id, piece), point, shift, behind)
+    }
+
+    /// The furthest place behind an edge, up to the depth of a point there, to which the ground is
+    /// unbroken. Beyond the far side of a steep ridge there may be a valley, with the part in it, and
+    /// then ground again.
+    fn behind(&self, (id, piece): (u32, &Primitive), point: &SurfacePoint) -> Vector3<f64> {
+        let Primitive::Edge(edge) = piece else {
+            return Vector3::zeros();
+        };
+        let [top, deepest] = edge.behind(&point.n, &(self.base + point.point));
+        let places = (1..=PLACES).map(|k| top + (deepest - top) * (k as f64 / PLACES as f64));
+        let inside = places.take_while(|x| self.terrain.is_inside(id, x));
+        inside.last().unwrap_or(edge.start)
+    }
+
+    fn overlaps_after(
+        &self,
+        (id, piece): (u32, &Primitive),
+        point: &SurfacePoint,
+        shift: &Vector3<f64>,
+        behind: impl FnOnce() -> Vector3<f64>,
+    ) -> bool {
         let origin = self.base + shift;
         let is_inside = |x: &Vector3<f64>| self.terrain.is_inside(id, x);
         let is_in_ground = || is_inside(&(origin + point.point));
@@ -75,15 +108,7 @@ impl OverSurfaces<'_> {
         match (piece, self.shape) {
             (Primitive::Face(face), _) => is_in_ground() || meets(face.corners(&origin)),
             (Primitive::Edge(edge), _) => {
-                is_in_ground() || {
-                    let behind = edge.behind(&point.n, &(self.base + point.point));
-                    let last = if is_inside(&behind) {
-                        behind
-                    } else {
-                        edge.start
-                    };
-                    meets([edge.start, edge.end(), last])
-                }
+                is_in_ground() || meets([edge.start, edge.end(), behind()])
             }
             (Primitive::Vertex(_), PlacedShape::Disc(_)) => is_in_ground(),
             (Primitive::Vertex(vertex), solid) => solid.holds(&(vertex.place - origin)),
@@ -103,7 +128,9 @@ impl OverSurfaces<'_> {
 
     #[cold]
     fn excess_of_deep(&self, piece: (u32, &Primitive), point: &SurfacePoint) -> f64 {
-        let overlaps_at = |rise: f64| self.overlaps(piece, point, &(Vector3::y() * rise));
+        let behind = self.behind(piece, point);
+        let overlaps_at =
+            |rise: f64| self.overlaps_after(piece, point, &(Vector3::y() * rise), || behind);
         let shallow = Self::shallow(self.shape);
         if !overlaps_at(0.0) {
             // The place just behind a tip is in the ground. It pierces a disc no deeper than that.
@@ -161,7 +188,7 @@ impl SupportMap for Corners {
     }
 }
 
-/// The points at which one part overlaps surfaces.
+/// The points at which one part overlaps or touches surfaces.
 #[derive(Debug, Default)]
 pub(crate) struct WaysOut {
     /// With the numbers of their pieces, in the order of their depth.
@@ -180,7 +207,7 @@ impl WaysOut {
     /// Adds a point at a piece of a surface; `shallow` (m) of [`OverSurfaces::shallow`].
     #[inline]
     pub fn add(&mut self, id: u32, point: &SurfacePoint, shallow: f64) {
-        if point.gap < 0.0 {
+        if point.gap < TOUCH {
             self.has_deep |= point.gap < -shallow;
             self.insert(id, point);
         }

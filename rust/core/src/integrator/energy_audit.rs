@@ -4,10 +4,10 @@
 //! excess = (K + V)(q⁺, v⁺) − (K + V)(q, v) − W
 //! ```
 //!
-//! W is the work of torques, motors and held joints. Inelastic contact with friction only
-//! dissipates, so a positive excess is an error of the scheme. Its sources are the linearisation
-//! (third order in the step), a solver that stopped early, and Newton's law of restitution, which
-//! creates energy in some impacts with friction (Kane's paradox).
+//! W is the work of torques, motors, held joints, springs and dampers. Inelastic contact with
+//! friction only dissipates, so a positive excess is an error of the scheme. Its sources are the
+//! linearisation (third order in the step), a solver that stopped early, and Newton's law of
+//! restitution, which creates energy in some impacts with friction (Kane's paradox).
 //!
 //! - After a coarse excess the step is repeated, with implicit gyroscopic terms and then in halves.
 //! - The remaining excess is removed by scaling the velocity, `v⁺ ← s v⁺`. Signorini's condition at
@@ -22,17 +22,15 @@
 //!   within the step.
 //!
 //! The correction is of the order of the excess, so the scheme keeps its order. Position projection
-//! follows the audit, and its energy is counted separately.
+//! follows the audit; it keeps the kinetic energy (`carried_velocity`), and its work is
+//! counted separately.
 //!
-//! What the scheme itself takes from the motion or adds to it is the rest of the balance, with the
-//! work of friction and impacts by their law (`step_contacts::contact_work`) and what contacts that
-//! yield release (`law::compliance`):
-//!
-//! ```text
-//! Δ(K + V) = W + released − dissipated − lost − removed + lifted
-//! ```
+//! What the scheme itself takes from the motion or adds to it is the rest of the balance
+//! ([`super::work`]), with the work of friction and impacts by their law
+//! (`step_contacts::contact_work`) and what contacts that yield release (`law::compliance`).
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+use super::carried_velocity::Carried;
 use super::groups::{Group, keep_ends, return_ends};
 use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
 use super::options::StepOptions;
@@ -40,6 +38,7 @@ use super::report::StepReport;
 use super::scratch::ScratchOf;
 use super::step_contacts::{contact_work, place};
 use super::warm_start::WarmStart;
+use super::work::{Ledger, Work};
 use crate::scalar::{Lane, Vec3};
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
@@ -126,22 +125,26 @@ impl<F: Fn(&Group) -> bool> Audit<F> {
         ws.audited.energies.clear();
         weigh(system, options, start, ws);
         let mut verdict = Verdict::Sound;
-        let mut corrected = std::mem::take(&mut ws.corrected);
+        let mut judged = std::mem::take(&mut ws.judged);
+        let mut is_corrected = false;
         for number in 0..ws.groups.n() {
             if !ws.groups.is_group(number) {
                 continue;
             }
-            let dissipated = -contact_work(system, start.v, warm_start, ws, number);
-            let found = if (self.is_last)(ws.groups.group(number)) {
+            let by_contacts = contact_work(system, start.v, warm_start, ws, number);
+            let mut found = if (self.is_last)(ws.groups.group(number)) {
                 shortened_balance(system, options, start, ws, number)
             } else {
                 balance::<S>(options, ws, number)
             };
-            match self.judge_group(system, options, start, ws, (number, &found), report) {
-                GroupVerdict::Sound => {
-                    report.enter_balance(dissipated, 0.0, found.released, found.excess.value);
+            found.contact_work = by_contacts;
+            match self.judge_group(system, options, start, ws, (number, &mut found), report) {
+                GroupVerdict::Sound => judged.push((number, found)),
+                GroupVerdict::Corrected => {
+                    found.removed = found.excess.value.max(0.0);
+                    judged.push((number, found));
+                    is_corrected = true;
                 }
-                GroupVerdict::Corrected => corrected.push((number, dissipated, found)),
                 GroupVerdict::NotFinite => {}
                 GroupVerdict::Coarse => {
                     verdict = Verdict::Coarse;
@@ -149,19 +152,25 @@ impl<F: Fn(&Group) -> bool> Audit<F> {
                 }
             }
         }
-        if !corrected.is_empty() {
+        if is_corrected {
             system.energies(options, &ws.end, &ws.v, &mut ws.after);
-            for (number, dissipated, found) in corrected.drain(..) {
-                let before = ws.groups.energy(&ws.before, number);
-                let after = ws.groups.energy(&ws.after, number);
-                let change =
-                    (after.kinetic - before.kinetic) + (after.potential - before.potential);
-                let (removed, released) = (found.excess.value.max(0.0), found.released);
-                let left = change - found.work - released;
-                report.enter_balance(dissipated, removed, released, left);
-            }
         }
-        ws.corrected = corrected;
+        system.stored(start.configuration, &mut ws.stored[0]);
+        system.stored(&ws.end, &mut ws.stored[1]);
+        for (number, found) in judged.drain(..) {
+            let after = ws.groups.energy(&ws.after, number);
+            let stored = ws.stored.each_ref().map(|own| ws.groups.sum(own, number));
+            let ledger = Ledger {
+                work: found.work,
+                stored: stored[1] - stored[0],
+                contact_work: found.contact_work,
+                released: found.released,
+                removed: found.removed,
+                change: after.above(&ws.groups.energy(&ws.before, number)),
+            };
+            report.enter_energies(ledger.entries());
+        }
+        ws.judged = judged;
         ws.audited.is(&ws.end, &ws.v, &ws.after);
         verdict
     }
@@ -173,10 +182,10 @@ impl<F: Fn(&Group) -> bool> Audit<F> {
         options: &StepOptions,
         start: Start<'_, S::Configuration>,
         ws: &mut ScratchOf<S>,
-        (number, found): (usize, &Balance),
+        (number, found): (usize, &mut Balance),
         report: &mut StepReport,
     ) -> GroupVerdict {
-        let Balance { after, excess, .. } = found;
+        let Balance { after, excess, .. } = *found;
         let own = *ws.groups.group(number);
         let is_last = (self.is_last)(&own);
         let gained = excess.value;
@@ -205,12 +214,12 @@ impl<F: Fn(&Group) -> bool> Audit<F> {
                 report.residual = report.residual.max(violation_by::<S>(share, ws, number));
             }
             if is_relative {
-                scale_relative_motion(system, ws, share, (number, after));
+                scale_relative_motion(system, ws, share, (number, &after));
             } else {
                 shorten(system, ws, share, number);
             }
             if excess.is_left(self.gain) {
-                hold_back(system, options, start, ws, number);
+                found.work = hold_back(system, options, start, ws, number);
             }
         }
         GroupVerdict::Corrected
@@ -234,14 +243,14 @@ enum GroupVerdict {
 ///
 /// Something stopped such a step before its end: the machine jammed while the actuators' work was
 /// counted to the end, or a contact closed on its way up. The largest fraction σ of the
-/// displacement that the energy allows is kept; σ = 0 is always allowed.
+/// displacement that the energy allows is kept; σ = 0 is always allowed. Returns the work over it.
 fn hold_back<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
     ws: &mut ScratchOf<S>,
     number: usize,
-) {
+) -> Work {
     let before = ws.groups.energy(&ws.before, number);
     let (h, theta) = (options.time_step, options.theta);
     let d = S::DIMENSION.components();
@@ -255,8 +264,7 @@ fn hold_back<S: MechanicalSystem>(
     for k in 0..MOST_SHORTENINGS {
         system.energies(options, &ws.end, &ws.v, &mut ws.after);
         let after = ws.groups.energy(&ws.after, number);
-        let excess =
-            (after.kinetic - before.kinetic) + (after.potential - before.potential) - share * work;
+        let excess = after.above(&before) - share * work.total();
         if excess <= 0.0 {
             break;
         }
@@ -281,11 +289,13 @@ fn hold_back<S: MechanicalSystem>(
         system.normalise(&mut ws.end);
         return_ends(system, ws, |own, _| own != number);
     }
+    work.times(share)
 }
 
-/// Counts the energy that a projection of `ws.end` by `ws.dv` added, beyond the actuators' work on
-/// the way.
-pub(super) fn count_lift<S: MechanicalSystem>(
+/// Carries the velocity `ws.v` of each group that a projection displaced, by its part of `ws.dv`, to
+/// its position in `ws.end`, see [`super::carried_velocity`]. Counts the energy that this added
+/// beyond the actuators' work on the way. `ws.stored[1]`: in springs before it, J.
+pub(super) fn carry_velocity<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
@@ -295,14 +305,37 @@ pub(super) fn count_lift<S: MechanicalSystem>(
     if ws.audited.energies.is_empty() {
         return;
     }
-    system.energies(options, &ws.end, &ws.v, &mut ws.after);
-    let total = |all: &[MechanicalEnergy]| {
-        let all = all.iter().copied();
-        all.reduce(MechanicalEnergy::with).unwrap_or_default()
-    };
-    let (before, after) = (total(&ws.audited.energies), total(&ws.after));
     let work = system.work_of_displacement(options, start, &ws.v, &ws.dv);
-    let lifted = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
+    system.energies(options, &ws.end, &ws.v, &mut ws.after);
+    let is_moved = |ws: &ScratchOf<S>, number: usize| {
+        ws.groups.is_group(number) && ws.groups.group(number).is_moved
+    };
+    for number in 0..ws.groups.n() {
+        if !is_moved(ws, number) {
+            continue;
+        }
+        let before = ws.groups.energy(&ws.audited.energies, number);
+        let moved = ws.groups.energy(&ws.after, number);
+        let is_alone = ws.groups.group(number).is_untouched;
+        let carried = Carried::new(before.moving(), moved.moving(), moved.mass, is_alone);
+        let Vec3 { x, y, z } = carried.common;
+        rescale(system, ws, carried.share, number, |k, v| {
+            let axis = system.translation_axis(k);
+            axis.map_or(0.0, |axis| [x, y, z][axis]) + carried.share * v
+        });
+    }
+    system.energies(options, &ws.end, &ws.v, &mut ws.after);
+    ws.stored.swap(0, 1);
+    system.stored(&ws.end, &mut ws.stored[1]);
+    let changes = (0..ws.groups.n()).filter(|own| is_moved(ws, *own));
+    let changes = changes.map(|own| {
+        let after = ws.groups.energy(&ws.after, own);
+        let stored = ws.stored.each_ref().map(|all| ws.groups.sum(all, own));
+        let before = ws.groups.energy(&ws.audited.energies, own);
+        after.above(&before) + (stored[1] - stored[0])
+    });
+    let lifted = changes.reduce(|a, b| a + b).unwrap_or_default() - work;
+    report.energy_supplied += work;
     report.energy_lifted += lifted.max(0.0);
     report.energy_lost += (-lifted).max(0.0);
     ws.audited.is(&ws.end, &ws.v, &ws.after);
@@ -313,8 +346,12 @@ pub(super) fn count_lift<S: MechanicalSystem>(
 pub(super) struct Balance {
     after: MechanicalEnergy,
     excess: Excess<f64>,
-    work: f64,
+    work: Work,
+    /// Work of the contacts by their law, and what yielding ones release.
+    contact_work: f64,
     released: f64,
+    /// What the audit removes.
+    removed: f64,
 }
 
 /// Excess of the change of the energy over what was supplied, and what it is compared with, J.
@@ -440,9 +477,16 @@ fn balance<S: MechanicalSystem>(
     let ends = [both(&before), both(&after)];
     Balance {
         after,
-        excess: Excess::new(ends[0], ends[1], [work, released], (after.mass, fall)),
+        excess: Excess::new(
+            ends[0],
+            ends[1],
+            [work.total(), released],
+            (after.mass, fall),
+        ),
         work,
+        contact_work: 0.0,
         released,
+        removed: 0.0,
     }
 }
 
@@ -521,12 +565,23 @@ fn scale<S: MechanicalSystem>(
     number: usize,
     common: impl Fn(usize) -> Option<f64>,
 ) {
+    rescale(system, ws, share, number, |k, v| match common(k) {
+        Some(common) => common + share * (v - common),
+        None => share * v,
+    });
+}
+
+/// Gives each velocity of a group a new value, and scales the local ones.
+fn rescale<S: MechanicalSystem>(
+    system: &S,
+    ws: &mut ScratchOf<S>,
+    share: f64,
+    number: usize,
+    new: impl Fn(usize, f64) -> f64,
+) {
     for (k, v) in ws.v.iter_mut().enumerate() {
         if ws.groups.of_cluster(system.cluster_of_velocity(k)) == number {
-            *v = match common(k) {
-                Some(common) => common + share * (*v - common),
-                None => share * *v,
-            };
+            *v = new(k, *v);
         }
     }
     let d = S::DIMENSION.components();

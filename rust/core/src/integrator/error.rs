@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::caught::Fault;
+
 /// An option out of its range.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum OptionsError {
@@ -84,5 +86,15 @@ pub enum StepError {
         time: f64,
         /// Events in the step.
         events: usize,
+    },
+    /// This library has a fault: the step panicked.
+    #[error(
+        "{fault}; this is a fault of rover-gym, please report it with the model and the state; the state before the step, at t = {time} s, was kept"
+    )]
+    Internal {
+        /// Time before the step, s.
+        time: f64,
+        /// The panic.
+        fault: Fault,
     },
 }

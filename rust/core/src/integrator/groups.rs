@@ -209,8 +209,11 @@ impl Groups {
             .unwrap_or_default()
     }
 
-    /// Sum of the numbers of a group's clusters.
-    pub(super) fn sum(&self, of_clusters: &[f64], group: usize) -> f64 {
+    /// Sum of what a group's clusters have.
+    pub(super) fn sum<T>(&self, of_clusters: &[T], group: usize) -> T
+    where
+        T: Copy + Default + std::ops::Add<Output = T>,
+    {
         let own = of_clusters.iter().enumerate();
         own.filter(|(cluster, _)| self.of_cluster[*cluster] == group)
             .map(|(_, x)| *x)

@@ -3,7 +3,7 @@
 use super::mechanical_system::MechanicalSystem;
 use super::report::StepReport;
 use super::scratch::{ScratchOf, left_of};
-use crate::problem::{FrictionContactProblem, Operator};
+use crate::problem::{FrictionContactProblem, Operator, Redundancy};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
 /// Memory of the problem of a group.
@@ -48,15 +48,16 @@ impl Island {
         }
     }
 
-    /// Solves the contacts of a group from `p`, N s, with the answer `u`, m/s.
+    /// Solves the contacts of a group from `p`, N s, with the answer `u`, m/s. Impulses that the
+    /// motion leaves open are those of least norm if there is a `redundancy`.
     fn solve(
         &mut self,
         problem: &FrictionContactProblem<'_>,
         compliance: f64,
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        [p, u]: [&mut [f64]; 2],
         workspace: &mut SolverWorkspace,
+        redundancy: Option<&mut Redundancy>,
     ) -> Option<SolveReport> {
         let Operator::Dense(W) = problem.operator() else {
             return None;
@@ -84,7 +85,11 @@ impl Island {
         self.u.resize(self.p.len(), 0.0);
         let dimension = problem.dimension();
         let own = FrictionContactProblem::from_assembled(dimension, &self.W, &self.q, &self.mu);
-        let report = solve(&own, options, &mut self.p, &mut self.u, workspace);
+        let mut report = solve(&own, options, &mut self.p, &mut self.u, workspace);
+        if let Some(redundancy) = redundancy.filter(|_| report.is_converged()) {
+            let answer = (&mut self.p[..], &mut self.u[..]);
+            settle(redundancy, &own, options.tolerance, &mut report, answer);
+        }
         for (k, &i) in self.contacts.iter().enumerate() {
             p[d * i..][..d].copy_from_slice(&self.p[d * k..][..d]);
             u[d * i..][..d].copy_from_slice(&self.u[d * k..][..d]);
@@ -131,12 +136,36 @@ pub(super) fn solve_group<S: MechanicalSystem>(
         Level::Velocity => 0.0,
         Level::Position(compliance) => compliance,
     };
-    let report = island.solve(&problem, compliance, &options, p, u, &mut ws.solver)?;
+    let is_settled =
+        matches!(level, Level::Velocity) && system.open_problem(&ws.q_free, &ws.mu).is_some();
+    let redundancy = is_settled.then_some(&mut ws.redundancy);
+    let report = island.solve(
+        &problem,
+        compliance,
+        &options,
+        [p, u],
+        &mut ws.solver,
+        redundancy,
+    )?;
     if let Some(own) = island.spent.get_mut(group) {
         *own += report.work;
     }
     ws.work_spent += report.work;
     Some(report)
+}
+
+/// Makes the impulses of a converged answer (p, u) that the motion leaves open those of least norm.
+pub(super) fn settle(
+    redundancy: &mut Redundancy,
+    problem: &FrictionContactProblem<'_>,
+    tolerance: f64,
+    solved: &mut SolveReport,
+    (p, u): (&mut [f64], &mut [f64]),
+) {
+    let residuals = (tolerance, solved.residual);
+    if let Some(residual) = redundancy.settle_problem(problem, residuals, p, u) {
+        (solved.residual, solved.velocity_error) = (residual.relative, residual.velocity);
+    }
 }
 
 /// Adds to the diagonal of a square matrix a share of its mean.

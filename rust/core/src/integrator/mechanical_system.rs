@@ -23,7 +23,9 @@
 
 use nalgebra::Vector3;
 
+use super::carried_velocity::Moving;
 use super::options::StepOptions;
+use super::work::Work;
 use crate::contact::Activation;
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
@@ -101,6 +103,21 @@ impl MechanicalEnergy {
             momentum: if is_held { Vector3::zeros() } else { momentum },
             mass: self.mass + other.mass,
             is_held,
+        }
+    }
+}
+
+impl MechanicalEnergy {
+    /// By how much it exceeds that of another state, J.
+    pub(crate) fn above(&self, other: &Self) -> f64 {
+        (self.kinetic - other.kinetic) + (self.potential - other.potential)
+    }
+
+    /// What of it a change of the velocity changes.
+    pub(crate) fn moving(&self) -> Moving<f64> {
+        Moving {
+            kinetic: self.kinetic,
+            momentum: self.momentum.into(),
         }
     }
 }
@@ -302,19 +319,26 @@ pub trait MechanicalSystem {
         false
     }
 
-    /// Work of the actuators of each cluster (n_clusters) over a step that ends with `v_end`, J.
+    /// Work of the own forces of each cluster (n_clusters) but gravity over a step that ends with
+    /// `v_end`.
     fn work(
         &mut self,
         _options: &StepOptions,
         _start: Start<'_, Self::Configuration>,
         _v_end: &[f64],
-        out: &mut [f64],
+        out: &mut [Work],
     ) {
+        out.fill(Work::default());
+    }
+
+    /// Energy that springs and position controls of each cluster (n_clusters) store in a
+    /// configuration, J, but for a constant. By default there are none.
+    fn stored(&self, _q: &Self::Configuration, out: &mut [f64]) {
         out.fill(0.0);
     }
 
-    /// Work of the actuators of such a step, as they are at its end, over a `displacement` (nv)
-    /// that is added to it, J.
+    /// Work that the torques, motors and wrenches of such a step, as they are at its end, supply
+    /// over a `displacement` (nv) that is added to it, J.
     fn work_of_displacement(
         &mut self,
         _options: &StepOptions,
@@ -400,6 +424,12 @@ pub trait MechanicalSystem {
     /// Builds H, Z and W of the contacts at the end pose, and `u = Hᵀ v` (d n_c), m/s.
     fn assemble(&mut self, contacts: &[Self::Contact], v: &[f64], u: &mut [f64]);
 
+    /// Whether closed loops let nothing move an assembled contact along its normal: it bears no
+    /// load, unless it yields, and its overlap cannot be removed. By default there is none.
+    fn is_immovable(&self, _contact: usize) -> bool {
+        false
+    }
+
     /// `out = Zᵀ y` (d n_c), m/s.
     fn local(&self, y: &[f64], out: &mut [f64]);
 
@@ -480,6 +510,16 @@ pub trait MechanicalSystem {
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
         self.solve(q, mu, options, p, u, workspace)
+    }
+
+    /// The step's problem, if its impulses are settled where the motion leaves some open: that of
+    /// few contacts with a dense W. By default they stay as the solver finds them.
+    fn open_problem<'a>(
+        &'a self,
+        _q: &'a [f64],
+        _mu: &'a [f64],
+    ) -> Option<FrictionContactProblem<'a>> {
+        None
     }
 
     /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.

@@ -6,9 +6,9 @@
 //! | Moreau–Jean, Newton on the end-of-step forces | [`moreau_jean_newton`] | 2 | 1 |
 //!
 //! Both schemes treat impacts and persistent contact by the same law at velocity level and locate
-//! no events. [`position_projection`] removes the penetration that the velocity law leaves.
-//! [`energy_audit`] checks the energy of every step. `held_step` differentiates a step while the
-//! modes of its contacts ([`contact_modes`]) hold.
+//! no events. [`position_projection`] removes the penetration that the velocity law leaves, and
+//! keeps the kinetic energy (`carried_velocity`). [`energy_audit`] checks the energy of every step.
+//! `held_step` differentiates a step while the modes of its contacts ([`contact_modes`]) hold.
 //!
 //! Each scheme is an [`Integrator`], written once, for any [`MechanicalSystem`]: the multibody tree
 //! and the planar systems ([`crate::system`], [`crate::planar`]) step through the same code. The
@@ -41,6 +41,7 @@
 //! No machine: a scheme knows a [`MechanicalSystem`].
 
 pub mod accuracy;
+pub(crate) mod carried_velocity;
 pub mod contact_modes;
 pub mod energy_audit;
 pub mod error;
@@ -59,6 +60,7 @@ pub mod scratch;
 pub(crate) mod step_contacts;
 mod variant;
 pub mod warm_start;
+pub mod work;
 
 pub use accuracy::Accuracy;
 pub use contact_modes::ContactMode;
@@ -70,3 +72,4 @@ pub use report::{StepReport, StepStatus};
 pub use scheme::{Integrator, StateMut};
 pub use scratch::{Scratch, ScratchOf};
 pub use warm_start::WarmStart;
+pub use work::Work;

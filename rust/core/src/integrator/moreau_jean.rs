@@ -28,7 +28,9 @@
 //!
 //! Source: Moreau 1988; Jean 1999; Acary and Brogliato 2008, ch. 10.
 
-use super::energy_audit::{Audit, GAIN, Verdict, count_lift, note_energy_before};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+use super::energy_audit::{Audit, GAIN, Verdict, carry_velocity, note_energy_before};
 use super::error::StepError;
 use super::groups::{Group, return_ends};
 use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
@@ -173,7 +175,7 @@ impl Part<'_> {
         Ok(report)
     }
 
-    /// Takes the step in `n` equal parts, or leaves everything as it was. The remembered impulses
+    /// Takes the step in `n` equal parts, or leaves everything as it was, also where one panics. The remembered impulses
     /// are those of a part meanwhile.
     fn divide<S: MechanicalSystem>(
         self,
@@ -209,17 +211,19 @@ impl Part<'_> {
                 v: &mut *v,
                 time: &mut *time,
             };
-            match part.advance(system, state, warm_start, ws, probe) {
-                Ok(report) => total.merge(&report),
-                Err(error) => {
-                    configuration.clone_from(&kept.0);
-                    v.copy_from_slice(&kept.1);
-                    *time = kept.2;
-                    *warm_start = kept.3;
-                    return Err(error);
-                }
+            let taken = catch_unwind(AssertUnwindSafe(|| {
+                part.advance(system, state, warm_start, ws, probe)
+            }));
+            if let Ok(Ok(report)) = taken {
+                total.merge(&report);
+                k += 1.0;
+                continue;
             }
-            k += 1.0;
+            configuration.clone_from(&kept.0);
+            v.copy_from_slice(&kept.1);
+            *time = kept.2;
+            *warm_start = kept.3;
+            return taken.unwrap_or_else(|panic| resume_unwind(panic));
         }
         warm_start.scale(n);
         *time = kept.2 + self.options.time_step;
@@ -390,6 +394,7 @@ pub(super) fn finish<S: MechanicalSystem>(
         time,
     } = state;
     let d = S::DIMENSION.components();
+    system.stored(&ws.end, &mut ws.stored[1]);
     if position_projection::project(system, options, ws, &mut report) {
         close_end(system, ws, &mut report);
         system.normalise(&mut ws.end);
@@ -398,7 +403,7 @@ pub(super) fn finish<S: MechanicalSystem>(
             configuration: &*configuration,
             v: &*v,
         };
-        count_lift(system, options, start, ws, &mut report);
+        carry_velocity(system, options, start, ws, &mut report);
     }
     probe.end(Phase::Projection);
     let is_finite = system.is_finite(&ws.end) && ws.v.iter().chain(&ws.p).all(|x| x.is_finite());

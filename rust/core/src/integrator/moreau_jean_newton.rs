@@ -30,7 +30,7 @@ use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::ScratchOf;
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, close_end, excuse_deflection, find_impacts,
+    activation, add_correction, assemble_contacts, close_end, excuse_gaps, find_impacts,
     solve_contacts,
 };
 use super::warm_start::WarmStart;
@@ -101,7 +101,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         ws.gap_end.clear();
         ws.gap_end
             .extend(ws.contacts.iter().map(UnilateralContact::gap));
-        excuse_deflection(ws);
+        excuse_gaps(system, ws);
         finish(system, options, state, warm_start, ws, report, probe)
     }
 }
@@ -131,6 +131,7 @@ fn settle<S: MechanicalSystem>(
         report.iterations += solved.iterations;
         report.residual = solved.residual;
         report.n_contacts = solved.n_contacts;
+        report.immovable_contacts = solved.immovable_contacts;
         report.newton_iterations = iteration + 1;
         // A maximum ignores NaN, so check for it.
         if !ws.v.iter().all(|x| x.is_finite()) {

@@ -4,7 +4,8 @@
 //! step: `d = W λ + (gap, 0, 0)`, `0 ≤ d_N ⊥ λ_N ≥ 0`, and Coulomb's law on the tangential
 //! displacement. Friction prevents the correction from shifting a parked rover down its slope. The
 //! projection runs only if penetration exceeds `penetration_tolerance`, and it skips a contact that
-//! is bouncing off and will have separated after the next step.
+//! is bouncing off and will have separated after the next step. The velocity is scaled to the
+//! kinetic energy before the projection (`carried_velocity`).
 //!
 //! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical
 //! systems with unilateral contact and Coulomb's friction*, CMAME 256, 224–250.

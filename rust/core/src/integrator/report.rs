@@ -41,6 +41,9 @@ pub struct StepReport {
     pub loop_gap: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,
+    /// Most contacts in a step that closed loops let nothing move along their normal, as under a
+    /// machine on a test stand. They bear no load, unless they yield, and an overlap there stays.
+    pub immovable_contacts: usize,
     /// Repeated steps: a motor changed its branch, the energy audit required it, or Newton's law of
     /// restitution had no solution.
     pub retaken: usize,
@@ -51,22 +54,26 @@ pub struct StepReport {
     pub energy_gain: f64,
     /// Energy that the scheme would have gained and the audit removed, all steps together, J.
     pub energy_removed: f64,
-    /// Energy that friction and impacts took by their law, all steps together, J.
+    /// Work of torques, motors and wrenches, all steps together, J.
+    pub energy_supplied: f64,
+    /// What commands since the last call have changed of the energy that position controls store,
+    /// J. The energy contains it as soon as the command is given.
+    pub energy_of_set_points: f64,
+    /// Energy that friction and impacts took by their law, dampers and sand, all steps together, J.
     ///
     /// Newton's law of restitution with friction can make it negative.
     pub energy_dissipated: f64,
     /// Energy that the scheme lost, all steps together, J; negative where it gained.
     ///
-    /// It is what the work of gravity and actuators, `energy_dissipated`, `energy_removed`,
-    /// `energy_lifted` and `energy_released` leave unexplained of the change of the energy: errors
-    /// of the time step, and the normal work of contacts that persist. 0 among grains and planar
-    /// soils, which are not audited.
+    /// It is what all other entries leave unexplained of the change of the energy, of which that of
+    /// springs and position controls is a part: errors of the time step, and the normal work of
+    /// contacts that persist. 0 among grains and planar soils, which are not audited.
     pub energy_lost: f64,
     /// Energy that contacts which yield gave off, all steps together, J; negative where they stored
     /// some. See [`crate::law::compliance::Yielding::supplied`].
     pub energy_released: f64,
-    /// Energy that position projection added beyond the actuators' work on the way, all steps
-    /// together, J.
+    /// Energy that position projection added against gravity and springs, beyond the actuators'
+    /// work on the way, all steps together, J.
     pub energy_lifted: f64,
 }
 
@@ -97,22 +104,6 @@ impl StepReport {
         }
     }
 
-    /// Enters the balance of a step, J: what the contacts' law dissipated, what the audit removed,
-    /// what contacts that yield released, and the final excess of the energy's change over that and
-    /// the work of the actuators.
-    pub(super) fn enter_balance(
-        &mut self,
-        dissipated: f64,
-        removed: f64,
-        released: f64,
-        excess: f64,
-    ) {
-        self.energy_dissipated += dissipated;
-        self.energy_removed += removed;
-        self.energy_released += released;
-        self.energy_lost -= excess + dissipated + removed;
-    }
-
     /// Adds the report of a later step.
     pub fn merge(&mut self, later: &Self) {
         if later.status == StepStatus::NotConverged {
@@ -127,10 +118,13 @@ impl StepReport {
         self.residual = self.residual.max(later.residual);
         self.loop_gap = self.loop_gap.max(later.loop_gap);
         self.n_contacts = self.n_contacts.max(later.n_contacts);
+        self.immovable_contacts = self.immovable_contacts.max(later.immovable_contacts);
         self.retaken += later.retaken;
         self.fallbacks += later.fallbacks;
         self.energy_gain = self.energy_gain.max(later.energy_gain);
         self.energy_removed += later.energy_removed;
+        self.energy_supplied += later.energy_supplied;
+        self.energy_of_set_points += later.energy_of_set_points;
         self.energy_dissipated += later.energy_dissipated;
         self.energy_lost += later.energy_lost;
         self.energy_lifted += later.energy_lifted;

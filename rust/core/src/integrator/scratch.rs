@@ -4,7 +4,9 @@ use super::energy_audit::Balance;
 use super::groups::Groups;
 use super::island::Island;
 use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, UnilateralContact};
+use super::work::Work;
 use crate::law::compliance::Yielding;
+use crate::problem::Redundancy;
 use crate::solver::{SolverOptions, SolverWorkspace};
 
 /// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it
@@ -46,17 +48,20 @@ pub struct Scratch<Q, C> {
     pub(super) p_position: Vec<f64>,
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
+    pub(super) redundancy: Redundancy,
     pub(super) audited: Audited<Q>,
     /// Groups of touching clusters.
     pub(super) groups: Groups,
     /// Of each cluster, whether the gyroscopic terms of the step are implicit.
     pub(super) gyroscopic: Vec<bool>,
-    /// Energies of the clusters before and after the step, and the work of their actuators, J.
+    /// Energies of the clusters before and after the step, the work of their own forces, and what
+    /// their springs store before and after it, J.
     pub(super) before: Vec<MechanicalEnergy>,
     pub(super) after: Vec<MechanicalEnergy>,
-    pub(super) work: Vec<f64>,
-    /// Balances of the groups that the audit corrects, with what their contacts dissipated, J.
-    pub(super) corrected: Vec<(usize, f64, Balance)>,
+    pub(super) work: Vec<Work>,
+    pub(super) stored: [Vec<f64>; 2],
+    /// Balances of the groups that the audit has judged.
+    pub(super) judged: Vec<(usize, Balance)>,
     /// A configuration and a velocity (nv) of which other groups keep their part.
     pub(super) kept: Q,
     pub(super) v_kept: Vec<f64>,
@@ -185,13 +190,15 @@ impl<Q: Clone, C> Scratch<Q, C> {
             p_position: room(),
             u_position: room(),
             solver: SolverWorkspace::default(),
+            redundancy: Redundancy::default(),
             audited: Audited::new(q.clone(), nv),
             groups: Groups::default(),
             gyroscopic: Vec::new(),
             before: Vec::new(),
             after: Vec::new(),
             work: Vec::new(),
-            corrected: Vec::new(),
+            stored: [Vec::new(), Vec::new()],
+            judged: Vec::new(),
             kept: q.clone(),
             v_kept: vec![0.0; nv],
             island: Island::default(),
@@ -206,7 +213,10 @@ impl<Q: Clone, C> Scratch<Q, C> {
     pub(super) fn fit(&mut self, nv: usize, n: usize) {
         self.work_spent = 0;
         self.island.begin(n);
-        self.work.resize(n, 0.0);
+        self.work.resize(n, Work::default());
+        for stored in &mut self.stored {
+            stored.resize(n, 0.0);
+        }
         self.whole.clear();
         for vector in [
             &mut self.impulse,

@@ -1,7 +1,7 @@
 //! The contacts of a step: forecast, assembly, solve, and the gaps at the end.
 
 use super::groups::Group;
-use super::island::{Level, solve_group};
+use super::island::{Level, settle, solve_group};
 use super::mechanical_system::{KeyOf, MechanicalSystem, UnilateralContact};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
@@ -304,6 +304,7 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
     let n = ws.contacts.len();
     let mut report = StepReport {
         n_contacts: n,
+        immovable_contacts: (0..n).filter(|i| system.is_immovable(*i)).count(),
         ..StepReport::default()
     };
     system.close_velocity(options, v_begin, &ws.v, &mut ws.y);
@@ -407,14 +408,15 @@ fn solve_problems<S: MechanicalSystem>(
     }
 }
 
-/// Solves the assembled problem from `ws.p` and charges the step's budget.
+/// Solves the assembled problem from `ws.p` and charges the step's budget. Impulses that the motion
+/// leaves open are those of least norm.
 fn solve_problem<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     ws: &mut ScratchOf<S>,
 ) -> SolveReport {
     let solver_options = ws.solver_options(&options.solver);
-    let solved = system.solve_step(
+    let mut solved = system.solve_step(
         (&ws.v, &ws.y),
         (&ws.q_free, &ws.mu),
         &solver_options,
@@ -423,6 +425,19 @@ fn solve_problem<S: MechanicalSystem>(
         &mut ws.solver,
     );
     ws.work_spent += solved.work;
+    if solved.is_converged()
+        && let Some(problem) = system.open_problem(&ws.q_free, &ws.mu)
+    {
+        let tolerance = options.solver.tolerance;
+        let redundancy = &mut ws.redundancy;
+        settle(
+            redundancy,
+            &problem,
+            tolerance,
+            &mut solved,
+            (&mut ws.p, &mut ws.u),
+        );
+    }
     solved
 }
 
@@ -437,7 +452,7 @@ pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: 
         contact.gap() + share * (u[0] - before[0])
     };
     ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
-    excuse_deflection(ws);
+    excuse_gaps(system, ws);
 }
 
 /// Closes the loops at the end of the step, `ws.end` and `ws.v`.
@@ -450,12 +465,17 @@ pub(super) fn close_end<S: MechanicalSystem>(
     report.enter_loops(gap);
 }
 
-/// Where contacts yield, leaves in `ws.gap_end` only the penetration that no elastic force
-/// explains.
-pub(super) fn excuse_deflection<Q, C>(ws: &mut Scratch<Q, C>) {
+/// Leaves in `ws.gap_end` only the penetration that can be removed: where contacts yield, what no
+/// elastic force explains, and nothing of contacts that cannot move.
+pub(super) fn excuse_gaps<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>) {
     for (gap, law) in ws.gap_end.iter_mut().zip(&ws.yielding) {
         if law.diagonal > 0.0 {
             *gap = law.unexplained;
+        }
+    }
+    for (i, gap) in ws.gap_end.iter_mut().enumerate() {
+        if system.is_immovable(i) {
+            *gap = 0.0;
         }
     }
 }

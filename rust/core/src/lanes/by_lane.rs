@@ -56,11 +56,9 @@ impl<T: Lane> BodyMotion for OneLane<'_, T> {
 
 /// A part whose contacts are asked for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked<T> {
+pub(super) struct Asked {
     pub part: Part,
     pub lanes: u32,
-    /// Distance within which it can be in contact, m.
-    pub reach: T,
 }
 
 /// A contact of a lane.
@@ -74,11 +72,11 @@ pub(super) struct Found {
 
 /// The contacts of a block that are found lane by lane.
 #[derive(Clone, Debug)]
-pub(super) struct ByLane<T> {
+pub(super) struct ByLane {
     /// Slots that contacts of each body fit, and those of contacts between bodies.
     pub hosts: Vec<Vec<usize>>,
     pub of_pairs: Vec<usize>,
-    pub asked: Vec<Asked<T>>,
+    pub asked: Vec<Asked>,
     pub found: Vec<Found>,
     /// Lanes of each slot with such a contact, and where it is among them.
     pub given: Vec<u32>,
@@ -89,7 +87,7 @@ pub(super) struct ByLane<T> {
     pub pairs: Option<PairSearch>,
 }
 
-impl<T: Lane> ByLane<T> {
+impl ByLane {
     /// Room for a machine whose wheels' slots end at `first_spare`.
     pub(super) fn new(machine: &Machine, first_spare: usize) -> Self {
         let bodies = machine.slot_bodies();
@@ -122,11 +120,10 @@ impl<T: Lane> ByLane<T> {
         !self.asked.is_empty()
     }
 
-    /// Asks for the contacts of a part in some lanes; `reach`: distance within which it can be in
-    /// contact, m.
+    /// Asks for the contacts of a part in some lanes.
     #[cold]
-    pub(super) fn ask(&mut self, part: Part, lanes: u32, reach: T) {
-        self.asked.push(Asked { part, lanes, reach });
+    pub(super) fn ask(&mut self, part: Part, lanes: u32) {
+        self.asked.push(Asked { part, lanes });
     }
 
     /// Lanes of a slot with a contact that was found lane by lane.

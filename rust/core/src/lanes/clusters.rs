@@ -26,7 +26,8 @@ pub(super) struct Clusters {
     wide: WidePatterns,
 }
 
-/// A pattern, found where it is first needed. It follows from the rest of the machine.
+/// A pattern, found where it is first needed. It follows from the rest of the machine, so copies of
+/// a machine share it.
 #[derive(Clone, Debug, Default)]
 struct LazyPattern(Arc<OnceLock<Arc<Pattern>>>);
 
@@ -79,7 +80,8 @@ impl Clusters {
             of_tree,
             velocities,
             has_loops,
-            patterns: vec![LazyPattern::default(); n],
+            // One each: a copy of a lazy pattern shares what is found.
+            patterns: (0..n).map(|_| LazyPattern::default()).collect(),
             wide: WidePatterns(wide.map(|size| (size, LazyPattern::default())).collect()),
         }
     }

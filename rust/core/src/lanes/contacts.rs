@@ -31,6 +31,7 @@ use super::pieces::LanePlane;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers};
+use crate::geometry::query::disc_plane::{rolling, to_lowest};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
@@ -71,12 +72,14 @@ pub struct Slot<T: Lane> {
 impl<T: Lane> Slot<T> {
     /// Completes the frame of a wheel from its normal and rolling direction.
     #[inline(always)]
-    fn finish_frame(&mut self, rollers: Option<[f64; 2]>) {
+    fn finish_frame(&mut self, rollers: Option<[f64; 2]>, across: Option<f64>) {
         self.b = self.t.cross(self.n);
         if let Some(angle) = rollers {
             self.t = rollers::axis_of(self.t, self.b, angle);
             let zero = self.gap.like(0.0);
             self.b = Vec3::new(zero, zero, zero);
+        } else if let Some(across) = across {
+            self.b = self.b * self.gap.like(across);
         }
     }
 }
@@ -117,7 +120,7 @@ pub struct Listed {
 pub struct Contacts<T: Lane> {
     pub(super) token: T::Token,
     pub(super) parts: Parts,
-    pub(super) by_lane: ByLane<T>,
+    pub(super) by_lane: ByLane,
     pub(super) stops: Vec<Stop>,
     /// Of each stop, 1 where the joint is at its lower end, −1 at its upper one, 0 at none.
     pub(super) ends: Vec<T>,
@@ -628,7 +631,7 @@ impl<T: Lane> Contacts<T> {
         for w in 0..self.parts.wheels.len() {
             let tree = self.parts.wheels[w].tree;
             let heights = self.heights[tree];
-            let (mut rest, reach) = self.look_at_wheel(w, heights.for_wheels, ground, sight);
+            let mut rest = self.look_at_wheel(w, heights.for_wheels, ground, sight);
             let slots = self.parts.wheels[w].slots.clone();
             if self.slots[slots.clone()].iter().any(|own| own.active.any()) {
                 let pose = &end.bodies[self.parts.wheels[w].body];
@@ -659,13 +662,13 @@ impl<T: Lane> Contacts<T> {
                 for slot in &mut self.slots[slots] {
                     slot.active = slot.active & !rest;
                 }
-                self.ask(Part::Wheel(w), rest, reach, sight);
+                self.ask(Part::Wheel(w), rest, sight);
             }
         }
         for b in 0..self.parts.boxes.len() {
             let height = self.heights[self.parts.boxes[b].tree].middle;
-            let (near, reach) = self.look_at_box(b, height, ground, sight);
-            self.ask(self.parts.boxes[b].part, near, reach, sight);
+            let near = self.look_at_box(b, height, ground, sight);
+            self.ask(self.parts.boxes[b].part, near, sight);
         }
         let mut fallbacks = T::mask(self.token, 0);
         let meeting = if sight.machine.has_pairs {
@@ -763,14 +766,14 @@ impl<T: Lane> Contacts<T> {
 
     /// Asks for the contacts of a part in the lanes of a mask.
     #[inline(always)]
-    fn ask(&mut self, part: Part, lanes: T::Mask, reach: T, sight: &Sight<'_, T>) {
+    fn ask(&mut self, part: Part, lanes: T::Mask, sight: &Sight<'_, T>) {
         let lanes = lanes.bits() & sight.going;
         if lanes != 0 {
-            self.by_lane.ask(part, lanes, reach);
+            self.by_lane.ask(part, lanes);
         }
     }
 
-    /// Whether a box may touch the ground, and how near it must come for that, m.
+    /// Whether a box may touch the ground.
     #[inline(always)]
     fn look_at_box(
         &mut self,
@@ -778,7 +781,7 @@ impl<T: Lane> Contacts<T> {
         height: T,
         ground: &mut Ground<T>,
         sight: &Sight<'_, T>,
-    ) -> (T::Mask, T) {
+    ) -> T::Mask {
         let solid = &self.parts.boxes[number];
         let pose = &sight.middle.bodies[solid.body];
         let n = ground.normal;
@@ -792,7 +795,7 @@ impl<T: Lane> Contacts<T> {
         let drop = (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
         let near_plane = (height + n.dot(centre) - drop).le(reach);
         if !ground.has_spheres() && !ground.has_surfaces() {
-            return (near_plane, reach);
+            return near_plane;
         }
         let at_end = &sight.end.bodies[solid.body];
         let (from, to) = (
@@ -804,11 +807,11 @@ impl<T: Lane> Contacts<T> {
         let motion = shift.norm() + turning(&at_end.R, &pose.R) * bound;
         let world = from + centre;
         let near = ground.is_near_box(number, world, &R, solid.half_size, (reach, motion));
-        (near_plane | near, reach)
+        near_plane | near
     }
 
     /// Fills the slots of a wheel with its contacts at the midpoint. Returns where they must be
-    /// found lane by lane, and how near the wheel must come to the ground to touch it, m.
+    /// found lane by lane.
     #[inline(always)]
     fn look_at_wheel(
         &mut self,
@@ -816,14 +819,14 @@ impl<T: Lane> Contacts<T> {
         height: T,
         ground: &mut Ground<T>,
         sight: &Sight<'_, T>,
-    ) -> (T::Mask, T) {
+    ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
         let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
         // The second and third point of the rim, and all that may come near.
         let reach = (sight.forecast).reach(
             #[inline(always)]
-            || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
+            || wheel.speed(&self.twists[wheel.carrier], (s, centre)),
         );
         let none = T::mask(self.token, 0);
         let (mut rest, mut on_pieces) = (none, none);
@@ -859,7 +862,7 @@ impl<T: Lane> Contacts<T> {
         if ground.has_spheres() {
             rest = rest | self.look_at_spheres(w, ground, sight, s, centre, reach);
         }
-        (rest, reach)
+        rest
     }
 
     /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of the
@@ -877,11 +880,13 @@ impl<T: Lane> Contacts<T> {
         let radius = T::splat(self.token, wheel.radius);
         let (across, along) = (n.cross(s), n.dot(s));
         let length = across.norm();
-        let mut height = base + n.dot(centre);
+        let mut from = centre;
         if wheel.is_wide() {
-            height += along * radius.like(wheel.along(circle)) - radius.like(wheel.rounding);
+            from += s * radius.like(wheel.along(circle));
         }
-        let gap = height - radius * length;
+        let height = base + n.dot(from);
+        let rounding = radius.like(wheel.rounding);
+        let gap = height - radius * length - rounding;
         let twist = &self.twists[wheel.carrier];
         let u_N = if sight.forecast.needs_velocity(gap) {
             let mut share = radius * along / length;
@@ -897,7 +902,7 @@ impl<T: Lane> Contacts<T> {
         Stand {
             gap,
             admitted: sight.forecast.admits(gap, u_N),
-            lies: (height + half * radius * length).le(reach),
+            lies: (height + half * radius * length - rounding).le(reach),
         }
     }
 
@@ -1087,12 +1092,10 @@ impl<T: Lane> Contacts<T> {
         let parallel = radius.like(PARALLEL);
         let mut undefined = T::mask(self.token, 0);
         if (slot.active & !slot.on_sphere).any() {
-            let across = n.cross(s);
-            let length = across.norm();
-            let t = across * (radius.like(1.0) / length);
+            let (t, length) = rolling(n, s);
             slot.n = n;
             slot.t = t;
-            slot.point = centre + t.cross(s) * radius;
+            slot.point = centre + to_lowest(t, s, radius);
             slot.gap = height + n.dot(centre) - radius * length;
             undefined = slot.active & !slot.on_sphere & length.le(parallel);
         }
@@ -1124,7 +1127,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + to_point, slot.point);
             slot.gap = T::select(here, distance - sphere.radius, slot.gap);
         }
-        slot.finish_frame(wheel.rollers);
+        slot.finish_frame(wheel.rollers, wheel.across);
         undefined
     }
 
@@ -1146,13 +1149,12 @@ impl<T: Lane> Contacts<T> {
         let on_plane = slot.active & !slot.on_sphere;
         let mut undefined = T::mask(self.token, 0);
         if on_plane.any() {
-            let across = n.cross(s);
-            let length = across.norm();
-            let along = radius.like(wheel.along(place));
+            let (t, length) = rolling(n, s);
+            let circle = centre + s * radius.like(wheel.along(place));
             slot.n = n;
-            slot.t = across * (one / length);
-            slot.point = centre + s * along + slot.t.cross(s) * radius - n * rounding;
-            slot.gap = height + n.dot(centre) + along * n.dot(s) - radius * length - rounding;
+            slot.t = t;
+            slot.point = circle + to_lowest(t, s, radius) - n * rounding;
+            slot.gap = height + n.dot(circle) - radius * length - rounding;
             undefined = on_plane & length.le(parallel);
         }
         if slot.on_sphere.any() {
@@ -1174,7 +1176,7 @@ impl<T: Lane> Contacts<T> {
             slot.point = Vec3::select(here, centre + near.point, slot.point);
             slot.gap = T::select(here, near.distance - slot.sphere.radius, slot.gap);
         }
-        slot.finish_frame(wheel.rollers);
+        slot.finish_frame(wheel.rollers, wheel.across);
         undefined
     }
 

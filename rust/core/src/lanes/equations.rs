@@ -366,6 +366,18 @@ impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
     }
 
     #[inline(always)]
+    fn least_pivot(&self, lane: usize) -> f64 {
+        let mut most = 0.0_f64;
+        for k in 0..C {
+            let inverse = &self.factors[k][k];
+            for own in [0, 4, 8] {
+                most = most.max(inverse[own].get(lane).abs());
+            }
+        }
+        1.0 / most
+    }
+
+    #[inline(always)]
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9] {
         &problem.W[block(contact, contact)]
     }

@@ -41,24 +41,19 @@ impl<T: Lane> Contacts<T> {
             };
             let mut contacts = std::mem::take(&mut self.by_lane.scratch);
             contacts.clear();
-            let activation = |margin| Activation {
+            let activation = Activation {
                 lead: sight.forecast.lead,
                 hover: sight.forecast.hover.get(lane),
                 slow: sight.forecast.slow.get(lane),
-                margin,
+                margin: 0.0,
             };
-            let own = |asked: &&Asked<T>| asked.lanes >> lane & 1 == 1;
+            let own = |asked: &&Asked| asked.lanes >> lane & 1 == 1;
             for asked in self.by_lane.asked.iter().filter(own) {
-                let activation = activation(asked.reach.get(lane));
                 let parts = std::iter::once(asked.part);
                 let unknown = detect_parts(parts, &machine, &**terrain, &activation, &mut contacts);
                 fallbacks |= u32::from(unknown.is_some()) << lane;
             }
             if meeting >> lane & 1 == 1 {
-                let v: Vec<f64> = sight.v.iter().map(|v| v.get(lane)).collect();
-                let places = |body: usize| sight.middle.bodies[body].r.get(lane).into();
-                let fastest = model.fastest_approach(places, &v);
-                let activation = activation(sight.forecast.lead.abs() * fastest);
                 let pairs = self
                     .by_lane
                     .pairs

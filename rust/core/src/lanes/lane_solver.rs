@@ -9,7 +9,7 @@ use super::large_equations::LargeSystem;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_LARGE};
 use super::system::Loaded;
 use super::velocity_equations::VelocitySystem;
-use crate::problem::{ContactScales, Magnitudes};
+use crate::problem::{Answered, ContactScales, Magnitudes, Redundancy};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 
@@ -20,6 +20,22 @@ pub const MAX_ITERATIONS: usize =
 /// What a problem has on its diagonal beside the machine's operator, relative to the mean diagonal,
 /// from which on its answer is unique and the smallest `α` serves.
 const DEFINITE: f64 = 1e-3;
+
+/// Smallest pivot, relative to the mean diagonal of W and to `α`, of systems whose impulses the
+/// motion determines. A null vector leaves a pivot of `α` over the square of its last entry, so
+/// one whose last entry is a thousandth is still found.
+const DETERMINED: [f64; 2] = [1e-3, 1e6];
+
+/// What is known about other impulses with the motion of an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Freedom {
+    /// There are none.
+    None,
+    /// They are those of the null space of the last factors.
+    OfFactors,
+    /// There may be some.
+    Unknown,
+}
 
 /// Where a solver gets its problems and leaves their answers.
 pub(super) trait ProblemSource {
@@ -60,6 +76,7 @@ pub(super) struct LaneSolver<T: Lane, const C: usize, S: Loaded<T, C>> {
     /// Attempts of each lane that failed, and its steps in them.
     failed: [usize; MAX_LANES],
     before: [usize; MAX_LANES],
+    redundancy: Redundancy,
 }
 
 impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
@@ -75,6 +92,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             steps: [0; MAX_LANES],
             failed: [0; MAX_LANES],
             before: [0; MAX_LANES],
+            redundancy: Redundancy::default(),
         }
     }
 
@@ -184,6 +202,111 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         }
     }
 
+    /// Speed up to which a lane's contact is at rest, m/s.
+    #[inline(always)]
+    fn still(&self, lane: usize, tolerances: [T; 2]) -> f64 {
+        (tolerances[0].get(lane) / self.pivoting.inverses[0].get(lane)).sqrt()
+    }
+
+    /// What the last factors of a lane say about other impulses with the motion of its answer.
+    #[inline(always)]
+    fn freedom(&self, lane: usize, problem: &ContactProblem, still: f64) -> Freedom {
+        let own = &self.pivoting;
+        if !problem.asks_least || own.definite.get(lane) {
+            return Freedom::None;
+        }
+        if self.steps[lane] == 0 {
+            // The factors are another problem's.
+            let stays = problem.begins_least && !problem.has_start && self.failed[lane] == 0;
+            return if stays {
+                Freedom::None
+            } else {
+                Freedom::Unknown
+            };
+        }
+        let pivot = self.system.least_pivot(lane);
+        if !(pivot > 0.0) {
+            return Freedom::Unknown;
+        }
+        let mut slides = false;
+        for i in self.system.places() {
+            if S::contact_at(problem, i).is_none() {
+                continue;
+            }
+            // The factors are those of the modes, the motion may allow more.
+            let (closed, sticks) = own.mode_of(i, lane);
+            let [n, t, b] = own.u[i].map(|u| u.get(lane));
+            let is_smooth = own.laws[i].mu.get(lane) == 0.0;
+            if closed && !sticks && !is_smooth {
+                if t * t + b * b <= still * still {
+                    return Freedom::Unknown;
+                }
+                slides = true;
+            } else if !closed && n <= still {
+                return Freedom::Unknown;
+            }
+        }
+        let [of_mean, of_alpha] = DETERMINED;
+        let least = (of_mean * own.mean.get(lane)).max(of_alpha * own.alpha_of(lane));
+        if pivot > least {
+            Freedom::None
+        } else if slides {
+            Freedom::Unknown
+        } else {
+            Freedom::OfFactors
+        }
+    }
+
+    /// Takes the least impulses where the last factors give them. Returns those of the lanes
+    /// `solved` that have them then.
+    #[inline(always)]
+    fn settle_together(
+        &mut self,
+        token: T::Token,
+        solved: u32,
+        problems: &[ContactProblem],
+        tolerances: [T; 2],
+    ) -> u32 {
+        let (mut done, mut asks) = (0, 0);
+        let mut left = solved;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let still = self.still(lane, tolerances);
+            match self.freedom(lane, &problems[self.problem[lane]], still) {
+                Freedom::None => done |= 1 << lane,
+                Freedom::OfFactors => asks |= 1 << lane,
+                Freedom::Unknown => {}
+            }
+        }
+        if asks != 0 {
+            let lanes = T::mask(token, asks);
+            done |= self
+                .pivoting
+                .remove_null_part(&mut self.system, lanes)
+                .bits();
+        }
+        done
+    }
+
+    /// Takes the least of the impulses that cause the same motion.
+    #[inline(always)]
+    fn settle(&mut self, lane: usize, problem: &mut ContactProblem, tolerances: [T; 2]) {
+        let still = self.still(lane, tolerances);
+        let n = problem.n_contacts;
+        let mut p = problem.p;
+        let answered = Answered {
+            d: 3,
+            block: |i, j| problem.block_at(i, j),
+            mu: &problem.mu[..n],
+            u: &problem.u[..3 * n],
+            still,
+        };
+        if self.redundancy.settle(&answered, 0..n, &mut p[..3 * n]) {
+            problem.p[..3 * n].copy_from_slice(&p[..3 * n]);
+        }
+    }
+
     /// A step of all lanes that have a problem.
     #[inline(always)]
     fn step(&mut self, token: T::Token, tolerances: [T; 2]) {
@@ -249,6 +372,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             }
             self.active &= !ended;
             let solved = solved.bits();
+            let settled = self.settle_together(token, ended & solved, problems, tolerances);
             let mut left = ended;
             while left != 0 {
                 let lane = left.trailing_zeros() as usize;
@@ -260,6 +384,9 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
                     self.again |= 1 << lane;
                 } else {
                     self.store(lane, problem, is_solved);
+                    if is_solved && settled >> lane & 1 == 0 {
+                        self.settle(lane, problem, tolerances);
+                    }
                     line.end(index);
                 }
             }

@@ -108,6 +108,8 @@ pub struct WheelDisc {
     pub compliance: Option<Compliance>,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
     pub rollers: Option<[f64; 2]>,
+    /// Friction across over that along, if they differ.
+    pub across: Option<f64>,
     /// Number of its slots for contacts.
     pub n_slots: usize,
 }
@@ -292,6 +294,7 @@ impl WheelDisc {
             rounding: if is_wide { wheel.rounding } else { 0.0 },
             compliance: wheel.compliance,
             rollers: wheel.rollers,
+            across: wheel.across,
             n_slots: 0,
         }
     }

@@ -46,12 +46,12 @@ pub(super) struct Wheel {
     pub is_soft: bool,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
     pub rollers: Option<[f64; 2]>,
+    /// Friction across over that along, if they differ.
+    pub across: Option<f64>,
     /// Radius of a bounding ball, m.
     pub bound: f64,
     /// Twist of the body that moves its centre.
     pub carrier: usize,
-    /// Velocity of the spin about its own axle that the carrier's twist lacks.
-    spin: Option<usize>,
 }
 
 /// Where a wheel's axle comes from.
@@ -130,9 +130,9 @@ impl Parts {
                     rounding: wheel.rounding,
                     is_soft: wheel.compliance.is_some(),
                     rollers: wheel.rollers,
+                    across: wheel.across,
                     bound: wheel.bound(),
                     carrier: carrier_of(machine, mover, &mut carriers),
-                    spin: spins.then_some(link.velocity),
                 }
             })
             .collect();
@@ -250,14 +250,12 @@ impl Wheel {
         }
     }
 
-    /// Upper bound on the speed of all its points, m/s, with its centre at `centre`.
+    /// Upper bound on the speed at which its surface moves along its normal, m/s, with the unit
+    /// axle `s` and its centre at `centre`: its spin moves it nowhere.
     #[inline(always)]
-    pub(super) fn speed<T: Lane>(&self, twist: &Twist<T>, centre: Vec3<T>, v: &[T]) -> T {
-        let spin = match self.spin {
-            Some(k) => v[k].abs(),
-            None => v[0].like(0.0),
-        };
-        twist.velocity(centre).norm() + (twist.angular.norm() + spin) * spin.like(self.bound)
+    pub(super) fn speed<T: Lane>(&self, twist: &Twist<T>, (s, centre): (Vec3<T>, Vec3<T>)) -> T {
+        let turning = twist.angular.cross(s).norm();
+        twist.velocity(centre).norm() + turning * turning.like(self.bound)
     }
 }
 

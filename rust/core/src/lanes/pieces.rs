@@ -5,8 +5,9 @@
 //! over its plane is over it. Where the wheel may touch an edge or a vertex, or is deep in the
 //! ground, its contacts are found lane by lane.
 //!
-//! What is kept decides only what need not be compared, so a step does not depend on when a search
-//! was made.
+//! What is kept decides only what need not be compared: a face touches with the same bits here and
+//! where contacts are found lane by lane, and in the same order. So a step does not depend on when a
+//! search was made.
 
 use std::sync::Arc;
 
@@ -92,8 +93,9 @@ pub(super) struct Pieces<T> {
     /// Place and axle of the wheel at the last search, world, m.
     from: Vec3<T>,
     axle: Vec3<T>,
-    /// Motion and reach together for which it holds, m.
-    within: T,
+    /// How far it may have moved from there, and the largest reach for which it holds, m.
+    moves: T,
+    reach: T,
 }
 
 impl<T: Lane> Pieces<T> {
@@ -120,13 +122,14 @@ impl<T: Lane> Pieces<T> {
             tips: Kept::new(Vec3::new(never, never, never)),
             from: nowhere,
             axle: nowhere,
-            within: -never,
+            moves: -never,
+            reach: -never,
         }
     }
 
     /// Forgets what is known of a lane's ground.
     pub fn forget(&mut self, lane: usize) {
-        self.within.set(lane, f64::NEG_INFINITY);
+        self.moves.set(lane, f64::NEG_INFINITY);
         self.keep(lane, &[]);
     }
 
@@ -140,15 +143,15 @@ impl<T: Lane> Pieces<T> {
     ) -> T::Mask {
         let turned = (rim.axle - self.axle).norm() * rim.reach.like(1.5 * rim.radius);
         let moved = (rim.centre - self.from).norm() + turned;
-        let need = moved + rim.reach + rim.reach.like(ROUNDING);
-        let mut unknown = (lanes & !need.le(self.within)).bits();
+        let is_known = moved.le(self.moves) & rim.reach.le(self.reach);
+        let mut unknown = (lanes & !is_known).bits();
         let mut others = 0;
         while unknown != 0 {
             let lane = unknown.trailing_zeros() as usize;
             unknown &= unknown - 1;
             let terrain = surfaces[lane].as_deref();
             if !terrain.is_some_and(|terrain| self.search(lane, terrain, rim)) {
-                if self.within.get(lane) > f64::NEG_INFINITY {
+                if self.moves.get(lane) > f64::NEG_INFINITY {
                     self.forget(lane);
                 }
                 others |= 1 << lane;
@@ -192,7 +195,8 @@ impl<T: Lane> Pieces<T> {
             if fits {
                 self.from.set(lane, disc.centre.into());
                 self.axle.set(lane, disc.axle.into());
-                self.within.set(lane, reach + moves);
+                self.moves.set(lane, moves - ROUNDING);
+                self.reach.set(lane, rim.reach.get(lane));
             }
             fits
         })

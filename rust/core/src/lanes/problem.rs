@@ -53,12 +53,17 @@ pub struct ContactProblem {
     /// Friction coefficients.
     pub mu: [f64; MAX_CONTACTS],
     /// Impulses, N s: those of the last step, and the answer. Of answers that the machine cannot
-    /// tell apart one near them is found.
+    /// tell apart one near them is found, or the least one: [`Self::asks_least`].
     pub p: [f64; MAX_UNKNOWNS],
     /// Impulses from which a solve starts if `has_start`, rather than from those of the last step.
     pub start: [f64; MAX_UNKNOWNS],
     /// See above.
     pub has_start: bool,
+    /// Whether of the answers with the same motion that of least norm is taken.
+    pub asks_least: bool,
+    /// Whether `p` was the least answer of the last step, of the same contacts. Where it still
+    /// solves the problem without any step of the solver, it stays.
+    pub begins_least: bool,
     /// Velocities `W p + q` of the answer, m/s.
     pub u: [f64; MAX_UNKNOWNS],
     /// Residual of the answer.
@@ -116,6 +121,23 @@ impl Factored {
         row(a).zip(row(b)).map(|(x, y)| x[i % 3] * y[j % 3]).sum()
     }
 
+    /// Block of W, 1/kg.
+    #[inline(never)]
+    fn block_at(&self, pattern: &Pattern, i: usize, j: usize) -> [f64; 9] {
+        if i == j {
+            return self.diagonal[i];
+        }
+        let shared = pattern.shared(self.slot_of(i), self.slot_of(j));
+        let row = |contact: usize| &self.Z[contact * pattern.stride()..][..shared];
+        let mut block = [0.0; 9];
+        for (x, y) in row(i).iter().zip(row(j)) {
+            for k in 0..9 {
+                block[k] += x[k / 3] * y[k % 3];
+            }
+        }
+        block
+    }
+
     /// Slot of a contact.
     fn slot_of(&self, contact: usize) -> usize {
         let mut slots = self.slots;
@@ -167,6 +189,7 @@ impl Clone for ContactProblem {
         (self.q, self.mu) = (other.q, other.mu);
         (self.p, self.u) = (other.p, other.u);
         (self.start, self.has_start) = (other.start, other.has_start);
+        (self.asks_least, self.begins_least) = (other.asks_least, other.begins_least);
         self.residual = other.residual;
         self.iterations = other.iterations;
         self.is_solved = other.is_solved;
@@ -185,6 +208,8 @@ impl Default for ContactProblem {
             p: [0.0; MAX_UNKNOWNS],
             start: [0.0; MAX_UNKNOWNS],
             has_start: false,
+            asks_least: false,
+            begins_least: false,
             u: [0.0; MAX_UNKNOWNS],
             residual: Residual::UNSOLVED,
             iterations: 0,
@@ -223,6 +248,15 @@ impl ContactProblem {
         let n = self.n_unknowns();
         let rows = (0..n).flat_map(|i| (0..n).map(move |j| self.entry(i, j)));
         rows.collect()
+    }
+
+    /// Block (i, j) of W, `j <= i`, row-major, 1/kg.
+    #[inline(always)]
+    pub(super) fn block_at(&self, i: usize, j: usize) -> [f64; 9] {
+        match &self.factored.pattern {
+            None => self.W[block(i, j)],
+            Some(pattern) => self.factored.block_at(pattern, i, j),
+        }
     }
 
     /// Entry of W, 1/kg.

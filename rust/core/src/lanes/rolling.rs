@@ -4,6 +4,7 @@ use super::contacts::{Contacts, Sight};
 use super::ground::Ground;
 use super::pieces::{LanePlane, Rim};
 use crate::contact::ways_out::SHALLOW;
+use crate::geometry::query::disc_plane::{rolling, to_lowest};
 use crate::scalar::{Lane, LaneMask, Vec3};
 
 impl<T: Lane> Contacts<T> {
@@ -40,9 +41,8 @@ impl<T: Lane> Contacts<T> {
             if !near.any() {
                 continue;
             }
-            let across = face.plane.normal.cross(s);
-            let t = across * (reach.like(1.0) / across.norm());
-            let low = rim.centre + t.cross(s) * reach.like(radius);
+            let (t, _) = rolling(face.plane.normal, s);
+            let low = origin + (centre + to_lowest(t, s, reach.like(radius)));
             let over = near & face.admits(low);
             rest = rest | (over & stand.gap.lt(shallow));
             rest = rest | self.enter_on_plane(first, over & stand.admitted, &face.plane);

@@ -19,9 +19,10 @@ use crate::contact::rows::{Path, Place, add, add_scaled, product, square};
 use crate::contact::{Contact, rollers};
 use crate::multibody::loops::Placed;
 use crate::multibody::mechanism::{BASE, Mover};
+use crate::multibody::model::Loop;
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
-use crate::system::loops::Loops;
+use crate::system::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
 
 /// What is read of a problem.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +46,7 @@ pub struct Rows<T: Lane> {
     movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
-    /// Whether wheels have rollers.
+    /// Whether wheels have rollers or no friction across.
     has_rollers: bool,
     /// Z along the path of each slot's part: `Z[starts[slot] + k]`.
     Z: Vec<Triple<T>>,
@@ -74,6 +75,15 @@ pub struct Rows<T: Lane> {
     pub(super) swept_loops: Vec<T>,
     /// The closed loops of the machine, which number the contacts by their slots.
     pub(super) loops: Option<Box<Loops<T>>>,
+    /// Z of each slot over all velocities without the motions that would open a loop
+    /// (n_slots, nv), of a machine that loops tie to the world. Several contacts of one body on a
+    /// stand are then dependent to the square of rounding, as W's entries are to rounding.
+    spread: Vec<Triple<T>>,
+    /// Slots that they hold along any direction, and of each slot where they hold its normal.
+    held: Vec<usize>,
+    immovable: Vec<T::Mask>,
+    /// Largest entry on W's diagonal without the loops by slot, 1/kg; zero where nothing is held.
+    closing: Vec<T>,
     n_slots: usize,
     /// Local velocity `Hᵀ v` before the step by slot, m/s.
     pub u_before: Vec<Triple<T>>,
@@ -132,7 +142,8 @@ impl<T: Lane> Rows<T> {
             bodies,
             movers,
             common,
-            has_rollers: (machine.wheels.iter()).any(|wheel| wheel.rollers.is_some()),
+            has_rollers: (machine.wheels.iter())
+                .any(|wheel| wheel.rollers.is_some() || wheel.across.is_some()),
             Z: vec![[zero; 3]; n_rows],
             starts,
             W: vec![[zero; 9]; n_blocks],
@@ -152,6 +163,14 @@ impl<T: Lane> Rows<T> {
             swept: vec![zero; machine.nv()],
             swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
             loops,
+            spread: if machine.loops.iter().any(Loop::holds_the_world) {
+                vec![[zero; 3]; n_slots * machine.nv()]
+            } else {
+                Vec::new()
+            },
+            held: Vec::new(),
+            immovable: vec![T::mask(token, 0); n_slots],
+            closing: vec![zero; n_slots],
             n_slots,
             u_before: vec![[zero; 3]; n_slots],
         }
@@ -197,13 +216,13 @@ impl<T: Lane> Rows<T> {
                 for &slot in contacts.used() {
                     self.build(machine, end, factor, contacts, v, slot);
                 }
-                self.multiply_loops(contacts);
                 for &slot in contacts.used_by_joints() {
-                    if let Some((_, JointRow::Friction)) = contacts.joint_row(slot) {
+                    if is_friction(contacts, slot) {
                         let (_, rows) = self.of(contacts, slot);
                         self.normal[slot] = square(self.normal[slot].like(0.0), rows)[4];
                     }
                 }
+                self.multiply_loops(contacts);
                 self.multiply(contacts);
                 if contacts.factored() != 0 {
                     self.multiply_diagonal(contacts);
@@ -287,7 +306,144 @@ impl<T: Lane> Rows<T> {
                 *loops.product_mut(row, slot) = path.add_local(rows, loops.q(row), none);
             }
         }
+        self.held.clear();
+        for &slot in contacts.used() {
+            self.hold(&mut loops, contacts, slot);
+        }
         self.loops = Some(loops);
+    }
+
+    /// Makes the rows of a slot zero where the loops let nothing move it. [`Self::close_held`]
+    /// follows.
+    #[inline(always)]
+    fn hold(&mut self, loops: &mut Loops<T>, contacts: &Contacts<T>, slot: usize) {
+        let zero = T::splat(self.token, 0.0);
+        let mut free = [zero; 3];
+        for z in self.of(contacts, slot).1 {
+            for k in 0..3 {
+                free[k] += z[k] * z[k];
+            }
+        }
+        if !is_friction(contacts, slot) {
+            self.normal[slot] = zero;
+        }
+        let held = self.find_held(loops, contacts, slot, &free);
+        self.immovable[slot] = held[0];
+        self.closing[slot] = zero;
+        let any = (held[0] | held[1] | held[2]) & contacts.slot(slot).active;
+        if !any.any() {
+            return;
+        }
+        self.held.push(slot);
+        loops.hold(slot, held);
+        self.closing[slot] = T::select(any, free[0].max(free[1]).max(free[2]), zero);
+        let n = self.of(contacts, slot).1.len();
+        let nv = if self.spread.is_empty() {
+            0
+        } else {
+            self.velocities.len()
+        };
+        let rows = self.Z[self.starts[slot]..][..n].iter_mut();
+        for z in rows.chain(&mut self.spread[slot * nv..][..nv]) {
+            for k in 0..3 {
+                z[k] = T::select(held[k], zero, z[k]);
+            }
+        }
+        for k in 0..3 {
+            let u = &mut self.u_before[slot][k];
+            *u = T::select(held[k], zero, *u);
+        }
+    }
+
+    /// Where the loops let nothing move a slot; `free`: squares of its rows, 1/kg.
+    #[inline(always)]
+    fn find_held(
+        &mut self,
+        loops: &Loops<T>,
+        contacts: &Contacts<T>,
+        slot: usize,
+        free: &Triple<T>,
+    ) -> [T::Mask; 3] {
+        let zero = T::splat(self.token, 0.0);
+        if self.spread.is_empty() {
+            let mut left = *free;
+            for row in 0..loops.m() {
+                let b = loops.product(row, slot);
+                for k in 0..3 {
+                    left[k] -= b[k] * b[k];
+                }
+            }
+            return Loops::holds(free, &left, ROUNDED);
+        }
+        let nv = self.velocities.len();
+        let mut spread = std::mem::take(&mut self.spread);
+        let own = &mut spread[slot * nv..][..nv];
+        own.fill([zero; 3]);
+        let (path, rows) = self.of(contacts, slot);
+        for (k, z) in path.velocities().zip(rows) {
+            own[k] = *z;
+        }
+        loops.project_rows(slot, own);
+        let mut left = [zero; 3];
+        for z in &*own {
+            for k in 0..3 {
+                left[k] += z[k] * z[k];
+            }
+        }
+        self.spread = spread;
+        Loops::holds(free, &left, ROUNDED_SQUARE)
+    }
+
+    /// Rows of two slots over all velocities, where they are kept.
+    #[inline(always)]
+    fn spread_of(&self, slots: [usize; 2]) -> Option<[&[Triple<T>]; 2]> {
+        let nv = self.velocities.len();
+        (!self.spread.is_empty()).then(|| slots.map(|slot| &self.spread[slot * nv..][..nv]))
+    }
+
+    /// Makes W regular where its diagonal is zero, since loops let nothing move a contact: the
+    /// impulses there are zero. After [`Self::soften`], as what yields has a load.
+    pub fn close_held(&mut self, contacts: &Contacts<T>) {
+        if self.held.is_empty() {
+            return;
+        }
+        let zero = T::splat(self.token, 0.0);
+        let close = |own: &mut T, closing: T| {
+            *own = T::select(own.le(zero) & zero.lt(closing), closing, *own);
+        };
+        for cluster in 0..contacts.n_clusters() {
+            let blocks = &mut self.W[self.first_blocks[cluster]..];
+            for (i, &slot) in contacts.used_densely(cluster).iter().enumerate() {
+                for k in [0, 4, 8] {
+                    close(&mut blocks[block(i, i)][k], self.closing[slot]);
+                }
+            }
+        }
+        if contacts.factored() != 0 {
+            for slot in contacts.used_nearby() {
+                let own = &mut self.diagonal[slot];
+                if !is_friction(contacts, slot) {
+                    let is_held = own[0].le(zero);
+                    self.normal[slot] = T::select(is_held, self.closing[slot], zero);
+                }
+                for k in [0, 4, 8] {
+                    close(&mut own[k], self.closing[slot]);
+                }
+            }
+        }
+    }
+
+    /// Lanes in which nothing moves a slot's contact along its normal.
+    #[inline(always)]
+    pub(super) fn immovable(&self, slot: usize) -> T::Mask {
+        self.immovable[slot]
+    }
+
+    /// Number of contacts of a lane that nothing moves along their normals.
+    pub(super) fn n_immovable(&self, contacts: &Contacts<T>, lane: usize) -> usize {
+        let here =
+            |slot: &&usize| (self.immovable[**slot] & contacts.slot(**slot).active).get(lane);
+        self.held.iter().filter(here).count()
     }
 
     /// Diagonal blocks of W from Z.
@@ -308,6 +464,11 @@ impl<T: Lane> Rows<T> {
             for (i, &row) in used.iter().enumerate() {
                 let a = contacts.part(row);
                 for &column in &used[..i] {
+                    if let Some([x, y]) = self.spread_of([row, column]) {
+                        self.W[at] = product(zero, x, y);
+                        at += 1;
+                        continue;
+                    }
                     let b = contacts.part(column);
                     let shared = self.common[a * n_parts + b];
                     let x = &self.Z[self.starts[row]..][..shared];
@@ -327,14 +488,20 @@ impl<T: Lane> Rows<T> {
     /// Block of W of a slot with itself.
     #[inline(always)]
     fn own_block(&self, contacts: &Contacts<T>, slot: usize) -> [T; 9] {
-        let (_, rows) = self.of(contacts, slot);
-        let mut own = square(T::splat(self.token, 0.0), rows);
-        if let Some((_, row)) = contacts.joint_row(slot) {
+        let zero = T::splat(self.token, 0.0);
+        let spread = self.spread_of([slot, slot]);
+        let mut own = match spread {
+            Some([rows, _]) => square(zero, rows),
+            None => square(zero, self.of(contacts, slot).1),
+        };
+        if is_friction(contacts, slot) {
+            (own[0], own[8]) = (self.normal[slot], self.normal[slot]);
+        } else if let Some((_, row)) = contacts.joint_row(slot) {
             row.close(&mut own);
         } else if self.has_rollers {
             rollers::close(&mut own);
         }
-        if let Some(loops) = &self.loops {
+        if let (Some(loops), None) = (&self.loops, spread) {
             loops.project_block([slot, slot], &mut own);
         }
         own
@@ -493,6 +660,7 @@ impl<T: Lane> Rows<T> {
                     problem.n_dry = contacts.n_dry(index);
                     problem.make_room();
                     problem.has_start = false;
+                    problem.asks_least = true;
                     if problem.n_contacts > 0 && contacts.is_factored(index) {
                         problem.factored.adopt(self.pattern_of(contacts, index));
                         problem.factored.slots = 0;
@@ -756,6 +924,12 @@ impl<T: Lane> Rows<T> {
             }
         }
     }
+}
+
+/// Whether a slot is for the dry friction of a joint.
+#[inline(always)]
+fn is_friction<T: Lane>(contacts: &Contacts<T>, slot: usize) -> bool {
+    matches!(contacts.joint_row(slot), Some((_, JointRow::Friction)))
 }
 
 /// Point and frame of a slot.

@@ -23,6 +23,12 @@ pub(super) trait Loaded<T: Lane, const C: usize>: System<T, Few<C>> + Sized {
     /// The least that is added to the diagonal of a problem's operator, 1/kg.
     fn least_softness(problem: &ContactProblem) -> f64;
 
+    /// Smallest pivot of a lane's last factors, 1/kg; 0 if it says nothing about the rank of W.
+    #[inline(always)]
+    fn least_pivot(&self, _lane: usize) -> f64 {
+        0.0
+    }
+
     /// Diagonal block of a problem's contact.
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9];
 

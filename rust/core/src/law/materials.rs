@@ -3,6 +3,9 @@
 //! A part of a machine and a primitive of the ground each have a material, named by a text. A pair
 //! that is listed here has Coulomb's μ and Newton's e of its own, whichever of the two comes first;
 //! every other pair has those of the step's options.
+//!
+//! A material may also have a friction of its own, which a machine's model states. It holds with
+//! every other material whose pair is not listed; between two such materials the smaller one does.
 
 use std::sync::Arc;
 
@@ -35,11 +38,22 @@ impl MaterialPair {
     }
 }
 
+/// A material with a friction of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnFriction {
+    /// Name of the material.
+    pub material: String,
+    /// Coulomb's μ with materials that have none.
+    pub friction_coefficient: f64,
+}
+
 /// The pairs that have a law of their own. Cheap to clone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Materials {
     /// `None` if there are none.
     pairs: Option<Arc<[MaterialPair]>>,
+    /// Materials with a friction of their own, and Newton's e of their contacts.
+    own: Option<(Arc<[OwnFriction]>, f64)>,
     is_inelastic: bool,
 }
 
@@ -49,16 +63,25 @@ impl Materials {
     pub fn new(pairs: Vec<MaterialPair>) -> Self {
         Self {
             pairs: Some(pairs).filter(|pairs| !pairs.is_empty()).map(Arc::from),
+            own: None,
             is_inelastic: false,
         }
+    }
+
+    /// The same with the materials of a machine that have a friction of their own; `restitution` is
+    /// that of their contacts.
+    #[must_use]
+    pub fn with_own(mut self, own: &Arc<[OwnFriction]>, restitution: f64) -> Self {
+        self.own = (!own.is_empty()).then(|| (Arc::clone(own), restitution));
+        self
     }
 
     /// The same with a restitution of zero between all.
     #[must_use]
     pub fn inelastic(&self) -> Self {
         Self {
-            pairs: self.pairs.clone(),
             is_inelastic: true,
+            ..self.clone()
         }
     }
 
@@ -66,10 +89,10 @@ impl Materials {
     #[inline]
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.pairs.is_none()
+        self.pairs.is_none() && self.own.is_none()
     }
 
-    /// All of them.
+    /// All pairs.
     #[must_use]
     pub fn pairs(&self) -> &[MaterialPair] {
         self.pairs.as_deref().unwrap_or_default()
@@ -85,19 +108,50 @@ impl Materials {
     #[must_use]
     pub fn between(&self, first: &str, second: &str) -> Option<[f64; 2]> {
         let mut pairs = self.pairs().iter();
-        let pair = pairs.find(|pair| pair.is_of(first, second))?;
-        let restitution = if self.is_inelastic {
-            0.0
-        } else {
-            pair.restitution
-        };
-        Some([pair.friction_coefficient, restitution])
+        let of_pair = pairs
+            .find(|pair| pair.is_of(first, second))
+            .map(|pair| [pair.friction_coefficient, pair.restitution]);
+        let [mu, e] = of_pair.or_else(|| self.by_own(first, second))?;
+        Some([mu, if self.is_inelastic { 0.0 } else { e }])
+    }
+
+    /// μ and e between two materials of which one has a friction of its own.
+    fn by_own(&self, first: &str, second: &str) -> Option<[f64; 2]> {
+        let (own, restitution) = self.own.as_ref()?;
+        let of_either = own
+            .iter()
+            .filter(|own| own.material == first || own.material == second);
+        let mu = of_either
+            .map(|own| own.friction_coefficient)
+            .reduce(f64::min)?;
+        Some([mu, *restitution])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_smaller_own_friction_holds_unless_the_pair_has_a_law() {
+        let own = |material: &str, friction_coefficient| OwnFriction {
+            material: material.to_owned(),
+            friction_coefficient,
+        };
+        let own: Arc<[OwnFriction]> = Arc::new([own("tyre", 0.9), own("skid", 0.2)]);
+        let listed = MaterialPair {
+            materials: ["tyre".to_owned(), "rock".to_owned()],
+            friction_coefficient: 1.5,
+            restitution: 0.0,
+        };
+        let laws = Materials::new(vec![listed]).with_own(&own, 0.5);
+        assert_eq!(laws.between("ground", "tyre"), Some([0.9, 0.5]));
+        assert_eq!(laws.between("tyre", "skid"), Some([0.2, 0.5]));
+        assert_eq!(laws.between("rock", "tyre"), Some([1.5, 0.0]));
+        assert_eq!(laws.between("rock", "ground"), None);
+        assert_eq!(laws.inelastic().between("ground", "tyre"), Some([0.9, 0.0]));
+        assert!(!laws.is_empty() && laws.pairs().len() == 1);
+    }
 
     #[test]
     fn the_order_of_two_materials_does_not_matter_and_others_have_no_law() {

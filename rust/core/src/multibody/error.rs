@@ -231,6 +231,16 @@ pub enum ModelError {
         /// Path of the field.
         field: String,
     },
+    /// A triangle of a drawing with a vertex that is not there.
+    #[error("{field}: there is no vertex {vertex}, only {count} vertices counted from 0")]
+    NoVertex {
+        /// Path of the field.
+        field: String,
+        /// Index of the vertex.
+        vertex: usize,
+        /// Number of vertices.
+        count: usize,
+    },
     /// The short form of one shape beside a list of shapes.
     #[error("{field}: a solid with shapes must not have its own {what}; the shapes define it")]
     NotWithShapes {
@@ -361,6 +371,7 @@ impl ModelError {
             | Self::CannotCollide { field }
             | Self::NoHull { field, .. }
             | Self::HullAlone { field }
+            | Self::NoVertex { field, .. }
             | Self::NotWithShapes { field, .. }
             | Self::HalfGiven { field }
             | Self::MassesContradict { field, .. }

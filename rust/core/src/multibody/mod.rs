@@ -66,9 +66,10 @@ pub mod state;
 
 pub use chart::Chart;
 pub use description::{
-    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, LoopDescription,
-    LoopKind, MAX_SHAPES, MAX_SOLIDS, MachineDescription, MassProperties, ModelDescription, Shape,
-    ShapeDescription, SolidDescription, Spring, TagDescription, TrackDescription, WheelDescription,
+    CouplingDescription, DrawingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits,
+    LoopDescription, LoopKind, MAX_SHAPES, MAX_SOLIDS, MachineDescription, MassProperties,
+    MaterialDescription, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
+    TagDescription, TrackDescription, WheelDescription,
 };
 pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};

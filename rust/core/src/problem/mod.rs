@@ -14,7 +14,7 @@
 //! - `scales`: factors between the velocity and the impulse of a contact.
 //! - `residual`: [`Residual`] judges an answer.
 //! - `prepared`: a problem together with its scales, for iterative methods.
-//! - `redundancy`: loads that equilibrium leaves open.
+//! - `redundancy`, `least_in_cones`: impulses that the motion leaves open, and the least of them.
 //! - `passivity`: scales down an approximate answer that would add energy.
 //!
 //! # One call
@@ -41,6 +41,7 @@
 mod dimension;
 mod error;
 mod friction_contact;
+mod least_in_cones;
 mod operator;
 mod passivity;
 mod prepared;
@@ -57,6 +58,7 @@ pub(crate) use operator::{Storage, dot};
 pub(crate) use passivity::passive_share;
 pub(crate) use prepared::{Prepared, Proximal};
 pub use redundancy::undetermined_loads;
+pub(crate) use redundancy::{Answered, Redundancy};
 pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
 pub use residual::{Residual, evaluate, evaluate_into};
 pub use rolling::RollingContact;

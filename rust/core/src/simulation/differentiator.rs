@@ -187,7 +187,7 @@ impl Differentiator {
         }
         let command = self.sim.command.clone();
         let sim = &mut self.sim;
-        if !sim.model().has_compliance() && sim.quick_step(&mut NoProbe).is_some() {
+        if !sim.model().has_compliance() && sim.quick_step(&mut NoProbe)?.is_some() {
             let mut found = sim.warm_start.clone();
             found.persistent.clear();
             self.set(state)?;

@@ -49,6 +49,17 @@ pub enum CommandError {
         /// rad.
         limit: f64,
     },
+    /// A joint that is to be held without stiffness and damping.
+    #[error(
+        "solids[{solid}].hold: the joint {name:?} has no gains to hold it; state \
+         hold = {{ stiffness, damping }} in the model, or give stiffness and damping to hold()"
+    )]
+    NoGains {
+        /// Index of its solid in the description.
+        solid: usize,
+        /// Its name.
+        name: String,
+    },
     /// A joint that the model does not have, or that is locked.
     #[error("{field}: there is no free joint named {name:?}")]
     UnknownJoint {

@@ -193,7 +193,12 @@ where
     }
 
     /// Without kinematic disks.
-    fn energy(&self, options: &StepOptions, state: &State<Vec<f64>>) -> Energy {
+    fn energy(
+        &self,
+        options: &StepOptions,
+        state: &State<Vec<f64>>,
+        _command: &Self::Command,
+    ) -> Energy {
         let State {
             configuration, v, ..
         } = state;

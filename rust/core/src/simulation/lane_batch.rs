@@ -8,6 +8,7 @@
 use std::sync::Arc;
 
 use super::rover::RoverSimulation;
+use crate::caught::caught;
 use crate::integrator::{NoProbe, StepError, StepOptions, StepReport};
 use crate::lanes::machine::Machine;
 use crate::lanes::problem::ContactProblem;
@@ -90,6 +91,8 @@ struct Slot {
     /// Index of the rover.
     index: usize,
     report: StepReport,
+    /// Report of the steps after which the rover itself has its state.
+    kept: StepReport,
     has_failed: bool,
     /// Whether its last step was a general one.
     is_general: bool,
@@ -137,16 +140,50 @@ impl<T: Lane> Lanes<T> {
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) {
-        let n_slots = self.slot(rovers);
+        let Ok(n_slots) = caught(|| self.slot(rovers)) else {
+            *self = Self::new(self.token);
+            for entry in rovers {
+                entry.go_alone(n, go_on);
+            }
+            return;
+        };
         let mut taken = self.slots[..n_slots].iter().flatten().peekable();
         for (k, entry) in rovers.iter_mut().enumerate() {
             if taken.next_if(|slot| slot.index == k).is_none() {
                 entry.go_alone(n, go_on);
             }
         }
-        if n_slots == 0 {
-            return;
+        if n_slots > 0 && caught(|| self.advance_blocks(n_slots, rovers, n, go_on)).is_err() {
+            self.part(rovers, n, go_on);
         }
+    }
+
+    /// After a panic in the blocks every rover takes the steps that it lacks alone, as it would
+    /// have moved; that which panics has the error.
+    #[cold]
+    fn part(&mut self, rovers: &mut [BatchRover<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
+        for (place, slot) in self.slots.iter().enumerate() {
+            let Some(slot) = slot else {
+                continue;
+            };
+            let BatchRover { rover, error } = &mut rovers[slot.index];
+            if let Some(block) = self.blocks.get_mut(place / T::LANES) {
+                rover.recover_from(block, place % T::LANES);
+            }
+            if !slot.has_failed {
+                **error = rover.resume(&slot.kept, n, go_on).err();
+            }
+        }
+        *self = Self::new(self.token);
+    }
+
+    fn advance_blocks(
+        &mut self,
+        n_slots: usize,
+        rovers: &mut [BatchRover<'_>],
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) {
         let n_blocks = n_slots / T::LANES;
         for (b, block) in self.blocks[..n_blocks].iter_mut().enumerate() {
             for lane in 0..T::LANES {
@@ -163,8 +200,9 @@ impl<T: Lane> Lanes<T> {
         }
         self.step(n_blocks, rovers, n, go_on);
         for (b, block) in self.blocks[..n_blocks].iter_mut().enumerate() {
-            for (lane, slot) in self.slots[b * T::LANES..][..T::LANES].iter().enumerate() {
-                if let Some(slot) = slot.filter(|slot| !slot.has_failed) {
+            let slots = self.slots[b * T::LANES..][..T::LANES].iter_mut();
+            for (lane, slot) in slots.enumerate() {
+                if let Some(slot) = slot.as_mut().filter(|slot| !slot.has_failed) {
                     let rover = &mut *rovers[slot.index].rover;
                     if slot.is_general {
                         rover.leave(block, lane);
@@ -173,6 +211,7 @@ impl<T: Lane> Lanes<T> {
                         rover.store(block, lane);
                         rover.list_from(block, lane);
                     }
+                    slot.kept = slot.report;
                     rover.end_call(slot.report);
                 }
             }
@@ -197,6 +236,7 @@ impl<T: Lane> Lanes<T> {
                 self.slots.push(Some(Slot {
                     index: k,
                     report: StepReport::default(),
+                    kept: StepReport::default(),
                     has_failed: false,
                     is_general: false,
                 }));
@@ -315,6 +355,7 @@ impl<T: Lane> Lanes<T> {
             }
             let BatchRover { rover, error } = &mut rovers[slot.index];
             rover.store(block, lane);
+            slot.kept = slot.report;
             match rover.step_generally() {
                 Ok(report) => {
                     slot.report.merge(&StepReport {
@@ -322,6 +363,7 @@ impl<T: Lane> Lanes<T> {
                         ..report
                     });
                     slot.is_general = true;
+                    slot.kept = slot.report;
                     rover.load(block, lane);
                 }
                 Err(why) => {

@@ -92,7 +92,12 @@ impl Scene for PlanarScene {
         contact.foot.into()
     }
 
-    fn energy(&self, options: &StepOptions, state: &State<Vec<f64>>) -> Energy {
+    fn energy(
+        &self,
+        options: &StepOptions,
+        state: &State<Vec<f64>>,
+        _command: &Self::Command,
+    ) -> Energy {
         let gravity = options.gravity.xy();
         let energy = (self.machine).energy(&state.configuration, &state.v, &gravity);
         Energy {

@@ -201,6 +201,16 @@ impl Scene for RoverScene {
         parts.gaps_to_grains.clear();
     }
 
+    fn recover(&self, parts: &mut RoverParts, memory: &mut RoverMemory) {
+        if let (Some(block), Some(sand)) = (&mut parts.quick.block, &mut memory.sand) {
+            block.recover_ruts(0, &mut sand.ruts);
+        }
+        *parts = RoverParts {
+            drive_work: std::mem::take(&mut parts.drive_work),
+            ..self.parts()
+        };
+    }
+
     /// Records torques and work of the drives.
     fn after_step(&self, taken: StepTaken<'_, Self>) {
         let drives = taken.parts.tree.drives();
@@ -236,11 +246,23 @@ impl Scene for RoverScene {
         }
     }
 
-    fn energy(&self, options: &StepOptions, state: &State<Configuration>) -> Energy {
+    /// With springs and position controls.
+    fn energy(
+        &self,
+        options: &StepOptions,
+        state: &State<Configuration>,
+        command: &RoverCommand,
+    ) -> Energy {
         let kinematics = Kinematics::of(&self.model, &state.configuration);
         let mut energy = kinematics.energy(&self.model, &state.v, &options.gravity);
-        energy.potential += self.model.spring_energy(&state.configuration.joints);
+        let joints = &state.configuration.joints;
+        energy.potential += self.model.spring_energy(joints);
+        energy.potential += self.stored(state, command);
         energy
+    }
+
+    fn stored(&self, state: &State<Configuration>, command: &RoverCommand) -> f64 {
+        command.actuators.stored(&state.configuration.joints)
     }
 
     fn fingerprint(&self) -> u64 {
@@ -278,6 +300,13 @@ pub struct LastCall {
     pub positive_work: f64,
 }
 
+/// Options with the friction of the model's materials.
+fn with_laws_of(model: &Model, mut options: StepOptions) -> StepOptions {
+    let restitution = options.restitution;
+    options.materials = (options.materials).with_own(model.own_frictions(), restitution);
+    options
+}
+
 impl RoverSimulation {
     /// At rest in the zero configuration, with all loops closed; steering joints held at zero, all
     /// others free.
@@ -290,6 +319,7 @@ impl RoverSimulation {
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
         let (configuration, v) = (Configuration::zero(&model), vec![0.0; model.nv()]);
+        let options = with_laws_of(&model, options);
         let mut made = Self::of(
             RoverScene::new(model, terrain),
             configuration.clone(),
@@ -317,6 +347,7 @@ impl RoverSimulation {
             configuration.is_of(&scene.model),
             "invariant: a configuration of this model"
         );
+        let options = with_laws_of(&scene.model, options);
         let mut made = Self::of(scene, configuration.clone(), options)?;
         made.place_closed(configuration, v);
         Ok(made)
@@ -378,7 +409,7 @@ impl RoverSimulation {
     fn restart(&mut self, placement: Placement) {
         self.command = placement.scene.command();
         self.scene = placement.scene;
-        self.options = placement.options;
+        self.options = with_laws_of(&self.scene.model, placement.options);
         self.place_closed(placement.configuration, placement.v);
     }
 

@@ -6,9 +6,26 @@ use super::active_contact::ActiveContact;
 use super::rover::RoverSimulation;
 use super::rover_sand::WheelContactInSand;
 use crate::contact::detection::{deepest_overlap, wheel_contacts};
+use crate::contact::rollers::across_of;
 use crate::contact::{Contact, ContactFrame, OtherSide, Part};
 use crate::geometry::query::PairPoint;
-use crate::multibody::Kinematics;
+use crate::multibody::{Kinematics, Model};
+
+impl ActiveContact<Contact> {
+    /// The contact along unit vectors, where its friction across differs from that along: the
+    /// solver's tangent b is then scaled by their ratio.
+    #[must_use]
+    pub fn with_unit_axes(&self, model: &Model) -> Self {
+        let mut own = *self;
+        let across = across_of(model, &self.contact).filter(|across| *across > 0.0);
+        if let Some(across) = across {
+            own.contact.frame.b /= across;
+            own.impulse[2] *= across;
+            own.velocity[2] /= across;
+        }
+        own
+    }
+}
 
 impl RoverSimulation {
     /// Current nearest point, frame and gap of every wheel.
@@ -61,6 +78,7 @@ impl RoverSimulation {
     pub(super) fn for_each_wheel_contact(&self, mut act: impl FnMut(usize, [f64; 3], [f64; 3])) {
         let mut kinematics = None;
         for active in &self.active {
+            let active = &active.with_unit_axes(self.model());
             if let Part::Wheel(i) = active.contact.part {
                 act(i, active.impulse, active.velocity);
             }

@@ -194,15 +194,48 @@ impl RoverSimulation {
                 }
             }
         }
-        for (i, &j) in indices.iter().enumerate() {
+        let gains = |j: usize| {
             let hold = self.scene.model.hold(j);
+            let stiffness = stiffness.unwrap_or(hold.stiffness);
+            (stiffness, damping.unwrap_or(hold.damping))
+        };
+        for &j in &indices {
+            self.check_gains(j, gains(j))?;
+        }
+        let gains: Vec<_> = indices.iter().map(|&j| gains(j)).collect();
+        for ((i, &j), (stiffness, damping)) in indices.iter().enumerate().zip(gains) {
             self.command.actuators.held[j] = Some(HeldJoint {
                 set_point: set_points.map_or(self.state.configuration.joints[j], |p| p[i]),
-                stiffness: stiffness.unwrap_or(hold.stiffness),
-                damping: damping.unwrap_or(hold.damping),
+                stiffness,
+                damping,
             });
         }
         Ok(())
+    }
+
+    /// Refuses to hold a joint whose stiffness and damping are 0: nothing would hold it.
+    fn check_gains(&self, j: usize, (stiffness, damping): (f64, f64)) -> Result<(), CommandError> {
+        if stiffness > 0.0 || damping > 0.0 {
+            return Ok(());
+        }
+        let name = &self.scene.model.bodies()[self.scene.model.joints()[j].body].name;
+        let mut solids = self.scene.model.description().solids.iter();
+        Err(CommandError::NoGains {
+            solid: solids.position(|solid| solid.name == *name).unwrap_or(0),
+            name: name.clone(),
+        })
+    }
+
+    /// Checks that the model states gains for every wheel that [`Self::brake`] holds.
+    ///
+    /// # Errors
+    /// The first wheel without gains.
+    pub fn check_brakes(&self) -> Result<(), CommandError> {
+        let model = &self.scene.model;
+        (model.wheels().iter().filter_map(|wheel| wheel.joint)).try_for_each(|j| {
+            let hold = model.hold(j);
+            self.check_gains(j, (hold.stiffness, hold.damping))
+        })
     }
 
     /// Releases joints by name.
@@ -216,7 +249,8 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Holds all wheels where they are and sets their torques to zero.
+    /// Holds all wheels where they are and sets their torques to zero. Wheels without gains stay
+    /// free: [`Self::check_brakes`].
     pub fn brake(&mut self) {
         self.command.wheel_torque.fill(0.0);
         self.combine_torques();

@@ -9,6 +9,7 @@ use super::active_contact::ActiveContact;
 use super::grains::GrainSimulation;
 use super::rover::RoverSimulation;
 use super::scene::{Scene, StepTaken};
+use crate::caught::caught;
 use crate::contact::Part;
 use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Sphere, SupportMap};
@@ -110,15 +111,19 @@ impl RoverInGrains {
             }
         }
         check_apart(rover, bed)?;
+        Ok(Self::with_friction(friction, rover, bed))
+    }
+
+    fn with_friction(friction: f64, rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Self {
         let q = (bed.q().clone(), rover.q().clone());
         let nv = bed.scene.nv() + rover.scene.nv();
         let room = bed.scene.contact_capacity() + rover.scene.contact_capacity();
-        Ok(Self {
+        Self {
             friction,
             warm_start: WarmStart::with_capacity(room, 0),
             scratch: Scratch::new(&q, nv, room, 3),
             parts: CompositeScratch::new(rover.model()),
-        })
+        }
     }
 
     /// μ of the rover's parts on grains.
@@ -212,20 +217,32 @@ impl RoverInGrains {
             friction: self.friction,
             parts: &mut self.parts,
         };
-        let taken = options.variant.step(
-            &mut system,
-            options,
-            StateMut {
-                configuration: &mut q,
-                v: &mut v,
-                time: &mut time,
-            },
-            &mut self.warm_start,
-            &mut self.scratch,
-            &mut NoProbe,
-        );
+        let taken = caught(|| {
+            options.variant.step(
+                &mut system,
+                options,
+                StateMut {
+                    configuration: &mut q,
+                    v: &mut v,
+                    time: &mut time,
+                },
+                &mut self.warm_start,
+                &mut self.scratch,
+                &mut NoProbe,
+            )
+        });
         (bed.state.configuration, rover.state.configuration) = q;
-        let report = taken?;
+        let report = match taken {
+            Ok(taken) => taken?,
+            Err(fault) => {
+                // Scratch anew; the state is that before the step.
+                *self = Self::with_friction(self.friction, rover, bed);
+                rover.scene.recover(&mut rover.parts, &mut rover.memory);
+                bed.scene.recover(&mut bed.parts, &mut bed.memory);
+                let time = bed.state.time;
+                return Err(StepError::Internal { time, fault });
+            }
+        };
         bed.state.v.copy_from_slice(&v[..n_bed]);
         rover.state.v.copy_from_slice(&v[n_bed..]);
         bed.state.time = time;

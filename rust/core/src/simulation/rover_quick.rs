@@ -77,6 +77,11 @@ impl RoverScene {
             all.resize_with(block.n_problems(), ContactProblem::default);
         }
         block.prepare(problems, probe);
+        if !block.is_going(0) {
+            // Its problems may have more contacts than fit.
+            block.return_ruts(0, &mut lane_rover);
+            return None;
+        }
         let solver = &step.options.solver;
         let mut next = Next::Retake;
         while next == Next::Retake {
@@ -137,6 +142,13 @@ impl RoverSimulation {
     /// Leaves a block that has made nothing of it since it was loaded.
     pub(super) fn leave<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
         block.return_ruts(lane, &mut self.lane_rover());
+    }
+
+    /// Leaves a block in whose step something panicked: whatever it holds of the rover comes back.
+    pub(super) fn recover_from<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+        if let Some(sand) = &mut self.memory.sand {
+            block.recover_ruts(lane, &mut sand.ruts);
+        }
     }
 
     /// Lists the contacts of its last step in a block.

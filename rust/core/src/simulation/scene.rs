@@ -71,6 +71,12 @@ pub trait Scene: Clone {
     /// default there are none.
     fn begin_call(&self, _parts: &mut Self::Parts) {}
 
+    /// Called after a step that panicked: makes the scratch anew and takes from it what belongs to
+    /// the memory. By default nothing does.
+    fn recover(&self, parts: &mut Self::Parts, _memory: &mut Self::Memory) {
+        *parts = self.parts();
+    }
+
     /// Whether [`Self::quick_step`] takes any.
     const HAS_FAST_STEP: bool = false;
 
@@ -92,8 +98,19 @@ pub trait Scene: Clone {
     /// way it was taken. By default they are.
     fn publish(&self, _parts: &mut Self::Parts, _scratch: &mut SceneScratch<Self>) {}
 
-    /// Kinetic and potential energy of a state, J.
-    fn energy(&self, options: &StepOptions, state: &State<Self::Configuration>) -> Energy;
+    /// Kinetic and potential energy of a state under a command, J.
+    fn energy(
+        &self,
+        options: &StepOptions,
+        state: &State<Self::Configuration>,
+        command: &Self::Command,
+    ) -> Energy;
+
+    /// The part of it that position controls store, which a command changes at once, J. By default
+    /// there are none.
+    fn stored(&self, _state: &State<Self::Configuration>, _command: &Self::Command) -> f64 {
+        0.0
+    }
 
     /// A number that is equal for two scenes only if a snapshot of one fits the other.
     fn fingerprint(&self) -> u64;

@@ -5,12 +5,13 @@ use super::error::SnapshotError;
 use super::profile::Stopwatch;
 use super::scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
 use super::state::State;
+use crate::caught::caught;
 use crate::integrator::{
     Integrator, NoProbe, OptionsError, Probe, Scratch, StepError, StepOptions, StepReport,
     WarmStart,
 };
 use crate::multibody::Energy;
-use crate::problem::undetermined_loads;
+use crate::problem::{Dimension, FrictionContactProblem, undetermined_loads};
 
 /// Steps of a copy that a profile takes before it measures.
 const WARM_UP: usize = 10;
@@ -29,6 +30,10 @@ pub struct Simulation<S: Scene> {
     pub(super) scratch: SceneScratch<S>,
     pub(super) active: Vec<ActiveContact<S::Contact>>,
     last_report: StepReport,
+    /// Energy in position controls at the end of the last call, J; none if the state was set since.
+    stored: Option<f64>,
+    /// What the commands since then have changed of it, J.
+    set: f64,
 }
 
 impl<S: Scene> Simulation<S> {
@@ -53,6 +58,8 @@ impl<S: Scene> Simulation<S> {
             warm_start: WarmStart::with_capacity(n, nv),
             active: Vec::with_capacity(n),
             last_report: StepReport::default(),
+            stored: None,
+            set: 0.0,
             scene,
             options,
         })
@@ -122,7 +129,7 @@ impl<S: Scene> Simulation<S> {
     /// Current kinetic and potential energy, J.
     #[must_use]
     pub fn energy(&self) -> Energy {
-        self.scene.energy(&self.options, &self.state)
+        (self.scene).energy(&self.options, &self.state, &self.command)
     }
 
     /// Sets configuration and velocity; time 0, warm start and memory forgotten, the command kept.
@@ -147,6 +154,7 @@ impl<S: Scene> Simulation<S> {
 
     /// Clears the results of the last call of [`Self::step`].
     pub(super) fn forget_last_call(&mut self) {
+        self.stored = None;
         self.active.clear();
         self.scene.begin_call(&mut self.parts);
         self.last_report = StepReport::default();
@@ -234,7 +242,7 @@ impl<S: Scene> Simulation<S> {
         self.begin_call();
         let result = self.steps(integrator, may_be_quick, n, go_on, probe);
         self.end_call(result.clone().unwrap_or_default());
-        result
+        result.map(|_| self.last_report)
     }
 
     /// Resets what counts over a call.
@@ -242,11 +250,17 @@ impl<S: Scene> Simulation<S> {
         self.scene.begin_call(&mut self.parts);
         self.last_report = StepReport::default();
         self.active.clear();
+        let stored = self.scene.stored(&self.state, &self.command);
+        self.set = self.stored.map_or(0.0, |before| stored - before);
     }
 
     /// Keeps the report of a call.
     pub(super) fn end_call(&mut self, report: StepReport) {
         self.last_report = report;
+        if report.steps > 0 {
+            self.last_report.energy_of_set_points = self.set;
+            self.stored = Some(self.scene.stored(&self.state, &self.command));
+        }
     }
 
     fn steps<I>(
@@ -262,7 +276,11 @@ impl<S: Scene> Simulation<S> {
     {
         let mut total = StepReport::default();
         for _ in 0..n {
-            let quick = may_be_quick.then(|| self.quick_step(probe)).flatten();
+            let quick = if may_be_quick {
+                self.quick_step(probe)?
+            } else {
+                None
+            };
             let report = match quick {
                 Some(report) => report,
                 None => StepReport {
@@ -282,8 +300,53 @@ impl<S: Scene> Simulation<S> {
         Ok(total)
     }
 
+    /// Takes the steps that are left of a call of `n`, after those of a report.
+    pub(super) fn resume(
+        &mut self,
+        before: &StepReport,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), StepError> {
+        if before.steps == 0 {
+            self.begin_call();
+        }
+        let (variant, left) = (self.options.variant, n.saturating_sub(before.steps));
+        let taken = self.steps(&variant, true, left, go_on, &mut NoProbe);
+        let mut total = *before;
+        total.merge(&taken.clone().unwrap_or_default());
+        let total = if taken.is_ok() {
+            total
+        } else {
+            StepReport::default()
+        };
+        self.end_call(total);
+        taken.map(|_| ())
+    }
+
+    /// Calls `step`, and where it panics makes all scratch anew. The state is then that before it.
+    fn guard<R>(&mut self, step: impl FnOnce(&mut Self) -> R) -> Result<R, StepError> {
+        let time = self.state.time;
+        caught(|| step(self)).map_err(|fault| {
+            self.scene.recover(&mut self.parts, &mut self.memory);
+            let (nv, n) = (self.scene.nv(), self.scene.contact_capacity());
+            let d = <S::Contact as LocatedContact>::Vector::N;
+            self.scratch = Scratch::new(&self.state.configuration, nv, n, d);
+            StepError::Internal { time, fault }
+        })
+    }
+
     /// The scene's own way to take a step, if it has one.
-    pub(super) fn quick_step(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
+    pub(super) fn quick_step(
+        &mut self,
+        probe: &mut dyn Probe,
+    ) -> Result<Option<StepReport>, StepError> {
+        if !S::HAS_FAST_STEP {
+            return Ok(None);
+        }
+        self.guard(|own| own.quick_step_of_scene(probe))
+    }
+
+    fn quick_step_of_scene(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
         let mut step = QuickStep {
             options: &self.options,
             state: &mut self.state,
@@ -297,6 +360,17 @@ impl<S: Scene> Simulation<S> {
 
     /// A step of any scene and integrator.
     pub(super) fn general_step<I>(
+        &mut self,
+        integrator: &I,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        self.guard(|own| own.general_step_of_scene(integrator, probe))?
+    }
+
+    fn general_step_of_scene<I>(
         &mut self,
         integrator: &I,
         probe: &mut dyn Probe,
@@ -391,11 +465,20 @@ where
         )
     }
 
-    /// Independent sets of normal forces that balance one another in the last step; see
-    /// [`undetermined_loads`].
+    /// Contacts whose impulses the motion of the last step leaves open; see [`undetermined_loads`].
     #[must_use]
     pub fn undetermined_loads(&self) -> usize {
-        let d = <S::Contact as LocatedContact>::Vector::N;
-        undetermined_loads(d, self.parts.operator(), self.scratch.impulses_of_problem())
+        let dimension = match <S::Contact as LocatedContact>::Vector::N {
+            2 => Dimension::Two,
+            _ => Dimension::Three,
+        };
+        let (W, q, mu) = self.last_problem();
+        let p = self.scratch.impulses_of_problem();
+        if W.len() != q.len() * q.len() || p.len() != q.len() {
+            return 0; // no contact, or no step yet
+        }
+        let problem = FrictionContactProblem::from_assembled(dimension, W, q, mu);
+        let tolerance = self.options.solver.tolerance;
+        undetermined_loads(&problem, tolerance, p)
     }
 }

@@ -15,6 +15,7 @@ use super::error::BatchError;
 use super::lane_batch::{BatchRover, LaneBatch};
 use super::reading::ReadingScratch;
 use super::rover::RoverSimulation;
+use crate::caught::{Fault, caught};
 use crate::integrator::StepError;
 use crate::pool::Pool;
 use crate::scalar::{Instructions, MAX_LANES};
@@ -131,7 +132,13 @@ impl Workers {
     }
 }
 
-/// Gives every rover its turn of `n` steps.
+/// Notes a panic in a rover's turn outside its steps.
+fn note(rover: &RoverSimulation, fault: Fault, error: &mut Option<StepError>) {
+    let time = rover.time();
+    *error = Some(StepError::Internal { time, fault });
+}
+
+/// Gives every rover its turn of `n` steps. A panic ends the turn of its own rover.
 ///
 /// `workers`: one for each thread, at least one; `pool`: the threads besides the calling one. Once
 /// `go_on` returns false, each rover stops after a whole step.
@@ -163,8 +170,10 @@ fn take_turns<'a, P: Send + 'a>(
             for ((rover, error), place) in &mut own {
                 **error = None;
                 if may_move && turn.is_moving(place) {
-                    turn.begin(rover, place);
-                    rovers.push(BatchRover { rover, error });
+                    match caught(|| turn.begin(rover, place)) {
+                        Ok(()) => rovers.push(BatchRover { rover, error }),
+                        Err(fault) => note(rover, fault, error),
+                    }
                 }
             }
             worker.batch.advance(&mut rovers, n, go_on);
@@ -174,7 +183,10 @@ fn take_turns<'a, P: Send + 'a>(
                     has_moved: may_move && turn.is_moving(place),
                     error: error.as_ref(),
                 };
-                turn.end(rover, done, place, &mut worker.reading);
+                if let Err(fault) = caught(|| turn.end(rover, done, place, &mut worker.reading)) {
+                    worker.reading = ReadingScratch::default();
+                    note(rover, fault, error);
+                }
             }
         }
     };

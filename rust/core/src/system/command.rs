@@ -95,7 +95,24 @@ pub struct Command {
     pub wrenches: Vec<Wrench>,
 }
 
+impl HeldJoint {
+    /// Energy that the stiffness stores at a coordinate, J.
+    #[must_use]
+    pub fn potential(&self, coordinate: f64) -> f64 {
+        let stretch = coordinate - self.set_point;
+        0.5 * self.stiffness * stretch * stretch
+    }
+}
+
 impl Command {
+    /// Energy that the held joints store at joint coordinates (n_joints), J.
+    #[must_use]
+    pub fn stored(&self, coordinates: &[f64]) -> f64 {
+        let held = self.held.iter().zip(coordinates);
+        let stored = held.filter_map(|(held, q)| held.as_ref().map(|held| held.potential(*q)));
+        stored.sum()
+    }
+
     /// No torque, nothing held.
     #[must_use]
     pub fn idle(model: &Model) -> Self {

@@ -15,6 +15,7 @@
 
 use super::command::Command;
 use super::fitted_theta::implicit_weight;
+use crate::integrator::Work;
 use crate::multibody::mechanism::Mechanism;
 use crate::multibody::{JointProperties, MotorLine, Passive};
 use crate::scalar::{Lane, LaneMask};
@@ -40,6 +41,7 @@ struct Joint<T> {
 struct Actuation<T> {
     drive: T,
     damper: T,
+    spring: T,
     /// All other torques.
     other: T,
     turned: T,
@@ -276,12 +278,12 @@ impl<T: Lane> Drives<T> {
         for (j, own) in mechanism.joints.iter().enumerate() {
             let k = own.velocity;
             let torque = self.actuation(j, step, places[j], [v[k], v_end[k]]);
-            out[k] += step.0 * (torque.other + torque.drive + torque.damper);
+            out[k] += step.0 * (torque.other + torque.spring + torque.drive + torque.damper);
         }
     }
 
-    /// Work of the joints of each cluster over a step from `v` to `v_end`, J; keeps impulse and work
-    /// of each drive.
+    /// Work of the joints of each cluster over a step from `v` to `v_end`; keeps impulse and work of
+    /// each drive.
     #[inline(always)]
     pub fn work(
         &mut self,
@@ -289,10 +291,10 @@ impl<T: Lane> Drives<T> {
         step: (T, T),
         places: &[T],
         [v, v_end]: [&[T]; 2],
-        out: &mut [T],
+        out: &mut [Work<T>],
     ) {
         let zero = step.0.like(0.0);
-        out.fill(zero);
+        out.fill(Work::none(zero));
         for (j, own) in mechanism.joints.iter().enumerate() {
             let k = own.velocity;
             let torque = self.actuation(j, step, places[j], [v[k], v_end[k]]);
@@ -301,11 +303,32 @@ impl<T: Lane> Drives<T> {
             self.tried[j] = [torque.drive * step.0, work];
             // A damper only dissipates. In a step that reverses the rate, torque and displacement
             // are evaluated at different times, and their product may be positive.
-            out[own.cluster] += work + torque.other * turned + (torque.damper * turned).min(zero);
+            let total = &mut out[own.cluster];
+            total.supplied += work + torque.other * turned;
+            total.damped += (-torque.damper * turned).max(zero);
+            total.of_springs += torque.spring * turned;
         }
     }
 
-    /// Work of all joints over a displacement that is added to such a step, J.
+    /// Energy that springs and position controls of each cluster store at joint coordinates, J, but
+    /// for a constant where a joint has both. `zero`: 0 in every lane.
+    #[inline(always)]
+    pub fn stored(&self, mechanism: &Mechanism, zero: T, places: &[T], out: &mut [T]) {
+        out.fill(zero);
+        let joints = self.joints.iter().zip(&mechanism.joints);
+        for ((joint, own), (place, is_implicit)) in joints.zip(places.iter().zip(&self.is_implicit))
+        {
+            if *is_implicit {
+                let stretch = *place - joint.set_point;
+                out[own.cluster] += joint.stiffness * stretch * stretch;
+            }
+        }
+        for twice in out {
+            *twice = zero.like(0.5) * *twice;
+        }
+    }
+
+    /// Work that drives and torques supply over a displacement that is added to such a step, J.
     #[inline(always)]
     pub fn work_of_displacement(
         &self,
@@ -337,6 +360,7 @@ impl<T: Lane> Drives<T> {
         let mut own = Actuation {
             drive: joint.line.at_rest(),
             damper: h.like(0.0),
+            spring: h.like(0.0),
             other: joint.torque,
             turned: h * mean,
         };
@@ -344,7 +368,7 @@ impl<T: Lane> Drives<T> {
             let rate = joint.rate(v, v_end);
             let place = place + h * joint.theta * mean;
             own.drive = joint.line.torque(rate);
-            own.other -= joint.stiffness * (place - joint.set_point);
+            own.spring = -joint.stiffness * (place - joint.set_point);
             own.damper = -joint.damping * rate;
         }
         own

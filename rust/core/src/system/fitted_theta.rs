@@ -3,7 +3,8 @@
 //! For the decay `v̇ = −λ v` the θ-method is exact at `θ(z) = 1/(1 − e^(−z)) − 1/z`, z = h λ. If
 //! the step resolves the decay, θ tends to ½ and keeps order 2, since θ − ½ = z/12. If the
 //! controller is stiffer than the step resolves, θ tends to 1; the trapezoidal rule would then
-//! oscillate from step to step for seconds.
+//! oscillate from step to step for seconds. A spring that the step resolves counts as no decay: at
+//! θ = ½ it keeps its energy.
 //!
 //! Source: Liniger and Willoughby 1970, *SIAM J. Numer. Anal.* 7, 47–66.
 
@@ -21,6 +22,14 @@ pub fn fitted_theta<T: Lane>(z: T) -> T {
     T::select(z.lt(z.like(1e-2)), series, exact)
 }
 
+/// Largest h ω of a spring whose oscillation a step resolves: the midpoint rule takes four steps
+/// for a period. It then keeps the spring's energy.
+///
+/// Measured on the response of one joint for h ω up to 100 and damping ratios of 0 to 5: with half
+/// the stiffness counted as damping below this limit too, the error of damped joints is the same
+/// within a fifth, and an undamped spring of 10 Hz at 5 ms loses 55% of its energy in 10 s.
+const RESOLVED: f64 = 2.0;
+
 /// θ_j of a coordinate with this damping (N m s/rad), stiffness (N m/rad) and inertia (kg m²) in a
 /// step of h with the scheme's θ: the fitted one, but at least θ.
 ///
@@ -31,7 +40,8 @@ pub fn fitted_theta<T: Lane>(z: T) -> T {
 #[must_use]
 pub fn implicit_weight<T: Lane>((h, theta): (T, T), (damping, stiffness): (T, T), inertia: T) -> T {
     let zero = h.like(0.0);
-    let z = h * (damping + h.like(0.5) * h * stiffness) / inertia;
+    let unresolved = h * h * stiffness / inertia - h.like(RESOLVED * RESOLVED);
+    let z = h * damping / inertia + h.like(0.5) * unresolved.max(zero);
     let is_stiff = zero.lt(damping) | zero.lt(stiffness);
     T::select(is_stiff, fitted_theta(z).max(theta), theta)
 }

@@ -14,6 +14,10 @@
 //! `A(q⁺) v = 0`, both along `M̂⁻¹ Aᵀ`. The second changes v by O(h²) and takes energy of O(h⁴),
 //! which the energy audit gives back to free motion.
 //!
+//! Where the loops let nothing move a contact along one of its directions, that entry on W's
+//! diagonal is the rounding of a difference. Such a row of H counts as zero: no impulse along it
+//! changes any velocity, and the least that obeys the law is zero.
+//!
 //! Rows that follow from earlier ones, such as those across the plane of a planar linkage, are left
 //! out: their part outside the span is below `DEPENDENT` of the loop's longest row. Their
 //! reactions count as zero.
@@ -27,7 +31,7 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::contact::ContactSystem;
-use crate::contact::rows::{Triple, along};
+use crate::contact::rows::{Triple, add_scaled, along};
 use crate::integrator::report::MOST_OPEN;
 use crate::multibody::error::StateError;
 use crate::multibody::loops::{Placed, widest, write_loops};
@@ -43,6 +47,16 @@ use crate::scalar::{Lane, LaneMask, Single};
 ///
 /// Loops that close to a micrometre make redundant rows differ by 1e-6 of their length.
 const DEPENDENT: f64 = 1e-5;
+
+/// Part of an entry on W's diagonal that the loops leave, relative to what it is without them, below
+/// which it is rounding: of a difference `Z² − B²`, and of the square of a projected row.
+///
+/// A sum over a hundred velocities rounds to about 1e-14 of itself. A projected row rounds to 1e-15
+/// of its length, and to 1e-11 where rows of the loops nearly depend on each other
+/// ([`DEPENDENT`]). A contact that does move has more: a foot of a gram that is welded to a
+/// machine of a hundred tonnes keeps 1e-8.
+pub(crate) const ROUNDED: f64 = 1e-13;
+pub(crate) const ROUNDED_SQUARE: f64 = 1e-20;
 
 /// Gap below which a loop is closed, m or rad.
 const TIGHT: f64 = 1e-13;
@@ -339,6 +353,41 @@ impl<T: Lane> Loops<T> {
         }
     }
 
+    /// Sets the products of a contact to zero in the lanes and along the directions of masks.
+    #[inline(always)]
+    pub(crate) fn hold(&mut self, contact: usize, held: [T::Mask; 3]) {
+        let (zero, n) = (T::splat(self.token, 0.0), self.n);
+        for b in self.B.iter_mut().skip(contact).step_by(n) {
+            for k in 0..3 {
+                b[k] = T::select(held[k], zero, b[k]);
+            }
+        }
+    }
+
+    /// `Z − Qᵀ B` in place of a contact's Z over all velocities (nv).
+    #[inline(always)]
+    pub(crate) fn project_rows(&self, contact: usize, rows: &mut [Triple<T>]) {
+        for row in 0..self.m() {
+            let b = self.product(row, contact);
+            for (z, q) in rows.iter_mut().zip(self.q(row)) {
+                add_scaled(z, b, -*q);
+            }
+        }
+    }
+
+    /// Along which directions the loops let nothing move a contact: `free` and `left` are its part of
+    /// W's diagonal without them and with them, 1/kg.
+    #[inline(always)]
+    pub(crate) fn holds(free: &Triple<T>, left: &Triple<T>, rounded: f64) -> [T::Mask; 3] {
+        [0, 1, 2].map(
+            #[inline(always)]
+            |k| {
+                let zero = free[k].like(0.0);
+                zero.lt(free[k]) & !(zero.like(rounded) * free[k]).lt(left[k])
+            },
+        )
+    }
+
     /// `y −= Qᵀ B p` in the lanes of a mask: what the loops make of impulses, given by contact and
     /// the lanes in which there is one.
     #[inline(always)]
@@ -557,23 +606,26 @@ impl Loops<f64> {
         Self::new(Single::best(), model.mechanism(), model.loops(), 0)
     }
 
-    /// Computes B, and subtracts `Bᵀ B` from W.
+    /// Computes B, and W from the projected rows; those of contacts that the loops hold are zero.
     pub(super) fn project_operator(&mut self, model: &Model, system: &mut ContactSystem) {
         let n = system.n_contacts();
         self.set_size(n);
         if n == 0 {
             return;
         }
-        let size = 3 * n;
         for row in 0..self.m() {
             let b = self.B[row * n..][..n].as_flattened_mut();
             system.local(model, self.middle.q(row, model.nv()), b);
         }
-        for b in self.B.chunks_exact(n) {
-            for (row, x) in system.W.chunks_exact_mut(size).zip(b.as_flattened()) {
-                add(row, b.as_flattened(), -x);
-            }
+        system.spread(model);
+        for c in 0..n {
+            let free = system.squares(model, c);
+            self.project_rows(c, system.spread_rows(model, c));
+            let held = Self::holds(&free, &system.squares(model, c), ROUNDED_SQUARE);
+            self.hold(c, held);
+            system.hold(model, c, &free, held);
         }
+        system.multiply_spread(model);
     }
 
     /// `out += Aᵀ λ` (nv) with the impulses of the last [`Self::close`] and the contacts'.

@@ -8,7 +8,7 @@ use super::fitted_theta::implicit_weight;
 use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
-    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::multibody::MotorLine;
 use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
@@ -358,7 +358,7 @@ impl MechanicalSystem for PlanarSystem<'_> {
         options: &StepOptions,
         start: Start<'_, Vec<f64>>,
         v_end: &[f64],
-        out: &mut [f64],
+        out: &mut [Work],
     ) {
         self.set_driving(start.v, v_end);
         let parts = &*self.parts;
@@ -373,7 +373,10 @@ impl MechanicalSystem for PlanarSystem<'_> {
             let surplus = torque * turned - own.line.work(torque, turned);
             work -= own.motor.gain.abs() * surplus;
         }
-        out.fill(work);
+        out.fill(Work {
+            supplied: work,
+            ..Work::default()
+        });
     }
 
     fn half_solve(&self, y: &mut [f64]) {
@@ -440,6 +443,14 @@ impl MechanicalSystem for PlanarSystem<'_> {
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled(Dimension::Two, &self.parts.W, q, mu)
+    }
+
+    fn open_problem<'a>(
+        &'a self,
+        q: &'a [f64],
+        mu: &'a [f64],
+    ) -> Option<FrictionContactProblem<'a>> {
+        Some(self.problem(q, mu))
     }
 
     fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {

@@ -20,7 +20,7 @@ use crate::contact::{
 use crate::geometry::Terrain;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::integrator::{
-    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
@@ -218,10 +218,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
-        let places = |body: usize| self.parts.kinematics.r(body);
-        let fastest = self.model.fastest_approach(places, v);
-        activation.margin = activation.lead.abs() * fastest;
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Contact>) {
         self.parts.unknown_ground = detect(
             self.model,
             &self.parts.kinematics,
@@ -484,31 +481,33 @@ impl MechanicalSystem for TreeSystem<'_> {
         options: &StepOptions,
         start: Start<'_, Configuration>,
         v_end: &[f64],
-        out: &mut [f64],
+        out: &mut [Work],
     ) {
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let velocities = [start.v, v_end];
         (self.parts.drives).work(mechanism, step(options), places, velocities, out);
-        let n = out.len();
-        let mut given = std::mem::take(&mut self.parts.given_work);
-        given.clear();
-        given.resize(n, 0.0);
+        let mut of_sand = std::mem::take(&mut self.parts.of_sand);
+        of_sand.clear();
+        of_sand.resize(out.len(), 0.0);
         if let Some((sand, scene, _)) = self.sand() {
-            sand.work(mechanism, &scene.layers, [start.v, v_end], &mut given);
+            sand.work(mechanism, &scene.layers, velocities, &mut of_sand);
         }
-        for (cluster, given) in given.iter_mut().enumerate() {
+        for (cluster, (work, of_sand)) in out.iter_mut().zip(&of_sand).enumerate() {
             let own = 0..self.parts.applied.len();
             let own = own.filter(|&k| mechanism.cluster_of_velocity(k) == cluster);
             let power = own.map(|k| {
                 let mean = options.theta * v_end[k] + (1.0 - options.theta) * start.v[k];
                 self.parts.applied[k] * mean
             });
-            *given += options.time_step * power.sum::<f64>();
+            work.supplied += options.time_step * power.sum::<f64>();
+            work.damped -= *of_sand;
         }
-        for (out, given) in out.iter_mut().zip(&given) {
-            *out += *given;
-        }
-        self.parts.given_work = given;
+        self.parts.of_sand = of_sand;
+    }
+
+    fn stored(&self, q: &Configuration, out: &mut [f64]) {
+        let mechanism = self.model.mechanism();
+        (self.parts.drives).stored(mechanism, 0.0, &q.joints, out);
     }
 
     fn work_of_displacement(
@@ -583,11 +582,16 @@ impl MechanicalSystem for TreeSystem<'_> {
             contacts,
             v,
         );
-        u.copy_from_slice(&parts.system.u);
         parts.note_friction(contacts);
         if let Some(loops) = &mut parts.loops {
             loops.project_operator(self.model, &mut parts.system);
         }
+        u.copy_from_slice(&parts.system.u);
+    }
+
+    #[inline]
+    fn is_immovable(&self, contact: usize) -> bool {
+        self.parts.system.is_immovable(contact)
     }
 
     #[inline]
@@ -652,6 +656,14 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
+    }
+
+    fn open_problem<'a>(
+        &'a self,
+        q: &'a [f64],
+        mu: &'a [f64],
+    ) -> Option<FrictionContactProblem<'a>> {
+        Some(self.problem(q, mu))
     }
 
     fn lever(&self, contact: &Contact) -> f64 {

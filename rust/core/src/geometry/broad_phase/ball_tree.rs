@@ -153,6 +153,17 @@ impl BallTree {
         self.search(centre, &reach, |ball| visit(&ball.sphere));
     }
 
+    /// The same with their numbers in the input.
+    pub fn visit_pillar_indexed(
+        &self,
+        centre: &Vector3<f64>,
+        radius: f64,
+        mut visit: impl FnMut(u32),
+    ) {
+        let reach = [radius, f64::INFINITY, radius];
+        self.search(centre, &reach, |ball| visit(ball.index));
+    }
+
     /// The ball that a ray meets first within `reach` (m).
     #[must_use]
     pub fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {

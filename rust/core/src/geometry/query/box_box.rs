@@ -203,22 +203,6 @@ fn edge(solid: &OrientedBox, k: usize, n: &Vector3<f64>) -> usize {
     4 * k + side(k + 1) + 2 * side(k + 2)
 }
 
-/// Middle, direction and half length of an edge, m.
-fn place_edge(solid: &OrientedBox, edge: usize) -> (Vector3<f64>, Vector3<f64>, f64) {
-    let k = edge / 4 % 3;
-    let mut local = Vector3::zeros();
-    for bit in 0..2 {
-        let axis = (k + 1 + bit) % 3;
-        let sign = if edge >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        local[axis] = sign * solid.half_size[axis];
-    }
-    (
-        solid.centre + solid.R * local,
-        solid.axis(k),
-        solid.half_size[k],
-    )
-}
-
 /// Nearest points of the lines of two edges, and whether they are within
 /// both edges; none where the edges are parallel.
 fn crossing_edges(
@@ -227,8 +211,8 @@ fn crossing_edges(
     edge: usize,
     other: usize,
 ) -> Option<(PairPoint, bool)> {
-    let (p, d, half_p) = place_edge(first, edge);
-    let (q, e, half_q) = place_edge(second, other);
+    let (p, d, half_p) = first.edge(edge);
+    let (q, e, half_q) = second.edge(other);
     let across = d.cross(&e);
     let square = across.norm_squared();
     if square <= PARALLEL * PARALLEL {

@@ -2,8 +2,10 @@
 //! faces and edges on a convex vertex.
 //!
 //! Of the box's twelve edges those along one axis share the normal `n ∝ e × f` with an edge of the
-//! surface, and the side of n decides which of the four can touch. A corner that has not yet come
-//! down to an edge is met too. The feature at an edge is the axis, or 3 and the corner's number.
+//! surface, and the side of n decides which of the four can touch: one, or both of a side of the box
+//! that lies flat on the edge. A corner that has not yet come down to an edge is met too. The
+//! feature at an edge is the number of the box's edge ([`OrientedBox::edge`]), or 12 and the corner's
+//! number.
 
 use nalgebra::Vector3;
 
@@ -14,6 +16,13 @@ use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 
 /// Sine of the angle between two edges below which they have no common normal.
 const PARALLEL: f64 = 1e-9;
+
+/// Sine of the angle by which a normal may leave the normals of an edge of the box: a side that lies
+/// flat on an edge of the surface rests on two of its own.
+const SLACK: f64 = 0.02;
+
+/// Fraction of the box's size by which a crossing may lie beyond the ends of the edges.
+const ENDS: f64 = 1e-9;
 
 /// Corners over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
 #[inline]
@@ -40,14 +49,22 @@ pub fn crossings(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
+    let slack = ENDS * solid.half_size.max();
     for axis in 0..3 {
-        let Some((point, place, own)) = crossing(solid, edge, base, axis) else {
+        let Some((n, sine)) = normal(solid, edge, axis).filter(|(n, _)| edge.bears(n)) else {
             continue;
         };
-        let is_between = own.abs() <= solid.half_size[axis];
-        if is_between && point.gap <= reach && edge.admits(&point.n) && edge.has(place, -point.gap)
-        {
-            visit(&point);
+        let local = solid.R.tr_mul(&n);
+        let touches = |k: usize, side: f64| local[k] * side <= SLACK;
+        for number in 4 * axis..4 * axis + 4 {
+            let side = signs(number % 4);
+            if touches((axis + 1) % 3, side[0]) && touches((axis + 2) % 3, side[1]) {
+                let (point, place, own) = crossing(solid, edge, base, number, (&n, sine));
+                let is_between = own.abs() <= solid.half_size[axis] + slack;
+                if is_between && point.gap <= reach && edge.has_within(place, -point.gap, slack) {
+                    visit(&point);
+                }
+            }
         }
     }
     for number in 0..8 {
@@ -95,7 +112,7 @@ fn corner_over(
 }
 
 /// Feature of the first corner.
-const CORNERS: usize = 3;
+const CORNERS: usize = 12;
 
 /// The point of a feature, wherever it is; the box's lowest corner if the edges are parallel.
 #[must_use]
@@ -108,38 +125,40 @@ pub fn point_at_edge(
     if feature >= CORNERS {
         return corner_over(solid, edge, base, feature - CORNERS).0;
     }
-    let axis = feature;
-    let crossing = crossing(solid, edge, base, axis);
-    crossing.map_or_else(
+    normal(solid, edge, feature / 4).map_or_else(
         || {
             let n = (edge.normals[0] + edge.normals[1]).normalize();
             let point = crate::geometry::SupportMap::support(solid, &-n);
             let gap = n.dot(&(point - (edge.start - base)));
-            SurfacePoint::of_normal(axis, point, &n, gap)
+            SurfacePoint::of_normal(feature, point, &n, gap)
         },
-        |(point, ..)| point,
+        |(n, sine)| crossing(solid, edge, base, feature, (&n, sine)).0,
     )
 }
 
-/// The crossing with the lowest of the box's edges along an axis, its place along the edge of the
-/// surface (m from the start) and along the box's (m from the middle).
-fn crossing(
-    solid: &OrientedBox,
-    edge: &Edge,
-    base: &Vector3<f64>,
-    axis: usize,
-) -> Option<(SurfacePoint, f64, f64)> {
-    let f = solid.axis(axis);
-    let across = edge.along.cross(&f);
+/// The common normal of an edge of the surface and the box's edges along an axis, out of the ground,
+/// and the sine of their angle.
+#[inline]
+fn normal(solid: &OrientedBox, edge: &Edge, axis: usize) -> Option<(Vector3<f64>, f64)> {
+    let across = edge.along.cross(&solid.axis(axis));
     let sine = across.norm();
     if sine <= PARALLEL {
         return None;
     }
     let up = (edge.normals[0] + edge.normals[1]).dot(&across);
-    let n = across / if up < 0.0 { -sine } else { sine };
-    let mut local = solid.R.tr_mul(&n).map(|x| -1.0_f64.copysign(x));
-    local[axis] = 0.0;
-    let middle = solid.centre + solid.R * local.component_mul(&solid.half_size);
+    Some((across / if up < 0.0 { -sine } else { sine }, sine))
+}
+
+/// The crossing with one of the box's edges along their common normal, its place along the edge of
+/// the surface (m from the start) and along the box's (m from the middle).
+fn crossing(
+    solid: &OrientedBox,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    number: usize,
+    (n, sine): (&Vector3<f64>, f64),
+) -> (SurfacePoint, f64, f64) {
+    let (middle, f, _) = solid.edge(number);
     let between = middle - (edge.start - base);
     let gap = n.dot(&between);
     // between + s f − t e = gap n
@@ -147,8 +166,8 @@ fn crossing(
     let (along, own, c) = (rest.dot(&edge.along), rest.dot(&f), edge.along.dot(&f));
     let s = (c * along - own) / (sine * sine);
     let place = along + s * c;
-    let point = SurfacePoint::of_normal(axis, middle + f * s, &n, gap);
-    Some((point, place, s))
+    let point = SurfacePoint::of_normal(number, middle + f * s, n, gap);
+    (point, place, s)
 }
 
 /// The point that a vertex pushes, wherever it is: for one that is inside, of the nearest of the
@@ -162,7 +181,7 @@ pub fn nearest_at_vertex(
 ) -> SurfacePoint {
     let local = solid.R.tr_mul(&(vertex.place - base - solid.centre));
     let (mut point, mut n, mut distance) = box_sphere::nearest_local(&local, &solid.half_size);
-    let admits = |n: &Vector3<f64>| vertex.admits(&(solid.R * n));
+    let admits = |n: &Vector3<f64>| vertex.bears(&(solid.R * n));
     if distance < 0.0 && !admits(&n) {
         let through = |k, side| box_sphere::through_side(&local, &solid.half_size, k, side);
         let sides = (0..3).flat_map(|k| [through(k, 1.0), through(k, -1.0)]);

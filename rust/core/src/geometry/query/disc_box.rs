@@ -2,14 +2,14 @@
 //!
 //! If the direction between the shapes is a face's normal, the wheel stands on that face as on a
 //! plane: its lowest rim point and, lying flat, one to either side ([`super::disc_plane`]), as far
-//! as they are over the face. If the direction is the axle, the box's corners stand on the disc. At
-//! edges and corners [`super::convex`] gives the nearest points or the shortest way out.
+//! as they are over the face; lying over the face's edge, also the ends of its chord there. If the
+//! direction is the axle, the box's corners stand on the disc. At edges and corners [`super::convex`] gives the nearest points or the shortest way out.
 //!
 //! The gap's rate is exact, except for the two rim points beside the lowest, as on a plane.
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, PairPoint, convex, disc_plane};
+use super::{NEAREST, PairPoint, chord, convex, disc_plane};
 use crate::geometry::{Disc, OrientedBox, SupportMap};
 use crate::scalar::elementary::hypot;
 
@@ -20,6 +20,8 @@ const ALONG: f64 = 1e-5;
 /// Features from here on are rim points on a face or corners on the disc.
 const RIM: usize = 1 << 13;
 const CORNER: usize = 1 << 14;
+/// Features from here on are ends of chords.
+const CHORD: usize = 1 << 15;
 
 /// Visits all points whose gap is at most `reach`, m; n from the disc to the box.
 pub fn points(disc: &Disc, solid: &OrientedBox, reach: f64, mut visit: impl FnMut(&PairPoint)) {
@@ -45,6 +47,25 @@ pub fn points(disc: &Disc, solid: &OrientedBox, reach: f64, mut visit: impl FnMu
                 offer(&point);
             }
         }
+        let is_above = near.n.dot(&disc.axle) > 0.0;
+        let is_up = usize::from(outward[k] > 0.0);
+        for edge in (0..12).filter(|edge| edge / 4 != k) {
+            // The side of the edge along the axis k.
+            let bit = if (edge / 4 + 1) % 3 == k {
+                edge
+            } else {
+                edge >> 1
+            };
+            if bit & 1 != is_up {
+                continue;
+            }
+            for end in 0..2 {
+                let code = usize::from(is_above) << 5 | edge << 1 | end;
+                if let Some((point, true)) = chord_end(disc, solid, code) {
+                    offer(&point);
+                }
+            }
+        }
     }
     if near.n.cross(&disc.axle).norm() < ALONG {
         let is_above = usize::from(near.n.dot(&disc.axle) > 0.0);
@@ -65,11 +86,25 @@ pub fn points(disc: &Disc, solid: &OrientedBox, reach: f64, mut visit: impl FnMu
     }
 }
 
+/// The end of the disc's chord over an edge of the box, and whether the edge reaches there. The code
+/// is 32 if the box is towards the axle's head, and the edge's number, and the end.
+fn chord_end(disc: &Disc, solid: &OrientedBox, code: usize) -> Option<(PairPoint, bool)> {
+    let n = disc.axle * if code >> 5 & 1 == 1 { 1.0 } else { -1.0 };
+    let (middle, along, half) = solid.edge(code >> 1 & 15);
+    let end = chord::ends(disc, &n, &middle, &along)?[code & 1];
+    let point = PairPoint::from_first(CHORD | code, &end.point, &n, -end.height);
+    Some((point, end.place.abs() <= half))
+}
+
 /// The point of a feature, wherever it is.
 #[must_use]
 pub fn point(disc: &Disc, solid: &OrientedBox, feature: usize) -> PairPoint {
     let code = feature & (RIM - 1);
-    if feature & RIM != 0 {
+    if feature & CHORD != 0
+        && let Some((point, _)) = chord_end(disc, solid, code)
+    {
+        point
+    } else if feature & RIM != 0 {
         rim_point(disc, solid, code >> 2 & 7, code & 3)
     } else if feature & CORNER != 0 {
         corner_point(disc, solid, code >> 3 & 1, code & 7)

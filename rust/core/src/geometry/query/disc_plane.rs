@@ -13,6 +13,26 @@ use nalgebra::Vector3;
 
 use super::SurfacePoint;
 use crate::geometry::{Disc, Plane};
+use crate::scalar::{Lane, Vec3};
+
+/// Rolling direction `n × s / |n × s|` of a wheel with the unit axle s over a plane with the unit
+/// normal n, and `|n × s|`. All searches for contacts take the lowest point from these numbers, so
+/// a contact has the same bits however it was found.
+#[inline(always)]
+#[allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+pub(crate) fn rolling<T: Lane>(n: Vec3<T>, s: Vec3<T>) -> (Vec3<T>, T) {
+    let across = n.cross(s);
+    let length = across.norm();
+    (across * (length.like(1.0) / length), length)
+}
+
+/// From the centre of a wheel of radius R (m) to its lowest point; `rolling`: its rolling
+/// direction.
+#[inline(always)]
+#[allow(clippy::inline_always)] // as above
+pub(crate) fn to_lowest<T: Lane>(rolling: Vec3<T>, s: Vec3<T>, radius: T) -> Vec3<T> {
+    rolling.cross(s) * radius
+}
 
 /// Rim points whose gap is at most `reach`; the lowest one always comes first if it is near.
 ///
@@ -60,8 +80,8 @@ struct Rim<'a> {
     normal: &'a Vector3<f64>,
     /// Of the centre, m.
     height: f64,
-    w: Vector3<f64>,
-    /// `|w|`.
+    rolling: Vec3<f64>,
+    /// `|n × s| = |w|`.
     length: f64,
 }
 
@@ -74,14 +94,13 @@ impl<'a> Rim<'a> {
 
     #[inline]
     fn over(disc: &'a Disc, n: &'a Vector3<f64>, height: f64) -> Self {
-        let s = &disc.axle;
-        let w = n - s * n.dot(s);
+        let (rolling, length) = rolling(Vec3::from(*n), Vec3::from(disc.axle));
         Self {
             disc,
             normal: n,
             height,
-            w,
-            length: w.norm(),
+            rolling,
+            length,
         }
     }
 
@@ -96,19 +115,19 @@ impl<'a> Rim<'a> {
     fn point(&self, feature: usize) -> SurfacePoint {
         let disc = self.disc;
         let down = if self.length > 1e-9 {
-            self.w / -self.length
+            to_lowest(self.rolling, Vec3::from(disc.axle), disc.radius).into()
         } else {
-            disc.spoke
+            disc.spoke * disc.radius
         };
         let side = || disc.axle.cross(&down) * 0.75_f64.sqrt();
-        let direction = match feature {
+        let arm = match feature {
             0 => down,
             1 => down * -0.5 + side(),
             _ => down * -0.5 - side(),
         };
         SurfacePoint {
             feature,
-            point: disc.centre + direction * disc.radius,
+            point: disc.centre + arm,
             n: *self.normal,
             rolling: disc.spoke,
             gap: self.gap(feature),

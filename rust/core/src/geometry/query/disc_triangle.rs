@@ -7,7 +7,11 @@
 //! `(n × e) · (E(n) − a) = 0`,
 //! found by a safeguarded secant iteration on `n ∝ (1 − τ) n₁ + τ n₂`. If the lowest point for a
 //! face's own normal is over that face, the face touches and the edge does not, so contacts hand
-//! over from face to edge with gap, point and normal continuous. A vertex is a ball of radius
+//! over from face to edge with gap, point and normal continuous.
+//!
+//! A disc that lies flat on an edge has it along a chord and touches it with both ends, along its
+//! axle. The normal that separates most belongs to the lower end; the higher one comes in as the
+//! disc tips over, as rim points do on a plane ([`chord_ends`]). A vertex is a ball of radius
 //! zero: the rim never reaches into it, since it is the edges that lift a rim with a vertex above
 //! it, but a vertex may be beyond the face of the disc.
 //!
@@ -16,11 +20,20 @@
 
 use nalgebra::Vector3;
 
+use super::chord::{self, LIES};
 use super::crossing::crossing;
 use super::disc_plane::{rim_point_over, rim_points};
-use super::{NEAREST, SurfacePoint, disc_sphere};
+use super::{CHORD, NEAREST, SurfacePoint, disc_sphere};
 use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
 use crate::geometry::{Disc, Sphere};
+
+/// Sine of the angle between a disc and an edge up to which the ends of the chord are the only points. The lower one is then the point
+/// of the normal that separates most but for half the square of this, relative to the radius, and
+/// rounding does not swap the names of the ends.
+const FLAT: f64 = 1e-6;
+
+/// Fraction of the radius by which the end of a chord may lie beyond the edge.
+const ENDS: f64 = 1e-9;
 
 /// Rim points over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
 #[inline]
@@ -31,20 +44,110 @@ pub fn rim_points_over_face(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
+    let lies = may_lie(disc, face.plane.normal());
     rim_points(disc, &face.plane, base, reach, |point| {
-        if face.admits(&(base + point.point)) {
+        if (point.feature == NEAREST || lies) && face.admits(&(base + point.point)) {
             visit(point);
         }
     });
 }
 
-/// The rim point over an edge, if its normal lies strictly between the faces'.
+/// Whether a disc leans against a plane of normal n by so little that its points beside the lowest
+/// may support it. Of a disc that stands they are one and a half radii higher: where they are in
+/// reach the lowest one is as deep, as behind the side of a block on which the disc lies.
+#[inline]
+pub(super) fn may_lie(disc: &Disc, n: &Vector3<f64>) -> bool {
+    let along = disc.axle.dot(n);
+    along * along > 0.75
+}
+
+/// Visits the points at an edge whose gap is at most `reach`: the rim point over it, if its normal
+/// lies strictly between the faces', and the ends of the chord of a disc that lies on it.
+#[inline]
+pub fn rim_points_at_edge(
+    disc: &Disc,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    let mut offer = |point: &SurfacePoint| {
+        let place = (point.point - (edge.start - base)).dot(&edge.along);
+        if point.gap <= reach && edge.has_within(place, -point.gap, ENDS * disc.radius) {
+            visit(point);
+        }
+    };
+    if visit_chord(disc, edge, base, None, &mut offer) {
+        return;
+    }
+    let point = rim_point_between(disc, edge, base).filter(|point| point.gap <= reach);
+    let place = |point: &SurfacePoint| (point.point - (edge.start - base)).dot(&edge.along);
+    if let Some(point) = point.filter(|point| edge.has(place(point), -point.gap)) {
+        visit(&point);
+    }
+}
+
+/// Visits the ends of the chord of a disc that lies on an edge: both if it lies flat, and the higher
+/// one otherwise. `down`: the only direction along the axle in which it may lie. Whether both ends
+/// were visited.
+#[inline]
+pub(super) fn visit_chord(
+    disc: &Disc,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    down: Option<Vector3<f64>>,
+    visit: &mut impl FnMut(&SurfacePoint),
+) -> bool {
+    let lean = disc.axle.dot(&edge.along).abs();
+    if lean > LIES {
+        return false; // as most wheels that stand
+    }
+    let Some(ends) = chord_ends(disc, edge, &(edge.start - base)) else {
+        return false;
+    };
+    let n = &ends[0].n;
+    if down.is_some_and(|down| n.dot(&down) > 0.0) || !edge.bears(n) {
+        return false;
+    }
+    let is_flat = lean <= FLAT;
+    let higher = usize::from(ends[1].gap > ends[0].gap);
+    for (k, end) in ends.iter().enumerate() {
+        if is_flat || k == higher {
+            visit(end);
+        }
+    }
+    is_flat
+}
+
+/// The ends of the chord of a disc over the line of an edge, towards the edge's start and towards
+/// its end: points of the rim over the line, along the axle out of the ground.
+fn chord_ends(disc: &Disc, edge: &Edge, start: &Vector3<f64>) -> Option<[SurfacePoint; 2]> {
+    let up = (edge.normals[0] + edge.normals[1]).dot(&disc.axle);
+    let n = if up < 0.0 { -disc.axle } else { disc.axle };
+    let ends = chord::ends(disc, &n, start, &edge.along)?;
+    Some([0, 1].map(|k| SurfacePoint {
+        feature: CHORD + k,
+        point: ends[k].point,
+        n,
+        rolling: disc.spoke,
+        gap: ends[k].height,
+    }))
+}
+
+/// The point of a feature at an edge, wherever it is.
 #[inline]
 #[must_use]
-pub fn rim_point_at_edge(disc: &Disc, edge: &Edge, base: &Vector3<f64>) -> Option<SurfacePoint> {
-    let point = rim_point_between(disc, edge, base)?;
-    let place = (point.point - (edge.start - base)).dot(&edge.along);
-    edge.has(place, -point.gap).then_some(point)
+pub fn point_at_edge(
+    disc: &Disc,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    feature: usize,
+) -> SurfacePoint {
+    let ends = || chord_ends(disc, edge, &(edge.start - base));
+    let end = feature
+        .checked_sub(CHORD)
+        .and_then(|k| ends()?.get(k).copied());
+    end.unwrap_or_else(|| nearest_at_edge(disc, edge, base))
 }
 
 /// The same anywhere along the edge's line.
@@ -101,7 +204,7 @@ pub fn nearest_at_vertex(disc: &Disc, vertex: &Vertex, base: &Vector3<f64>) -> S
     let abreast = offset - disc.axle * offset.dot(&disc.axle);
     let is_on_face = abreast.norm_squared() < disc.radius * disc.radius;
     let mut sides = [disc.axle, -disc.axle].into_iter();
-    match sides.find(|n| is_on_face && vertex.admits(n)) {
+    match sides.find(|n| is_on_face && vertex.bears(n)) {
         Some(n) => SurfacePoint {
             n,
             gap: -n.dot(&offset),

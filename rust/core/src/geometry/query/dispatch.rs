@@ -152,7 +152,10 @@ pub fn visit_at_edge(
     mut visit: impl FnMut(&SurfacePoint),
 ) {
     let point = match shape {
-        PlacedShape::Disc(disc) => disc_triangle::rim_point_at_edge(disc, edge, base),
+        PlacedShape::Disc(disc) => {
+            disc_triangle::rim_points_at_edge(disc, edge, base, reach, visit);
+            return;
+        }
         PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_triangle::points_at_edge(roller, edge, base, reach, visit);
             return;
@@ -183,7 +186,7 @@ pub fn point_at_edge(
     feature: usize,
 ) -> SurfacePoint {
     match shape {
-        PlacedShape::Disc(disc) => disc_triangle::nearest_at_edge(disc, edge, base),
+        PlacedShape::Disc(disc) => disc_triangle::point_at_edge(disc, edge, base, feature),
         PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_triangle::point_at_edge(roller, edge, base, feature)
         }
@@ -193,6 +196,31 @@ pub fn point_at_edge(
         PlacedShape::Hull(hull) => hull_triangle::point_at_edge(hull, edge, base, feature),
     }
 }
+
+/// Whether a convex vertex of a surface may push a shape along the normal of its point there.
+///
+/// A round shape is pushed by the vertex where it would not be by an edge. A flat side or a straight
+/// line rests on the vertices at the ends of what it lies on, whatever the rounding.
+#[inline]
+#[must_use]
+pub fn pushes(vertex: &Vertex, shape: &PlacedShape<'_>, n: &Vector3<f64>) -> bool {
+    let is_flat = match shape {
+        PlacedShape::Disc(disc) => disc.axle.dot(n).abs() > ON_SIDE,
+        PlacedShape::Sphere(_) | PlacedShape::Ellipsoid(_) => false,
+        PlacedShape::Roller(_)
+        | PlacedShape::Cylinder(_)
+        | PlacedShape::Box(_)
+        | PlacedShape::Hull(_) => true,
+    };
+    if is_flat {
+        vertex.bears(n)
+    } else {
+        vertex.admits(n)
+    }
+}
+
+/// Cosine of the angle between a disc's axle and a normal that is the axle's but for rounding.
+const ON_SIDE: f64 = 1.0 - 1e-12;
 
 /// The point of a shape at a convex vertex of a surface, wherever it is.
 #[inline]

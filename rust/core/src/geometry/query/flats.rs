@@ -3,8 +3,8 @@
 //!
 //! The nearest points ([`super::convex`]) give the direction between the shapes. If it is the
 //! normal of a flat side of one of them, the other stands on that side as on a plane, with those of
-//! its points that are over the side's outline; and where a straight line of one crosses one of the
-//! other, the two lines touch. Sides and lines:
+//! its points that are over the side's outline; where the outlines cross, they touch, too: straight
+//! lines of both, a circle and a line (at the ends of the chord), two circles. Sides and lines:
 //!
 //! | | flat sides | lines |
 //! |---|---|---|
@@ -13,25 +13,28 @@
 //! | capsule | | its axis, with its radius |
 //! | disc, ellipsoid, sphere | | |
 //!
-//! Two lines that cross have the gap `n · (b − a) − r_a − r_b` with the normal n across both. Two
-//! treads side by side, almost parallel, touch at the ends of the shorter one. Whatever no such
-//! point explains is left to the nearest points, so that the deepest place always counts.
+//! Two lines that cross have the gap `n · (b − a) − r_a − r_b` with the normal n across both. A tread
+//! beside another one, or along an edge, almost parallel, touches it at the ends of what they share:
+//! the ends of the one that are abreast of the other. Whatever no such point explains is left to the
+//! nearest points, so that the deepest place always counts.
 //!
 //! The gap's rate is exact at vertices, at treads and at lines that cross; at the two points of a
 //! rim beside the lowest it is as on a plane ([`super::disc_plane`]).
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, PairPoint, dispatch, hull_sphere};
-use crate::geometry::shape::oriented_box::signs;
-use crate::geometry::{PlacedShape, Plane, Roller, SupportMap};
+use super::{NEAREST, PairPoint, chord, dispatch, hull_sphere};
+use crate::geometry::{Disc, PlacedShape, Plane, SupportMap};
 
 /// Difference between a direction and a flat side's normal below which they are the same.
 const ALONG: f64 = 1e-5;
 
-/// Sine below which two lines have no common normal worth using. Where edges of two outlines cross
-/// at less, cutting off their corner takes 2.5 % of their length at most.
+/// Sine below which the axes of two treads have no common normal worth using.
 const PARALLEL: f64 = 0.1;
+
+/// The same where one of the lines is an edge. Where edges of two outlines cross at less, cutting off
+/// their corner takes 0.025 % of their length at most.
+const SKEW: f64 = 1e-3;
 
 /// Sine of the angle between a common normal of lines and the direction between the shapes, at
 /// most.
@@ -41,10 +44,13 @@ const ASIDE: f64 = 0.1;
 /// point may be deeper than the other points without being one itself.
 const SLACK: f64 = 1e-6;
 
-/// Features from here on are points on a flat side, crossings of lines, and ends of lines.
+/// Features from here on are points on a flat side, crossings of lines, ends of lines, ends of chords,
+/// and crossings of circles.
 const ON_FLAT: usize = 1 << 20;
 const CROSSING: usize = 1 << 21;
 const END: usize = 1 << 22;
+const CHORD: usize = 1 << 23;
+const CIRCLES: usize = 1 << 24;
 
 /// Bits of a side or a line.
 const BITS: usize = 8;
@@ -98,26 +104,45 @@ pub fn points(
             && point.n.cross(&near.n).norm() < ASIDE
             && point.gap > near.gap - SLACK * size
     };
-    if sides.iter().any(Option::is_some) || is_tread(first) && is_tread(second) {
+    let is_on_side = sides.iter().any(Option::is_some);
+    let treads = [is_tread(first), is_tread(second)];
+    if is_on_side || treads.contains(&true) {
         let lines = [
             lines_along(first, sides[0], &near.n),
             lines_along(second, sides[1], &-near.n),
         ];
+        let mut offer_alike = |found: Option<(PairPoint, bool)>| {
+            if let Some((point, true)) = found
+                && is_alike(&point)
+            {
+                offer(&point);
+            }
+        };
+        let may_cross = is_on_side || treads == [true; 2];
         for a in lines[0].iter() {
             for b in lines[1].iter() {
-                if let Some((point, true)) = crossing(first, second, [a, b])
-                    && is_alike(&point)
-                {
-                    offer(&point);
+                if may_cross {
+                    offer_alike(crossing(first, second, [a, b]));
+                }
+                for code in (0..4).filter(|_| treads.contains(&true)) {
+                    offer_alike(end(first, second, code, [a, b]));
                 }
             }
         }
-    }
-    for code in 0..4 {
-        if let Some((point, true)) = end(first, second, code)
-            && is_alike(&point)
-        {
-            offer(&point);
+        for (of, side) in sides.iter().enumerate() {
+            let Some(side) = side.filter(|_| treads[of]) else {
+                continue;
+            };
+            for line in lines[1 - of].iter() {
+                for end in 0..2 {
+                    offer_alike(chord_end(first, second, of << 2 | side << 1 | end, line));
+                }
+            }
+        }
+        if let ([Some(a), Some(b)], [true, true]) = (sides, treads) {
+            for end in 0..2 {
+                offer_alike(circles(first, second, a << 2 | b << 1 | end));
+            }
         }
     }
     if deepest > near.gap + SLACK * size {
@@ -145,7 +170,12 @@ pub fn point(first: &PlacedShape<'_>, second: &PlacedShape<'_>, feature: usize) 
         let lines = [feature >> BITS & LOW, feature & LOW];
         crossing(first, second, lines).map(|(point, _)| point)
     } else if feature & END != 0 {
-        end(first, second, feature & LOW).map(|(point, _)| point)
+        let lines = [feature >> BITS & LOW, feature & LOW];
+        end(first, second, feature >> (2 * BITS) & 3, lines).map(|(point, _)| point)
+    } else if feature & CHORD != 0 {
+        chord_end(first, second, feature >> BITS & LOW, feature & LOW).map(|(point, _)| point)
+    } else if feature & CIRCLES != 0 {
+        circles(first, second, feature & LOW).map(|(point, _)| point)
     } else {
         None
     };
@@ -277,13 +307,8 @@ fn lines_along(shape: &PlacedShape<'_>, side: Option<usize>, n: &Vector3<f64>) -
 fn line(shape: &PlacedShape<'_>, number: usize) -> Option<(Vector3<f64>, Vector3<f64>, f64, f64)> {
     match shape {
         PlacedShape::Box(solid) if number < 12 => {
-            let (axis, mut corner) = (number / 4, solid.half_size);
-            corner.component_mul_assign(&Vector3::from_fn(|k, _| match (k + 3 - axis) % 3 {
-                0 => 0.0,
-                bit => signs(number % 4)[bit - 1],
-            }));
-            let middle = solid.centre + solid.R * corner;
-            Some((middle, solid.axis(axis), solid.half_size[axis], 0.0))
+            let (middle, along, half) = solid.edge(number);
+            Some((middle, along, half, 0.0))
         }
         PlacedShape::Hull(hull) => {
             let edge = hull.polytope.edges().get(number)?;
@@ -316,7 +341,12 @@ fn crossing(
     let (q, e, half_q, r_q) = line(second, b)?;
     let across = d.cross(&e);
     let square = across.norm_squared();
-    if square <= PARALLEL * PARALLEL {
+    let least = if r_p > 0.0 && r_q > 0.0 {
+        PARALLEL
+    } else {
+        SKEW
+    };
+    if square <= least * least {
         return None;
     }
     let between = q - p;
@@ -333,51 +363,112 @@ fn crossing(
     Some((point, is_within))
 }
 
-/// An end of one tread abreast of another one almost along it, and whether the other one has that
-/// place. The code is 2 for the second shape's tread, and one more for its end towards the tail.
+/// An end of one line abreast of another one almost along it, of which one at least is a tread, and
+/// whether the other one has that place. The code is 2 for an end of the second shape's line, and
+/// one more for its end towards the tail.
 fn end(
     first: &PlacedShape<'_>,
     second: &PlacedShape<'_>,
     code: usize,
+    [a, b]: [usize; 2],
 ) -> Option<(PairPoint, bool)> {
     let is_of_second = code & 2 != 0;
+    let lines = [line(first, a)?, line(second, b)?];
+    let (p, d, half, radius) = lines[usize::from(is_of_second)];
+    let (q, e, half_other, radius_other) = lines[usize::from(!is_of_second)];
+    if radius + radius_other <= 0.0 || d.cross(&e).norm() > PARALLEL {
+        return None;
+    }
+    let centre = p + d * if code & 1 == 0 { half } else { -half };
+    let from_middle = centre - q;
+    let place = e.dot(&from_middle);
+    let across = e * place - from_middle;
+    let distance = across.norm();
+    // From the line with the end to the other one.
+    let n = across.try_normalize(0.0)?;
+    let (x, gap) = (centre + n * radius, distance - radius - radius_other);
+    let feature = END | code << (2 * BITS) | a << BITS | b;
+    let point = PairPoint::from_first(feature, &x, &n, gap);
+    let is_within = place.abs() <= half_other;
+    let point = if is_of_second { point.swapped() } else { point };
+    Some((point, is_within))
+}
+
+/// A flat round side of a shape: its circle, its outward normal and its rounding, m.
+fn round_side(shape: &PlacedShape<'_>, side: usize) -> Option<(Disc, Vector3<f64>, f64)> {
+    match shape {
+        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
+            let n = roller.core.axle * if side == 0 { 1.0 } else { -1.0 };
+            Some((roller.circle(side), n, roller.rounding))
+        }
+        _ => None,
+    }
+}
+
+/// An end of the chord that a flat round side has over an edge of the other shape, and whether the
+/// edge reaches there. The code is 4 for a side of the second shape, 2 for its second side, and the
+/// end.
+fn chord_end(
+    first: &PlacedShape<'_>,
+    second: &PlacedShape<'_>,
+    code: usize,
+    number: usize,
+) -> Option<(PairPoint, bool)> {
+    let is_of_second = code & 4 != 0;
     let (own, other) = if is_of_second {
         (second, first)
     } else {
         (first, second)
     };
-    let tread = |shape: &PlacedShape<'_>| -> Option<Roller> {
-        match shape {
-            PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => Some(*roller),
-            _ => None,
-        }
-    };
-    let (own, other) = (tread(own)?, tread(other)?);
-    if own.core.axle.cross(&other.core.axle).norm() > PARALLEL {
+    let (circle, n, rounding) = round_side(own, code >> 1 & 1)?;
+    let (q, e, half, radius) = line(other, number)?;
+    if radius > 0.0 {
         return None;
     }
-    let centre = own.circle(code & 1).centre;
-    let from_middle = centre - other.core.centre;
-    let place = other.core.axle.dot(&from_middle);
-    let across = other.core.axle * place - from_middle;
-    let distance = across.norm();
-    // From the tread with the end to the other one.
-    let n = across.try_normalize(0.0)?;
-    let (x, gap) = (
-        centre + n * own.radius(),
-        distance - own.radius() - other.radius(),
-    );
-    let point = PairPoint::from_first(END | code, &x, &n, gap);
-    let is_within = place.abs() <= other.half;
+    let end = chord::ends(&circle, &n, &q, &e)?[code & 1];
+    let x = end.point + n * rounding;
+    let feature = CHORD | code << BITS | number;
+    let point = PairPoint::from_first(feature, &x, &n, -end.height - rounding);
     let point = if is_of_second { point.swapped() } else { point };
-    Some((point, is_within))
+    Some((point, end.place.abs() <= half))
+}
+
+/// Where the circles of two flat round sides cross, seen along the normal of the first one. The code
+/// has the numbers of the sides and of the crossing.
+fn circles(
+    first: &PlacedShape<'_>,
+    second: &PlacedShape<'_>,
+    code: usize,
+) -> Option<(PairPoint, bool)> {
+    let (own, n, rounding) = round_side(first, code >> 2 & 1)?;
+    let (other, m, rounding_other) = round_side(second, code >> 1 & 1)?;
+    let between = other.centre - own.centre;
+    let across = between - n * n.dot(&between);
+    let distance = across.norm();
+    if distance <= SLACK * own.radius {
+        return None;
+    }
+    let u = across / distance;
+    let (r, s) = (own.radius, other.radius);
+    let x = 0.5 * (distance + (r - s) * (r + s) / distance);
+    let square = (r - x) * (r + x);
+    if square <= 0.0 {
+        return None;
+    }
+    let side = n.cross(&u) * if code & 1 == 0 { 1.0 } else { -1.0 };
+    let place = own.centre + u * x + side * square.sqrt();
+    // To the plane of the second side.
+    let way = m.dot(&(other.centre - place)) / m.dot(&n);
+    let gap = way - rounding - rounding_other;
+    let x = place + n * rounding;
+    Some((PairPoint::from_first(CIRCLES | code, &x, &n, gap), true))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::query::pairs;
-    use crate::geometry::{Disc, Ellipsoid, Hull, OrientedBox};
+    use crate::geometry::{Ellipsoid, Hull, OrientedBox, Roller};
     use crate::spatial::Polytope;
     use nalgebra::Rotation3;
     use proptest::prelude::*;
@@ -587,5 +678,69 @@ mod tests {
             points.len() >= 3 && spread(&points).iter().all(|s| *s > 0.25),
             "{points:?}"
         );
+    }
+
+    /// A log along an edge had one point there, and rolled about it; a drum that stood half over an
+    /// edge, or over another drum, had those of its rim that happened to be over the other.
+    #[test]
+    fn along_an_edge_and_half_over_one_a_drum_touches_at_the_ends_of_what_is_shared() {
+        let polytopes = polytopes();
+        let gap = -1e-6;
+        let block = PlacedShape::Box(OrientedBox {
+            centre: Vector3::zeros(),
+            R: nalgebra::Matrix3::identity(),
+            half_size: Vector3::new(0.3, 0.2, 0.4),
+        });
+        let extent = |points: &[PairPoint], axis: usize| {
+            let places = points.iter().map(|p| p.point[axis]);
+            [
+                places.clone().fold(f64::INFINITY, f64::min),
+                places.fold(f64::NEG_INFINITY, f64::max),
+            ]
+        };
+        let are = |points: &[PairPoint], axis: usize, expected: [f64; 2]| {
+            let found = extent(points, axis);
+            let is = (0..2).all(|k| (found[k] - expected[k]).abs() < 1e-5);
+            assert!(
+                is && points.iter().all(|p| (p.gap - gap).abs() < 1e-8),
+                "{points:?}"
+            );
+        };
+        // Beside the block's edge at an angle of 45 degrees, and beyond its end.
+        let out = Vector3::new(1.0, 1.0, 0.0).normalize();
+        let place = Vector3::new(0.3, 0.2, 0.35) + out * (0.2 + gap);
+        let log = shape(
+            0,
+            place,
+            [std::f64::consts::FRAC_PI_2, 0.0, 0.0],
+            &polytopes,
+        );
+        for (first, second) in [(&block, &log), (&log, &block)] {
+            let points = all(first, second, 1e-4);
+            are(&points, 2, [0.2, 0.4]);
+            assert!(points.len() >= 2, "{points:?}");
+        }
+        // Standing, its middle just over the block; and just over another drum.
+        let standing = shape(0, Vector3::new(0.29, 0.35 + gap, 0.1), [0.0; 3], &polytopes);
+        let half = (0.04_f64 - 1e-4).sqrt();
+        for (first, second) in [(&block, &standing), (&standing, &block)] {
+            are(&all(first, second, 1e-4), 2, [0.1 - half, 0.1 + half]);
+        }
+        let lower = shape(0, Vector3::new(0.0, 0.05, 0.0), [0.0; 3], &polytopes);
+        let upper = shape(0, Vector3::new(0.19, 0.35 + gap, 0.0), [0.0; 3], &polytopes);
+        let half = (0.04_f64 - 0.095 * 0.095).sqrt();
+        for (first, second) in [(&lower, &upper), (&upper, &lower)] {
+            let points = all(first, second, 1e-4);
+            are(&points, 2, [-half, half]);
+        }
+        // A lying wheel of no width.
+        let wheel = PlacedShape::Disc(Disc {
+            centre: Vector3::new(0.29, 0.2 + gap, 0.1),
+            axle: Vector3::y(),
+            spoke: Vector3::x(),
+            radius: 0.2,
+        });
+        let half = (0.04_f64 - 1e-4).sqrt();
+        are(&all(&wheel, &block, 1e-4), 2, [0.1 - half, 0.1 + half]);
     }
 }

@@ -20,6 +20,9 @@ const PARALLEL: f64 = 1e-9;
 /// lies flat on an edge of the surface rests on two of its own.
 const SLACK: f64 = 0.02;
 
+/// Fraction of the polytope's size by which a crossing may lie beyond the ends of the edges.
+const ENDS: f64 = 1e-9;
+
 /// Feature of the first vertex at an edge.
 const VERTICES: usize = 192;
 
@@ -47,16 +50,17 @@ pub fn points_at_edge(
     mut visit: impl FnMut(&SurfacePoint),
 ) {
     let local = Local::of(hull, edge, base);
+    let slack = ENDS * hull.polytope.bound();
     for number in 0..hull.polytope.edges().len() {
         let Some(crossing) = local.crossing(number) else {
             continue;
         };
-        let is_between = (0.0..=crossing.length).contains(&crossing.own);
+        let is_between = (-slack..=crossing.length + slack).contains(&crossing.own);
         if is_between
             && crossing.gap <= reach
             && local.supports(&crossing.n, &hull.polytope.edges()[number])
-            && local.edge.admits(&crossing.n)
-            && edge.has(crossing.place, -crossing.gap)
+            && local.edge.bears(&crossing.n)
+            && edge.has_within(crossing.place, -crossing.gap, slack)
         {
             visit(&local.point(&crossing, number));
         }
@@ -208,7 +212,7 @@ impl<'a> Local<'a> {
 pub fn nearest_at_vertex(hull: &Hull<'_>, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
     let local = hull.local(&(vertex.place - base));
     let mut near = hull_sphere::nearest_local(hull.polytope, &local);
-    let admits = |n: &Vector3<f64>| vertex.admits(&(hull.R * n));
+    let admits = |n: &Vector3<f64>| vertex.bears(&(hull.R * n));
     if near.2 < 0.0 && !admits(&near.1) {
         let through = hull.polytope.faces().iter().map(|face| {
             let distance = face.normal.dot(&local) - face.offset;

@@ -27,6 +27,7 @@ pub mod box_box;
 pub mod box_plane;
 pub mod box_sphere;
 pub mod box_triangle;
+mod chord;
 pub mod convex;
 mod crossing;
 pub mod disc_box;
@@ -60,12 +61,15 @@ pub const NEAREST: usize = 0;
 /// two circles.
 pub const CIRCLE: usize = 16;
 
+/// Feature of the first end of the chord of a wheel's circle that lies on an edge.
+pub const CHORD: usize = 3;
+
 /// Whether a feature of a wheel is the lowest point of its rim, or of one of its circles, or on its
-/// tread.
+/// tread, or the end of a chord, which may be the lowest over an edge.
 #[inline]
 #[must_use]
 pub fn is_lowest(feature: usize) -> bool {
-    feature.is_multiple_of(CIRCLE)
+    feature.is_multiple_of(CIRCLE) || feature % CIRCLE >= CHORD
 }
 
 /// A point of a shape at a primitive of the ground.

@@ -3,7 +3,7 @@
 //! Over a face its points are those over a plane ([`super::roller_plane`]) that lie over the face.
 //! At a convex edge each circle touches like a disc's rim ([`super::disc_triangle`]), lowered along
 //! the normal by the rounding; the ends of a capsule are balls. Where the edge crosses the tread
-//! between the circles, it touches there too: the normal is `n ∝ s × e`, of axle and edge, and the
+//! between the circles, it touches there too, also if the tread lies flat on one of the faces: the normal is `n ∝ s × e`, of axle and edge, and the
 //! gap `n · (c − a) − R` with a point a of the edge. A vertex is a ball of radius zero; one inside
 //! the wheel leaves it through the side that the surface lets it, the tread or a side face.
 //!
@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use super::CIRCLE;
 use super::roller_plane::{rim_points, swept};
 use super::roller_sphere::Seen;
-use super::{SurfacePoint, disc_triangle, sphere_triangle};
+use super::{SurfacePoint, disc_triangle, is_lowest, sphere_triangle};
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{Roller, Sphere};
 
@@ -23,6 +23,9 @@ pub const TREAD: usize = 2 * CIRCLE;
 
 /// Sine of the angle between axle and edge below which they have no common normal.
 const PARALLEL: f64 = 1e-9;
+
+/// Fraction of the wheel's size by which a point may lie beyond the ends of edge and tread.
+const ENDS: f64 = 1e-9;
 
 /// Points over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
 #[inline]
@@ -33,8 +36,9 @@ pub fn rim_points_over_face(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
+    let lies = disc_triangle::may_lie(&roller.core, face.plane.normal());
     rim_points(roller, &face.plane, base, reach, |point| {
-        if face.admits(&(base + point.point)) {
+        if (is_lowest(point.feature) || lies) && face.admits(&(base + point.point)) {
             visit(point);
         }
     });
@@ -48,12 +52,25 @@ pub fn points_at_edge(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
+    let slack = ENDS * (roller.core.radius + roller.half);
     let is_on = |point: &SurfacePoint| {
         let place = (point.point - (edge.start - base)).dot(&edge.along);
-        point.gap <= reach && edge.has(place, -point.gap)
+        point.gap <= reach && edge.has_within(place, -point.gap, slack)
     };
     for k in 0..roller.n_circles() {
         let point = if roller.core.radius > 0.0 {
+            // Of two circles that one may lie on the edge whose side faces it.
+            let outward = roller.core.axle * if k == 0 { 1.0 } else { -1.0 };
+            let down = (roller.half > 0.0).then_some(outward);
+            let mut offer = |end: &SurfacePoint| {
+                let end = swept(roller, k, *end);
+                if is_on(&end) {
+                    visit(&end);
+                }
+            };
+            if disc_triangle::visit_chord(&roller.circle(k), edge, base, down, &mut offer) {
+                continue;
+            }
             let point = disc_triangle::rim_point_between(&roller.circle(k), edge, base);
             point.map(|point| swept(roller, k, point))
         } else {
@@ -65,8 +82,8 @@ pub fn points_at_edge(
         }
     }
     if let Some((point, own)) = on_tread(roller, edge, base)
-        && own.abs() < roller.half
-        && edge.admits(&point.n)
+        && own.abs() < roller.half + slack
+        && edge.bears(&point.n)
         && is_on(&point)
     {
         visit(&point);
@@ -89,8 +106,12 @@ pub fn point_at_edge(
                 let end = end_of_capsule(roller, k);
                 return of_end(k, sphere_triangle::nearest_at_edge(&end, edge, base));
             }
-            let point = disc_triangle::nearest_at_edge(&roller.circle(k), edge, base);
-            swept(roller, k, point)
+            let circle = roller.circle(k);
+            swept(
+                roller,
+                k,
+                disc_triangle::point_at_edge(&circle, edge, base, feature % CIRCLE),
+            )
         },
         |(point, _)| point,
     )
@@ -144,8 +165,8 @@ fn on_tread(roller: &Roller, edge: &Edge, base: &Vector3<f64>) -> Option<(Surfac
 pub fn nearest_at_vertex(roller: &Roller, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
     let seen = Seen::at(roller, &(vertex.place - base - roller.core.centre));
     let near = seen.nearest();
-    if near.gap < 0.0 && !vertex.admits(&near.n) {
-        return seen.nearest_open(|n| vertex.admits(n));
+    if near.gap < 0.0 && !vertex.bears(&near.n) {
+        return seen.nearest_open(|n| vertex.bears(n));
     }
     near
 }

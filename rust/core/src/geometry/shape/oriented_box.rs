@@ -23,6 +23,21 @@ impl OrientedBox {
         self.centre + self.R * self.half_size.component_mul(&signs(number))
     }
 
+    /// Middle, unit direction and half length (m) of an edge: its number is 4 k for an edge along axis
+    /// k, and bits 0 and 1 select the side along the next two axes.
+    #[inline]
+    #[must_use]
+    pub fn edge(&self, number: usize) -> (Vector3<f64>, Vector3<f64>, f64) {
+        let k = number / 4 % 3;
+        let mut local = Vector3::zeros();
+        for bit in 0..2 {
+            let axis = (k + 1 + bit) % 3;
+            local[axis] = signs(number % 4)[bit] * self.half_size[axis];
+        }
+        let middle = self.centre + self.R * local;
+        (middle, self.axis(k), self.half_size[k])
+    }
+
     /// The same with each side moved out by `reach`, m.
     #[inline]
     #[must_use]

@@ -11,13 +11,13 @@ use nalgebra::Vector3;
 use super::error::TerrainError;
 use super::limits::check_entry;
 use super::plane::Plane;
-use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
-use super::{Coverage, GROUND, Neighbourhood, Primitive, Terrain};
+use super::seams::Rim;
+use super::surface::{Edge, Face, Hinge, Vertex, Wall};
+use super::{Area, Coverage, GROUND, Neighbourhood, Primitive, Terrain};
 use crate::geometry::broad_phase::{BallTree, Bounds, BoxTree};
 use crate::geometry::ray::triangle::Sheared;
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::Sphere;
-use crate::scalar::elementary::sin_cos;
 
 /// Most triangles of a mesh.
 pub const MAX_TRIANGLES: usize = 5_000_000;
@@ -43,6 +43,8 @@ pub struct TriangleMesh {
     spokes: Vec<u32>,
     /// Bounding balls of the triangles.
     tree: BallTree,
+    /// Whether no triangle has a border.
+    is_closed: bool,
     /// Their bounding boxes, from the first ray on.
     boxes: OnceLock<BoxTree>,
     /// Where it is not the default.
@@ -117,6 +119,7 @@ impl TriangleMesh {
             vertices,
             triangles: own,
             normals,
+            is_closed: neighbours.iter().flatten().all(|&t| t != NONE),
             neighbours,
             owners,
             begins,
@@ -141,7 +144,7 @@ impl TriangleMesh {
     /// Whether no triangle has a border.
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        self.neighbours.iter().flatten().all(|&t| t != NONE)
+        self.is_closed
     }
 
     fn bounding_boxes(&self) -> BoxTree {
@@ -189,6 +192,16 @@ impl TriangleMesh {
         };
         let l = (0..3).find(same).unwrap_or(0);
         self.hinge(other, l).walls[1]
+    }
+
+    /// Number of an edge as the triangle beyond it counts it; its own at a border.
+    fn same_edge(&self, t: usize, k: usize) -> u32 {
+        let (own, other) = (&self.triangles[t], self.neighbours[t][k]);
+        let l = match self.triangles.get(other as usize) {
+            Some(its) => (0..3).find(|&l| its[l] == own[(k + 1) % 3] && its[(l + 1) % 3] == own[k]),
+            None => None,
+        };
+        l.map_or(3 * narrow(t) + narrow(k), |l| 3 * other + narrow(l))
     }
 
     /// Whether a place is farther than `reach` in front of a triangle's plane, or beside it.
@@ -257,27 +270,12 @@ impl TriangleMesh {
         let place = self.vertices[i];
         let range = self.begins[i] as usize..self.begins[i + 1] as usize;
         let all = &self.spokes[range];
-        let mut spokes = [Vector3::zeros(); MAX_SPOKES];
         let from_here = |&j: &u32| self.vertices[j as usize] - place;
-        if all.len() <= MAX_SPOKES {
-            for (spoke, j) in spokes.iter_mut().zip(all) {
-                *spoke = from_here(j);
-            }
-            let n = all.len();
-            return Vertex { place, spokes, n };
-        }
-        let n = self.normals[self.owners[i] as usize];
-        let right = crate::geometry::query::any_tangent(&n);
-        let ahead = n.cross(&right);
-        for (k, spoke) in spokes.iter_mut().enumerate() {
-            let (sine, cosine) = sin_cos(std::f64::consts::TAU * k as f64 / MAX_SPOKES as f64);
-            let direction = right * cosine + ahead * sine;
-            let along = |j: &u32| from_here(j).normalize().dot(&direction);
-            let best = all.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
-            *spoke = best.map_or(-n, from_here);
-        }
-        let n = MAX_SPOKES;
-        Vertex { place, spokes, n }
+        Vertex::among(
+            place,
+            all.iter().map(from_here),
+            &self.normals[self.owners[i] as usize],
+        )
     }
 
     /// Visits the height at which each triangle crosses the vertical through (x, z), and whether it
@@ -424,6 +422,69 @@ impl Terrain for TriangleMesh {
         narrow(4 * self.triangles.len() + self.vertices.len())
     }
 
+    fn visit_rims(&self, visit: &mut dyn FnMut(&Rim)) {
+        let m = narrow(self.triangles.len());
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let other = self.neighbours[t][k];
+                let is_border = other == NONE;
+                let beyond = (!is_border).then(|| self.normal_beyond(t, k));
+                if !is_border && !self.hinge(t, k).is_convex {
+                    continue;
+                }
+                let [start, end] = self.ends(t, k);
+                let own = 3 * narrow(t) + narrow(k);
+                visit(&Rim {
+                    face: narrow(t),
+                    wall: k,
+                    piece: Some(m + own.min(self.same_edge(t, k))),
+                    corners: [triangle[k], triangle[(k + 1) % 3]].map(|v| 4 * m + v),
+                    start,
+                    end,
+                    normal: self.normals[t],
+                    beyond,
+                });
+            }
+        }
+    }
+
+    fn rim_corner(&self, id: u32) -> Vertex {
+        self.vertex(id as usize - 4 * self.triangles.len())
+    }
+
+    /// Known if no border and no edge where it turns under crosses the rectangle, and there is
+    /// ground at its middle. What is closed, such as a rock, does not end the ground.
+    fn covers(&self, area: &Area, is_joined: &dyn Fn(u32) -> bool) -> Coverage {
+        let m = narrow(self.triangles.len());
+        let mut coverage = Coverage::Silent;
+        let [x, z] = area.middle();
+        if self.height(x, z).is_some() {
+            coverage = Coverage::Known;
+        }
+        let place = Vector3::new(x, 0.0, z);
+        self.tree.visit_pillar_indexed(&place, area.radius(), |t| {
+            let t = t as usize;
+            let faces_up = |n: &Vector3<f64>| n.y > UPRIGHT;
+            if !faces_up(&self.normals[t]) {
+                return;
+            }
+            for k in 0..3 {
+                let other = self.neighbours[t][k];
+                let ends_here = other == NONE || !faces_up(&self.normals[other as usize]);
+                let own = 3 * narrow(t) + narrow(k);
+                let is_crossed = || area.is_crossed(&self.ends(t, k).map(|p| [p.x, p.z]));
+                if ends_here && is_crossed() && !is_joined(m + own.min(self.same_edge(t, k))) {
+                    coverage = if self.is_closed {
+                        Coverage::Silent
+                    } else {
+                        Coverage::Unknown([x, z])
+                    };
+                }
+            }
+        });
+        coverage
+    }
+
     /// Whether an odd number of triangles is above the point.
     fn is_inside(&self, _id: u32, point: &Vector3<f64>) -> bool {
         let mut above = 0;
@@ -431,6 +492,18 @@ impl Terrain for TriangleMesh {
             above += usize::from(y > point.y - SURFACE);
         });
         above % 2 == 1
+    }
+
+    /// What is next above the place must face up, so that a hall of inward faces is not solid. Below
+    /// an open surface, such as a bridge, there may be free space.
+    fn buries(&self, place: &Vector3<f64>, within: f64) -> bool {
+        let mut next = (f64::INFINITY, false);
+        self.visit_crossings(place.x, place.z, |y, faces_up| {
+            if y > place.y - SURFACE && y < next.0 {
+                next = (y, faces_up);
+            }
+        });
+        next.1 && (self.is_closed || next.0 - place.y <= within)
     }
 
     fn coverage(&self, _centre: &Vector3<f64>, _radius: f64) -> Coverage {
@@ -478,6 +551,9 @@ impl Terrain for TriangleMesh {
         None
     }
 }
+
+/// Vertical part of a normal below which a triangle covers nothing, seen from above.
+const UPRIGHT: f64 = 1e-12;
 
 /// How far above the surface a point that is in the ground may seem to be by rounding, m.
 const SURFACE: f64 = 1e-9;

@@ -3,6 +3,7 @@
 //! A terrain lists its primitives near a place. Each primitive is convex and pairs with every shape
 //! of a machine ([`super::query`]).
 
+mod area;
 pub mod error;
 mod half_space;
 pub mod height_field;
@@ -11,6 +12,7 @@ pub mod mesh;
 mod neighbourhood;
 pub mod plane;
 pub mod rocks;
+mod seams;
 pub mod soft_ground;
 pub mod sphere_field;
 pub mod surface;
@@ -21,12 +23,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
 
+pub use area::Area;
 pub use error::TerrainError;
 pub use height_field::HeightField;
 pub use mesh::TriangleMesh;
 pub use neighbourhood::Neighbourhood;
 pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
+pub use seams::Rim;
 pub use soft_ground::SoftGround;
 pub use sphere_field::SphereField;
 pub use surface::{Edge, Face, Vertex};
@@ -150,9 +154,55 @@ pub trait Terrain: Send + Sync {
         true
     }
 
+    /// Whether a place (world, m) is in the ground, for pieces of other terrains: below a surface
+    /// without an underside by at most `within`, m.
+    fn buries(&self, place: &Vector3<f64>, _within: f64) -> bool {
+        self.has_surface() && self.is_inside(0, place)
+    }
+
     /// What is known of the ground within `radius` (m) of `centre`, seen from above.
     fn coverage(&self, _centre: &Vector3<f64>, _radius: f64) -> Coverage {
         Coverage::Known
+    }
+
+    /// What is known of the ground all over a rectangle. `is_joined`: whether the ground goes on
+    /// beyond an edge of a surface, by its number.
+    fn covers(&self, area: &Area, _is_joined: &dyn Fn(u32) -> bool) -> Coverage {
+        let [x, z] = area.middle();
+        self.coverage(&Vector3::new(x, 0.0, z), area.radius())
+    }
+
+    /// Rectangle within which it knows the ground, if it knows that of one.
+    fn known_within(&self) -> Option<Area> {
+        None
+    }
+
+    /// Visits the edges at which a face of a surface ends, or bends away from the free side.
+    fn visit_rims(&self, _visit: &mut dyn FnMut(&Rim)) {}
+
+    /// The vertex of a number from a [`Rim`], convex or not, with all its edges.
+    fn rim_corner(&self, id: u32) -> Vertex {
+        unreachable!("invariant: corner {id} is of a rim")
+    }
+
+    /// Whether a face may end within `radius` (m) of a place.
+    fn may_end_near(&self, _place: &Vector3<f64>, _radius: f64) -> bool {
+        true
+    }
+
+    /// The terrains that it was made of, if it is a union.
+    fn members(&self) -> &[Arc<dyn Terrain>] {
+        &[]
+    }
+
+    /// Whether pieces of different numbers may lie in each other.
+    fn may_overlap(&self) -> bool {
+        false
+    }
+
+    /// Whether a place (world, m) of a piece with the unit normal n is covered by other ground.
+    fn is_buried(&self, _id: u32, _place: &Vector3<f64>, _n: &Vector3<f64>) -> bool {
+        false
     }
 
     /// A distance (m) along a unit vector n, which points up, that no place of a surface exceeds

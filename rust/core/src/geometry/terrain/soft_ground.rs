@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Coverage, KnownRules, Neighbourhood, Plane, Primitive, SoftLayer, Terrain};
+use super::{Area, Coverage, KnownRules, Neighbourhood, Plane, Primitive, SoftLayer, Terrain};
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::{PlacedShape, Sphere};
 use crate::quantity::QuantityError;
@@ -130,6 +130,14 @@ impl Terrain for SoftGround {
 
     fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {
         self.surface.coverage(centre, radius)
+    }
+
+    fn covers(&self, area: &Area, is_joined: &dyn Fn(u32) -> bool) -> Coverage {
+        self.surface.covers(area, is_joined)
+    }
+
+    fn known_within(&self) -> Option<Area> {
+        self.surface.known_within()
     }
 
     fn furthest(&self, n: &Vector3<f64>, centre: &Vector3<f64>, radius: f64) -> f64 {

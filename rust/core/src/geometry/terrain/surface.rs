@@ -12,6 +12,7 @@
 use nalgebra::Vector3;
 
 use super::plane::Plane;
+use crate::scalar::elementary::sin_cos;
 
 /// Sine of the angle between two faces below which their edge is flat.
 const FLAT: f64 = 1e-12;
@@ -108,6 +109,14 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// As [`Self::has`], with its ends `slack` (m) further out: where a line ends on the edge's end,
+    /// rounding leaves no gap between them.
+    #[inline]
+    #[must_use]
+    pub fn has_within(&self, place: f64, depth: f64, slack: f64) -> bool {
+        self.has(place + slack, depth) || self.has(place - slack, depth)
+    }
+
     /// Which of the normals through a point x, given from the start of the edge (m), leads away
     /// from the edge: positive beyond the face of the first, where n is that of the second.
     #[inline]
@@ -133,20 +142,39 @@ impl Edge {
         self.lean(first, n) < 0.0 && self.lean(second, n) > 0.0
     }
 
+    /// Whether the edge may bear a flat side or a straight line that it crosses, along a unit normal
+    /// n across the edge: one between the faces' normals, or beyond them by a small share of the
+    /// angle between them.
+    ///
+    /// What lies flat on one of the faces rests on the edge where that face ends, and then n is the
+    /// face's normal but for rounding.
+    #[inline]
+    #[must_use]
+    pub fn bears(&self, n: &Vector3<f64>) -> bool {
+        let [first, second] = &self.normals;
+        let (low, high) = (self.lean(first, n), self.lean(second, n));
+        if low < 0.0 && high > 0.0 {
+            return true;
+        }
+        let slack = BEYOND * (first - second).norm();
+        low < slack && high > -slack
+    }
+
     /// Where it ends, world, m.
     #[must_use]
     pub fn end(&self) -> Vector3<f64> {
         self.start + self.along * self.length
     }
 
-    /// The place midway between its faces' planes that is as far behind the edge, along an
-    /// admissible unit normal n, as the point x; world, m.
+    /// The place of the edge beside a point x, and the one midway between its faces' planes that is
+    /// as far behind the edge, along an admissible unit normal n, as x; world, m.
     #[must_use]
-    pub fn behind(&self, n: &Vector3<f64>, x: &Vector3<f64>) -> Vector3<f64> {
+    pub fn behind(&self, n: &Vector3<f64>, x: &Vector3<f64>) -> [Vector3<f64>; 2] {
         let from = x - self.start;
         let place = from.dot(&self.along).clamp(0.0, self.length);
         let outward = self.normals[0] + self.normals[1];
-        self.start + self.along * place + outward * (n.dot(&from) / n.dot(&outward))
+        let top = self.start + self.along * place;
+        [top, top + outward * (n.dot(&from) / n.dot(&outward))]
     }
 
     /// Whether a place along the edge (m from its start) belongs to it, for a part that is `depth`
@@ -166,6 +194,14 @@ pub const LEAN: f64 = 0.2;
 /// Cosine of the angle between the normals of a sharp edge.
 const SHARP: f64 = 0.2;
 
+/// Share of the size of an edge or a vertex, as an angle, by which a normal may leave its cone
+/// ([`Edge::bears`], [`Vertex::bears`]).
+///
+/// A part that comes down flat may turn by 0.07 rad in a step before the second edge of a wall is
+/// missed in it. A share, because a surface that is flat but for the rounding of its heights must
+/// not bear a part with each of its edges.
+pub(crate) const BEYOND: f64 = 0.05;
+
 /// Most edges that bound a vertex.
 pub const MAX_SPOKES: usize = 12;
 
@@ -181,6 +217,35 @@ pub struct Vertex {
 }
 
 impl Vertex {
+    /// Of its neighbours, given from it, m. Of more than it can keep it keeps those around the unit
+    /// normal n.
+    #[must_use]
+    pub fn among(
+        place: Vector3<f64>,
+        all: impl ExactSizeIterator<Item = Vector3<f64>> + Clone,
+        n: &Vector3<f64>,
+    ) -> Self {
+        let mut spokes = [Vector3::zeros(); MAX_SPOKES];
+        if all.len() <= MAX_SPOKES {
+            let n = all.len();
+            for (own, spoke) in spokes.iter_mut().zip(all) {
+                *own = spoke;
+            }
+            return Self { place, spokes, n };
+        }
+        let right = crate::geometry::query::any_tangent(n);
+        let ahead = n.cross(&right);
+        for (k, spoke) in spokes.iter_mut().enumerate() {
+            let (sine, cosine) = sin_cos(std::f64::consts::TAU * k as f64 / MAX_SPOKES as f64);
+            let direction = right * cosine + ahead * sine;
+            let along = |x: &Vector3<f64>| x.normalize().dot(&direction);
+            let best = all.clone().max_by(|a, b| along(a).total_cmp(&along(b)));
+            *spoke = best.unwrap_or(-n);
+        }
+        let n = MAX_SPOKES;
+        Self { place, spokes, n }
+    }
+
     /// Unit direction into the ground, away from all faces alike: the mean of its edges'.
     #[must_use]
     pub fn inward(&self) -> Vector3<f64> {
@@ -195,6 +260,23 @@ impl Vertex {
         let spokes = self.spokes[..self.n].iter();
         let rises = spokes.map(|spoke| n.dot(spoke) / spoke.norm());
         rises.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Whether the vertex may bear a flat side or a straight line along a unit normal: whether the
+    /// surface lies below the plane with this normal on all sides, or above it by a small share of
+    /// its steepest descent. As [`Edge::bears`].
+    #[inline]
+    #[must_use]
+    pub fn bears(&self, n: &Vector3<f64>) -> bool {
+        if self.admits(n) {
+            return true;
+        }
+        let (mut lowest, mut highest) = (0.0_f64, f64::NEG_INFINITY);
+        for spoke in &self.spokes[..self.n] {
+            let rise = n.dot(spoke) / spoke.norm();
+            (lowest, highest) = (lowest.min(rise), highest.max(rise));
+        }
+        lowest < -OVERLAP && highest <= -BEYOND * lowest
     }
 
     /// Whether the surface lies below the plane with this unit normal on all sides, or in it but

@@ -122,6 +122,18 @@ impl Tiles {
     /// of cells (first and last).
     #[inline]
     pub(super) fn steepest(&self, columns: [usize; 2], rows: [usize; 2]) -> f64 {
+        self.most(columns, rows, |bound| bound.steepest)
+    }
+
+    /// Height that no face in ranges of columns and rows of cells (first and last) exceeds, m.
+    #[inline]
+    pub(super) fn highest_of(&self, columns: [usize; 2], rows: [usize; 2]) -> f64 {
+        self.most(columns, rows, |bound| bound.highest)
+    }
+
+    /// Largest number of a few tiles that have all cells in ranges of columns and rows.
+    #[inline]
+    fn most(&self, columns: [usize; 2], rows: [usize; 2], number: impl Fn(&Bound) -> f32) -> f64 {
         let few = |level: &&Level| {
             let [w, h] = [columns, rows].map(|[a, b]| b / level.side - a / level.side + 1);
             w * h <= FACTOR
@@ -129,15 +141,15 @@ impl Tiles {
         let Some(level) = self.levels.iter().find(few).or(self.levels.last()) else {
             return f64::INFINITY;
         };
-        let mut steepest = 0.0_f32;
+        let mut most = f32::NEG_INFINITY;
         for row in rows[0] / level.side..=rows[1] / level.side {
             let first = row * level.columns;
             let tiles = first + columns[0] / level.side..=first + columns[1] / level.side;
-            steepest = level.bounds[tiles]
+            most = level.bounds[tiles]
                 .iter()
-                .fold(steepest, |s, own| s.max(own.steepest));
+                .fold(most, |most, own| most.max(number(own)));
         }
-        f64::from(steepest)
+        f64::from(most)
     }
 
     /// Bytes.

@@ -2,6 +2,7 @@
 
 use crate::integrator::StepReport;
 use crate::integrator::energy_audit::{Excess, GAIN};
+use crate::integrator::work::{Ledger, Work};
 use crate::multibody::mechanism::TreeSpan;
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
@@ -24,14 +25,20 @@ pub(super) struct Energies<T: Lane> {
     pub after: Vec<[T; 2]>,
     /// After the projection.
     pub lifted: Vec<[T; 2]>,
+    /// Kinetic energies and momenta of the groups after the projection, kg m/s; and how their
+    /// velocities are carried there.
+    pub kinetic: Vec<T>,
+    pub momentum: [Vec<T>; 3],
     /// Work of the drives, of the sand and of wheels that yield.
-    pub of_drives: Vec<T>,
+    pub of_drives: Vec<Work<T>>,
     pub of_sand: Vec<T>,
     pub released: Vec<T>,
     /// Sums over the contacts.
     pub of_contacts: [Vec<T>; 4],
     /// Masses, kg, and numbers and lanes on their way from group to cluster.
     pub mass: Vec<T>,
+    /// What the springs store before and after the step or the projection.
+    pub stored: [Vec<T>; 2],
     pub number: Vec<T>,
     pub in_touch: Vec<T::Mask>,
     pub on_ground: Vec<T::Mask>,
@@ -44,11 +51,14 @@ impl<T: Lane> Default for Energies<T> {
             before: Vec::new(),
             after: Vec::new(),
             lifted: Vec::new(),
+            kinetic: Vec::new(),
+            momentum: std::array::from_fn(|_| Vec::new()),
             of_drives: Vec::new(),
             of_sand: Vec::new(),
             released: Vec::new(),
             of_contacts: std::array::from_fn(|_| Vec::new()),
             mass: Vec::new(),
+            stored: [Vec::new(), Vec::new()],
             number: Vec::new(),
             in_touch: Vec::new(),
             on_ground: Vec::new(),
@@ -65,11 +75,14 @@ impl<T: Lane> Energies<T> {
             before: both(),
             after: both(),
             lifted: both(),
-            of_drives: zeros(),
+            kinetic: zeros(),
+            momentum: std::array::from_fn(|_| zeros()),
+            of_drives: vec![Work::none(T::splat(token, 0.0)); n],
             of_sand: zeros(),
             released: zeros(),
             of_contacts: std::array::from_fn(|_| zeros()),
             mass: zeros(),
+            stored: [zeros(), zeros()],
             number: zeros(),
             in_touch: vec![T::mask(token, 0); n],
             on_ground: vec![T::mask(token, 0); n],
@@ -85,9 +98,11 @@ pub(super) struct Balance<T: Lane> {
     pub after: [T; 2],
     /// Linear momentum at the end of the step, kg m/s.
     pub momentum: Vec3<T>,
-    /// Work of the actuators and of wheels that yield; the latter's alone.
-    pub supplied: T,
-    pub released: T,
+    /// Work of the machine's own forces, and change of the energy that its springs store.
+    pub work: Work<T>,
+    pub stored: T,
+    /// By wheels that yield.
+    released: T,
     /// Work of the contacts by their law.
     pub contact_work: T,
     /// Energy beyond what was supplied; what the audit removed of it; what is left of it, as a
@@ -144,7 +159,8 @@ impl<T: Lane> Balance<T> {
             before: [zero; 2],
             after: [zero; 2],
             momentum: Vec3::splat(token, [0.0; 3]),
-            supplied: zero,
+            work: Work::none(zero),
+            stored: zero,
             released: zero,
             contact_work: zero,
             excess: None,
@@ -157,14 +173,10 @@ impl<T: Lane> Balance<T> {
     /// Measures the excess of energy. Returns the lanes whose step must be taken otherwise; of the
     /// others, those with too much are [to be corrected](Self::correct).
     ///
-    /// `work`: the actuators'; `released`: by wheels that yield, J.
+    /// `released`: by wheels that yield, J.
     #[inline(always)]
-    pub fn audit(
-        &mut self,
-        (work, released): (T, T),
-        conditions: &Conditions<T>,
-        going: T::Mask,
-    ) -> T::Mask {
+    pub fn audit(&mut self, released: T, conditions: &Conditions<T>, going: T::Mask) -> T::Mask {
+        let work = self.work.total();
         let (zero, gain) = (work.like(0.0), work.like(GAIN));
         let Conditions {
             mass,
@@ -173,7 +185,6 @@ impl<T: Lane> Balance<T> {
             ..
         } = *conditions;
         self.released = released;
-        self.supplied = work + released;
         let excess = Excess::new(self.before, self.after, [work, released], (mass, fall));
         let is_balanced = excess.is_balanced(is_free, [gain, zero]);
         let is_lost = excess.is_coarse(is_free, gain) & !is_balanced;
@@ -210,37 +221,26 @@ impl<T: Lane> Balance<T> {
         }
     }
 
-    /// Enters the balance into the lanes' reports, after those of the groups before it.
+    /// Adds the balance to the lanes' reports.
     #[inline(always)]
-    pub fn report(&self, reports: &mut [StepReport; MAX_LANES], is_first: bool) {
+    pub fn report(&self, reports: &mut [StepReport; MAX_LANES]) {
         let [kinetic, potential] = self.before;
-        let change = (self.after[0] - kinetic) + (self.after[1] - potential);
-        let lost = self.contact_work - (change - self.supplied) - self.removed;
-        let mut entries = [[0.0; MAX_LANES]; 5];
-        let balance = [
-            self.gain,
-            self.removed,
-            self.contact_work,
-            lost,
-            self.released,
-        ];
-        for (entry, x) in entries.iter_mut().zip(balance) {
+        let ledger = Ledger {
+            work: self.work,
+            stored: self.stored,
+            contact_work: self.contact_work,
+            released: self.released,
+            removed: self.removed,
+            change: (self.after[0] - kinetic) + (self.after[1] - potential),
+        };
+        let (mut gain, mut entries) = ([0.0; MAX_LANES], [[0.0; MAX_LANES]; 5]);
+        self.gain.store(&mut gain[..T::LANES]);
+        for (entry, x) in entries.iter_mut().zip(ledger.entries()) {
             x.store(&mut entry[..T::LANES]);
         }
         for (lane, report) in reports[..T::LANES].iter_mut().enumerate() {
-            if !is_first {
-                report.energy_gain = report.energy_gain.max(entries[0][lane]);
-                report.energy_removed += entries[1][lane];
-                report.energy_dissipated -= entries[2][lane];
-                report.energy_lost += entries[3][lane];
-                report.energy_released += entries[4][lane];
-                continue;
-            }
-            report.energy_gain = entries[0][lane];
-            report.energy_removed = entries[1][lane];
-            report.energy_dissipated = -entries[2][lane];
-            report.energy_lost = entries[3][lane];
-            report.energy_released = entries[4][lane];
+            report.energy_gain = report.energy_gain.max(gain[lane]);
+            report.enter_energies(entries.map(|entry| entry[lane]));
         }
     }
 }

@@ -400,3 +400,19 @@ enum State {
     Start,
     End,
 }
+
+/// The linear momentum of a cluster that only contacts with the ground change; 0 of one that is tied
+/// to the world.
+#[inline(always)]
+fn own_momentum<T: Lane>(
+    token: T::Token,
+    machine: &Machine,
+    cluster: usize,
+    momentum: Vec3<T>,
+) -> Vec3<T> {
+    if machine.is_held(cluster) {
+        Vec3::splat(token, [0.0; 3])
+    } else {
+        momentum
+    }
+}

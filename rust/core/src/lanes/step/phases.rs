@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use super::balance::{Balance, Conditions, Correction, Energies, select_both};
-use super::{Block, Fallback, Next, State};
+use super::{Block, Fallback, Next, State, own_momentum};
 use crate::contact::clusters_of;
 use crate::integrator::{Phase, Probe, Stabilisation, StepReport};
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
 use crate::multibody::Model;
-use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::extent::Turning;
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
@@ -78,10 +78,15 @@ impl<T: Lane> Block<T> {
             let laws = &self.yields.laws;
             self.rows.soften(&self.contacts, |slot| laws[slot].diagonal);
         }
+        self.rows.close_held(&self.contacts);
         probe.end(Phase::Delassus);
         self.load();
         self.rows
             .to_problems(&self.contacts, &self.u, &self.mu, problems);
+        let problems_in_use = &mut problems[..self.contacts.n_problems()];
+        for (index, problem) in problems_in_use.iter_mut().enumerate() {
+            problem.begins_least = self.is_same[index / T::LANES].get(Self::lane_of(index));
+        }
         probe.end(Phase::Bias);
         if self.contacts.factored() != 0 {
             T::vectorize(
@@ -198,6 +203,7 @@ impl<T: Lane> Block<T> {
             let mut report = StepReport {
                 steps: 1,
                 retaken: self.n_retaken[lane],
+                immovable_contacts: self.rows.n_immovable(&self.contacts, lane),
                 ..StepReport::default()
             };
             let mut is_solved = true;
@@ -237,8 +243,8 @@ impl<T: Lane> Block<T> {
             token,
             #[inline(always)]
             || {
-                for (cluster, balance) in self.balances.iter().enumerate() {
-                    balance.report(&mut self.reports, cluster == 0);
+                for balance in &self.balances {
+                    balance.report(&mut self.reports);
                 }
             },
         );
@@ -317,11 +323,7 @@ impl<T: Lane> Block<T> {
         let token = self.token;
         for (cluster, found) in self.energy(State::End).iter().enumerate() {
             own.after[cluster] = found.energy.kinetic_and_potential();
-            balances[cluster].momentum = if machine.is_held(cluster) {
-                Vec3::splat(token, [0.0; 3])
-            } else {
-                found.momentum
-            };
+            balances[cluster].momentum = own_momentum(token, &machine, cluster, found.momentum);
         }
         for (balance, (before, after)) in
             (balances.iter_mut()).zip(own.before.iter().zip(&own.after))
@@ -363,15 +365,27 @@ impl<T: Lane> Block<T> {
     fn audit(&mut self) {
         let (h, theta) = self.time_step();
         let mut own = std::mem::take(&mut self.energies);
+        let mut balances = std::mem::take(&mut self.balances);
         let (places, velocities) = (&self.start.joints, [&self.v[..], &self.v_end]);
-        (self.drives).work(
-            &self.machine,
-            (h, theta),
-            places,
-            velocities,
-            &mut own.of_drives,
-        );
-        own.released.fill(h.like(0.0));
+        let (machine, step, zero) = (&*self.machine, (h, theta), h.like(0.0));
+        (self.drives).work(machine, step, places, velocities, &mut own.of_drives);
+        let [before, after] = &mut own.stored;
+        self.drives.stored(machine, zero, places, before);
+        (self.drives).stored(machine, zero, &self.end.joints, after);
+        for (c, balance) in balances.iter_mut().enumerate() {
+            balance.work = own.of_drives[c];
+            balance.work.damped -= own.of_sand[c];
+            balance.stored = own.stored[1][c] - own.stored[0][c];
+        }
+        if self.contacts.joined() != 0 {
+            let number = &mut own.number;
+            self.gather(&mut balances, number, |own| &mut own.work.supplied);
+            self.gather(&mut balances, number, |own| &mut own.work.damped);
+            self.gather(&mut balances, number, |own| &mut own.work.of_springs);
+            self.gather(&mut balances, number, |own| &mut own.stored);
+        }
+        self.balances = balances;
+        own.released.fill(zero);
         if !self.yields.is_empty() {
             let (contacts, before) = (&self.contacts, &self.rows.u_before);
             let released = &mut own.released;
@@ -382,12 +396,7 @@ impl<T: Lane> Block<T> {
         }
         self.find_touch(&mut own.in_touch);
         self.find_ground(&mut own.on_ground);
-        for sums in [
-            &mut own.of_drives,
-            &mut own.of_sand,
-            &mut own.released,
-            &mut own.mass,
-        ] {
+        for sums in [&mut own.released, &mut own.mass] {
             self.contacts.gather(sums);
         }
         let nobody = T::mask(self.token, 0);
@@ -401,9 +410,8 @@ impl<T: Lane> Block<T> {
         };
         let (mut is_lost, mut is_corrected) = (nobody, nobody);
         for (c, balance) in self.balances.iter_mut().enumerate() {
-            let work = own.of_sand[c] + own.of_drives[c];
             let going = self.going & self.contacts.leads(c);
-            is_lost = is_lost | balance.audit((work, own.released[c]), &conditions(c), going);
+            is_lost = is_lost | balance.audit(own.released[c], &conditions(c), going);
             is_corrected = is_corrected | balance.is_corrected;
         }
         if is_corrected.any() {

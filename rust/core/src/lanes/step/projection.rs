@@ -1,12 +1,15 @@
 //! The position projection: contacts that penetrate too deep are moved apart.
 
+use std::sync::Arc;
+
 use super::balance::select_both;
-use super::{Block, Fallback, State};
+use super::{Block, Fallback, State, own_momentum};
+use crate::integrator::carried_velocity::{Carried, Moving};
 use crate::integrator::position_projection::FARTHEST;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
-use crate::scalar::{Lane, LaneMask};
+use crate::scalar::{Lane, LaneMask, Vec3};
 use crate::system::extent::{displacement, tolerated};
 
 /// Sweeps before pivoting, of machines with many contacts: a problem of six cylinders on hills with
@@ -47,7 +50,7 @@ impl<T: Lane> Block<T> {
         is_any
     }
 
-    /// Gap of a slot after the step, m; 0 where it is negative and opening.
+    /// Gap of a slot after the step, m; 0 where it is negative and opening, or nothing can open it.
     #[inline(always)]
     fn gap_at_end(&self, slot: usize, h: T, theta: T) -> T {
         let zero = h.like(0.0);
@@ -59,7 +62,7 @@ impl<T: Lane> Block<T> {
             gap = T::select(zero.lt(law.diagonal), law.unexplained, gap);
         }
         let parts = gap.lt(zero) & !(gap + h * u).lt(zero);
-        let gap = T::select(parts, zero, gap);
+        let gap = T::select(parts | self.rows.immovable(slot), zero, gap);
         T::select(own.active, gap, zero)
     }
 
@@ -80,6 +83,7 @@ impl<T: Lane> Block<T> {
                         problem.n_contacts = 0;
                     }
                     let n = problem.n_unknowns();
+                    problem.asks_least = false;
                     problem.q[..n].fill(0.0);
                     problem.p[..n].fill(0.0);
                 }
@@ -121,39 +125,92 @@ impl<T: Lane> Block<T> {
             }
         }
         self.fall_back(Fallback::Projection, T::mask(token, unsolved));
+        let (drives, stored) = (&self.drives, &mut self.energies.stored[0]);
+        drives.stored(
+            &self.machine,
+            T::splat(token, 0.0),
+            &self.end.joints,
+            stored,
+        );
         T::vectorize(
             token,
             #[inline(always)]
             || self.displace(problems),
         );
+        self.close_moved(self.any(&self.is_deep) & self.going);
+        self.carry_velocity();
+    }
+
+    /// Carries the velocities of the groups that were moved to the projected position, and counts
+    /// the energy that this added, as [`crate::integrator::energy_audit`] does. `energies.stored[0]`:
+    /// in springs before it, J.
+    fn carry_velocity(&mut self) {
         let is_moved = self.any(&self.is_deep) & self.going;
-        self.close_moved(is_moved);
-        let mut own = std::mem::take(&mut self.energies);
-        let mut gained = self.number(0.0);
-        let going = self.going;
-        for (cluster, lifted) in self.energy(State::End).iter().enumerate() {
-            own.lifted[cluster] = lifted.energy.kinetic_and_potential();
+        if !is_moved.any() {
+            return;
         }
-        for (cluster, (after, lifted)) in own.after.iter_mut().zip(&own.lifted).enumerate() {
-            let lanes = self.is_deep[cluster] & going;
-            let change = (lifted[0] - after[0]) + (lifted[1] - after[1]);
-            gained += T::select(lanes, change, change.like(0.0));
-            *after = select_both(lanes, *lifted, *after);
-        }
-        self.energies = own;
         let work = self.drives.work_of_displacement(
             &self.machine,
             self.time_step(),
             &self.start.joints,
             [&self.v, &self.v_end, &self.y],
         );
+        let token = self.token;
+        self.weigh_moved();
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.scale_carried(),
+        );
+        let mut own = std::mem::take(&mut self.energies);
+        for (cluster, lifted) in self.energy(State::End).iter().enumerate() {
+            own.lifted[cluster] = lifted.energy.kinetic_and_potential();
+        }
+        let zero = self.number(0.0);
+        let [before, after] = &mut own.stored;
+        (self.drives).stored(&self.machine, zero, &self.end.joints, after);
+        let mut gained = zero;
+        for (cluster, lifted) in own.lifted.iter().enumerate() {
+            let lanes = self.is_deep[cluster] & self.going;
+            let [kinetic, potential] = own.after[cluster];
+            let stored = after[cluster] - before[cluster];
+            let change = (lifted[0] - kinetic) + (lifted[1] - potential) + stored;
+            gained += T::select(lanes, change, zero);
+            own.after[cluster] = select_both(lanes, *lifted, own.after[cluster]);
+        }
+        self.energies = own;
         let gained = gained - work;
         for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
             if is_moved.get(lane) {
+                report.energy_supplied += work.get(lane);
                 report.energy_lifted = gained.get(lane).max(0.0);
                 report.energy_lost += (-gained.get(lane)).max(0.0);
             }
         }
+    }
+
+    /// `energies.kinetic` and `energies.momentum`: kinetic energies and momenta of the groups at the
+    /// projected position, with the velocity before it.
+    fn weigh_moved(&mut self) {
+        let mut own = std::mem::take(&mut self.energies);
+        let machine = Arc::clone(&self.machine);
+        let token = self.token;
+        for (cluster, found) in self.energy(State::End).iter().enumerate() {
+            own.kinetic[cluster] = found.energy.kinetic;
+            let momentum = own_momentum(token, &machine, cluster, found.momentum);
+            for (sum, own) in own
+                .momentum
+                .iter_mut()
+                .zip([momentum.x, momentum.y, momentum.z])
+            {
+                sum[cluster] = own;
+            }
+        }
+        self.contacts.gather(&mut own.kinetic);
+        for momentum in &mut own.momentum {
+            self.contacts.gather(momentum);
+        }
+        self.energies = own;
     }
 
     /// Closes the loops of the groups that were moved.
@@ -171,6 +228,54 @@ impl<T: Lane> Block<T> {
         for (v, (kept, cluster)) in self.v_end.iter_mut().zip(kept) {
             *v = T::select(!self.is_deep[*cluster], *kept, *v);
         }
+    }
+
+    #[inline(always)]
+    fn scale_carried(&mut self) {
+        let mut own = std::mem::take(&mut self.energies);
+        for (cluster, balance) in self.balances.iter().enumerate() {
+            let before = Moving {
+                kinetic: balance.after[0],
+                momentum: balance.momentum,
+            };
+            let [x, y, z] = own.momentum.each_ref().map(|all| all[cluster]);
+            let after = Moving {
+                kinetic: own.kinetic[cluster],
+                momentum: Vec3::new(x, y, z),
+            };
+            let is_alone = !own.on_ground[cluster];
+            let carried = Carried::new(before, after, own.mass[cluster], is_alone);
+            own.kinetic[cluster] = carried.share;
+            let Vec3 { x, y, z } = carried.common;
+            for (all, common) in own.momentum.iter_mut().zip([x, y, z]) {
+                all[cluster] = common;
+            }
+        }
+        self.contacts.spread(&mut own.kinetic);
+        for common in &mut own.momentum {
+            self.contacts.spread(common);
+        }
+        let (shares, commons) = (&own.kinetic, &own.momentum);
+        for tree in &self.machine.trees {
+            let lanes = self.is_deep[tree.cluster] & self.going;
+            let share = shares[tree.cluster];
+            let axes = if tree.is_free { 3 } else { 0 };
+            for (k, v) in self.v_end[tree.velocities.clone()].iter_mut().enumerate() {
+                let mut own = share * *v;
+                if k < axes {
+                    own = commons[k][tree.cluster] + own;
+                }
+                *v = T::select(lanes, own, *v);
+            }
+        }
+        for &slot in self.contacts.used() {
+            let lanes = self.contacts.mask_of(slot, &self.is_deep) & self.going;
+            let share = self.contacts.number_of(slot, shares);
+            for u in &mut self.u[slot] {
+                *u = T::select(lanes, *u * share, *u);
+            }
+        }
+        self.energies = own;
     }
 
     #[inline(always)]

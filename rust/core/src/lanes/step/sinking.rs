@@ -3,6 +3,7 @@
 use super::Block;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
 use crate::lanes::lane_rover::LaneRover;
+use crate::sand::RutMap;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use crate::system::sand_patch::{Layers, SandScene};
@@ -38,6 +39,15 @@ impl<T: Lane> Block<T> {
     pub fn return_ruts(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
         if let Some(state) = rover.sand.as_deref_mut() {
             std::mem::swap(&mut self.ruts[lane], &mut state.ruts);
+        }
+    }
+
+    /// Gives a rover its ruts back if the lane has them, after a panic.
+    pub fn recover_ruts(&mut self, lane: usize, ruts: &mut RutMap) {
+        // A rover whose ruts are here has a map without wheels in their place.
+        if let Some(own) = (self.ruts.get_mut(lane)).filter(|own| own.n_wheels() > ruts.n_wheels())
+        {
+            std::mem::swap(own, ruts);
         }
     }
 

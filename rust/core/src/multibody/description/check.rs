@@ -11,11 +11,16 @@ use super::check_values::{
 use super::join::check_machines;
 use super::joint::{JointKind, Limits};
 use super::masses::mass_left;
-use super::{MAX_SHAPES, MAX_SOLIDS, ModelDescription, SolidDescription, WheelDescription};
+use super::{
+    MAX_SHAPES, MAX_SOLIDS, MAX_TRIANGLES, ModelDescription, SolidDescription, WheelDescription,
+};
 use crate::multibody::error::ModelError;
 
 /// Least angle of rollers from the axle, rad. At 0 they would turn in place of the wheel.
 const LEAST_ROLLER_ANGLE: f64 = 0.01;
+
+/// Largest friction across a wheel over that along: the ratio scales a row of the contact problem.
+const MOST_ACROSS: f64 = 100.0;
 
 /// Checks the whole description, in the order of its text.
 pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), ModelError> {
@@ -23,12 +28,21 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
         return Err(ModelError::NoSolids);
     }
     let n_shapes = description.solids.iter().map(|s| s.shapes.len()).sum();
+    let drawings = description.solids.iter().flat_map(|s| &s.drawings);
+    let n_triangles = drawings.map(|drawing| drawing.faces.len()).sum();
     for (field, what, count, limit) in [
         ("solids", "solids", description.solids.len(), MAX_SOLIDS),
         ("wheels", "wheels", description.wheels.len(), MAX_SOLIDS),
         ("tags", "tags", description.tags.len(), MAX_SOLIDS),
         ("loops", "loops", description.loops.len(), MAX_SOLIDS),
+        (
+            "materials",
+            "materials",
+            description.materials.len(),
+            MAX_SOLIDS,
+        ),
         ("solids", "shapes", n_shapes, MAX_SHAPES),
+        ("solids", "triangles", n_triangles, MAX_TRIANGLES),
     ] {
         if count > limit {
             return Err(ModelError::TooMany {
@@ -54,6 +68,7 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
     check_trees(description)?;
     check_wheels(description, &solids)?;
     check_tags(description, &solids)?;
+    check_materials(description)?;
     check_loops(description, &solids)?;
     check_machines(description, &solids)
 }
@@ -285,6 +300,35 @@ fn check_tags(
             });
         }
         place(&at("position"), &tag.position)?;
+        for angle in tag.rotation.iter().flatten() {
+            in_range(&at("rotation"), *angle, 1e3, "at most 1e3 rad either way")?;
+        }
+    }
+    Ok(())
+}
+
+fn check_materials(description: &ModelDescription) -> Result<(), ModelError> {
+    let mut names = HashSet::new();
+    for (i, own) in description.materials.iter().enumerate() {
+        let at = |what: &str| format!("materials[{i}].{what}");
+        material(&at("name"), Some(&own.name))?;
+        if !names.insert(own.name.as_str()) {
+            return Err(ModelError::DuplicateName {
+                field: at("name"),
+                name: own.name.clone(),
+            });
+        }
+        moderate(&at("friction"), own.friction)?;
+        if let Some(across) = own.friction_across {
+            moderate(&at("friction_across"), across)?;
+            positive(&at("friction"), own.friction)?;
+            in_range(
+                &at("friction_across"),
+                across,
+                own.friction * MOST_ACROSS,
+                "at most 100 times the friction along",
+            )?;
+        }
     }
     Ok(())
 }

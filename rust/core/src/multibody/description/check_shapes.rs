@@ -1,6 +1,6 @@
 //! Checks of the shapes of a solid.
 
-use super::check_values::{in_range, length, material, place, positive};
+use super::check_values::{in_range, length, material, not_negative, place, positive};
 use super::{Shape, ShapeDescription, SolidDescription};
 use crate::multibody::error::ModelError;
 
@@ -35,6 +35,7 @@ pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), Mod
     for (k, shape) in solid.shapes.iter().enumerate() {
         check_placed_shape(&at(&format!("shapes[{k}]")), shape)?;
     }
+    check_drawings(i, solid)?;
     let is_half_given = solid.centre_of_mass.is_some() != solid.inertia.is_some();
     if !solid.shapes.is_empty() && is_half_given {
         let missing = if solid.inertia.is_none() {
@@ -45,6 +46,34 @@ pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), Mod
         return Err(ModelError::HalfGiven { field: at(missing) });
     }
     Ok(())
+}
+
+fn check_drawings(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
+    for (k, drawing) in solid.drawings.iter().enumerate() {
+        let at = |what: &str| format!("solids[{i}].drawings[{k}].{what}");
+        for x in &drawing.vertices {
+            place(&at("vertices"), x)?;
+        }
+        let count = drawing.vertices.len();
+        if let Some(&vertex) = drawing.faces.iter().flatten().find(|&&v| v >= count) {
+            let field = at("faces");
+            return Err(ModelError::NoVertex {
+                field,
+                vertex,
+                count,
+            });
+        }
+        colour(&at("colour"), drawing.colour)?;
+    }
+    Ok(())
+}
+
+/// Checks a colour: red, green, blue.
+fn colour(field: &str, levels: Option<[f64; 3]>) -> Result<(), ModelError> {
+    levels.iter().flatten().try_for_each(|&level| {
+        not_negative(field, level)?;
+        in_range(field, level, 1.0, "from 0 to 1")
+    })
 }
 
 fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelError> {
@@ -63,6 +92,7 @@ fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelErr
         in_range(&field, mass, 1e12, "at most 1e12 kg")?;
     }
     material(&format!("{at}.material"), shape.material.as_ref())?;
+    colour(&format!("{at}.colour"), shape.colour)?;
     if shape.collides && !collides(&shape.shape) {
         return Err(ModelError::CannotCollide {
             field: format!("{at}.collides"),

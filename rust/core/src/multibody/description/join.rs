@@ -54,6 +54,11 @@ impl ModelDescription {
             [&mut tag.name, &mut tag.solid].into_iter().for_each(rename);
             self.tags.push(tag);
         }
+        for own in part.materials {
+            if !self.materials.contains(&own) {
+                self.materials.push(own);
+            }
+        }
         for mut own in part.loops {
             [&mut own.name, &mut own.solid].into_iter().for_each(rename);
             own.other.iter_mut().for_each(rename);

@@ -25,7 +25,7 @@ pub use closure::{LoopDescription, LoopKind};
 pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
 pub use machines::MachineDescription;
 pub use masses::MassProperties;
-pub use shape::{Shape, ShapeDescription};
+pub use shape::{DrawingDescription, Shape, ShapeDescription};
 pub use tracks::TrackDescription;
 
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
@@ -62,6 +62,9 @@ pub struct ModelDescription {
     /// Constraints that close kinematic loops.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loops: Vec<LoopDescription>,
+    /// Materials with a friction of their own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<MaterialDescription>,
     /// Whether parts of one tree collide with each other, except across a joint. Parts of two trees
     /// always collide.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -82,6 +85,34 @@ pub struct TagDescription {
     pub solid: String,
     /// Position in the solid's frame, m.
     pub position: [f64; 3],
+    /// Rotation from axes at the point to the solid's frame as a rotation vector (axis times
+    /// angle), rad; the identity by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<[f64; 3]>,
+}
+
+/// A material with a friction of its own, which holds with every other material whose pair has no
+/// law in the step's options. Between two such materials the smaller friction holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialDescription {
+    /// Its name, as wheels and shapes state it.
+    pub name: String,
+    /// Coulomb's coefficient.
+    pub friction: f64,
+    /// Coefficient across a wheel on the ground, if it differs from that along its rolling
+    /// direction, `friction`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_across: Option<f64>,
+}
+
+impl MaterialDescription {
+    /// Friction across over that along, if they differ.
+    #[must_use]
+    pub fn across(&self) -> Option<f64> {
+        let ratio = self.friction_across? / self.friction;
+        Some(ratio).filter(|ratio| (ratio - 1.0).abs() > 0.0)
+    }
 }
 
 /// One solid and the joint that carries it.
@@ -118,6 +149,10 @@ pub struct SolidDescription {
     /// given inertia.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeDescription>,
+    /// Meshes that are drawn in place of its shapes that are not visible. They touch nothing and
+    /// have no mass.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drawings: Vec<DrawingDescription>,
     /// Mass centre in the solid's frame, m; the origin by default. A solid with `shapes` specifies
     /// both this and `inertia`, or neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -228,6 +263,9 @@ pub const MAX_SOLIDS: usize = 1000;
 
 /// Largest total number of shapes in a model.
 pub const MAX_SHAPES: usize = 4000;
+
+/// Largest total number of triangles that a model draws: a page with them is ten megabytes.
+pub const MAX_TRIANGLES: usize = 200_000;
 
 /// Largest length of a description's text, bytes: a model of [`MAX_SOLIDS`] solids needs a
 /// twentieth of it.
@@ -354,6 +392,7 @@ impl ModelDescription {
             tracks: Vec::new(),
             tags: Vec::new(),
             loops: Vec::new(),
+            materials: Vec::new(),
             self_contact: false,
             machines: Vec::new(),
         }

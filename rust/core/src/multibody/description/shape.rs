@@ -148,6 +148,9 @@ pub struct ShapeDescription {
     /// Name of its material; `body` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
+    /// Its colour: red, green, blue, 0 to 1; by default that of its kind.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colour: Option<[f64; 3]>,
     /// Whether it is drawn.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub visible: bool,
@@ -155,6 +158,19 @@ pub struct ShapeDescription {
     /// is divided by volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
+}
+
+/// A mesh that is drawn, fixed to a solid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrawingDescription {
+    /// Vertices in the solid's frame, m.
+    pub vertices: Vec<[f64; 3]>,
+    /// Triangles: indices of vertices, counter-clockwise seen from outside.
+    pub faces: Vec<[usize; 3]>,
+    /// Red, green, blue, 0 to 1; by default that of the solid's shapes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colour: Option<[f64; 3]>,
 }
 
 fn yes() -> bool {

@@ -13,8 +13,9 @@ use super::spinners::mark_spinners;
 use super::tree::{Paths, Tree};
 use super::{Body, Model, fingerprint};
 use crate::law::compliance::Compliance;
+use crate::law::materials::OwnFriction;
 use crate::multibody::description::{
-    JointKind, ModelDescription, Shape, SolidDescription, WheelDescription,
+    JointKind, MaterialDescription, ModelDescription, Shape, SolidDescription,
 };
 use crate::multibody::error::ModelError;
 use crate::multibody::joint::fixed::Lock;
@@ -71,7 +72,7 @@ impl Model {
             let i = solid_of_body[b];
             coupled_apart(i, &description.solids[i])
         })?;
-        let wheels = wheels(&description.wheels, &index_of, &frames, &bodies, &joints);
+        let wheels = wheels(&description, &index_of, &frames, &bodies, &joints);
         let carriers = (boxes.iter().map(|x| x.body))
             .chain(spheres.iter().map(|x| x.body))
             .chain(colliders.iter().map(|x| x.body));
@@ -103,6 +104,12 @@ impl Model {
             .collect();
         let has_slides = bodies.iter().any(|body| body.joint.slides());
         let text = description.to_json().unwrap_or_default();
+        let own_frictions = (description.materials.iter())
+            .map(|own| OwnFriction {
+                material: own.name.clone(),
+                friction_coefficient: own.friction,
+            })
+            .collect();
         let mut model = Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
             fingerprint: fingerprint(text.bytes()),
@@ -125,6 +132,7 @@ impl Model {
             common,
             body_of_velocity: paths.body_of_velocity,
             loops: Vec::new(),
+            own_frictions,
             machines,
         };
         model.build_loops()?;
@@ -451,7 +459,7 @@ fn tree(t: usize, bodies: &[Body], paths: &Paths) -> Tree {
 }
 
 fn wheels(
-    described: &[WheelDescription],
+    description: &ModelDescription,
     index_of: &HashMap<&str, usize>,
     frames: &[Frame],
     bodies: &[Body],
@@ -470,7 +478,7 @@ fn wheels(
         (!body.is_coupled || joints[coordinate].drive.is_none()).then_some(coordinate)
     };
     let mut wheels = Vec::new();
-    for wheel in described {
+    for wheel in &description.wheels {
         let Some(frame) = index_of.get(wheel.solid.as_str()).map(|&k| &frames[k]) else {
             continue;
         };
@@ -485,6 +493,9 @@ fn wheels(
             width: wheel.width.unwrap_or(0.0),
             rounding: wheel.rounding.unwrap_or(0.0),
             rollers: wheel.rollers.map(|angle| sin_cos(angle).into()),
+            across: (description.materials.iter())
+                .find(|own| own.name == wheel.material.as_deref().unwrap_or("wheel"))
+                .and_then(MaterialDescription::across),
             grouser_height: wheel.grouser_height.unwrap_or(0.0),
             grousers: wheel.grousers.unwrap_or(0),
             compliance: (wheel.stiffness.filter(|stiffness| *stiffness > 0.0)).map(|stiffness| {

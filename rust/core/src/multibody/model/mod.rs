@@ -17,7 +17,7 @@ mod properties;
 mod spinners;
 mod tree;
 
-use nalgebra::Vector3;
+use std::sync::Arc;
 
 pub use body::Body;
 pub use closed_loop::{Loop, LoopGap};
@@ -34,6 +34,7 @@ use super::inertias::Inertias;
 use super::joint::Joint;
 pub use super::mechanism::BASE;
 use super::mechanism::{Mechanism, Mover};
+use crate::law::materials::OwnFriction;
 
 /// Kinematic trees. Velocities are in the order of the bodies; [`super::joint`] lists those of each
 /// joint.
@@ -61,6 +62,7 @@ pub struct Model {
     /// Indices of the joints with dry friction.
     rubbing: Vec<usize>,
     loops: Vec<Loop>,
+    own_frictions: Arc<[OwnFriction]>,
     machines: Vec<MachineSpan>,
     has_slides: bool,
     mass: f64,
@@ -121,43 +123,6 @@ impl Model {
     #[must_use]
     pub fn inertias(&self) -> &Inertias<f64> {
         &self.inertias
-    }
-
-    /// Upper bound on the speed at which two trees approach each other, m/s, or of all points of a
-    /// single one; `place`: origin of a body's frame, m.
-    #[inline]
-    pub(crate) fn fastest_approach(&self, place: impl Fn(usize) -> Vector3<f64>, v: &[f64]) -> f64 {
-        let (mut fastest, mut next) = (0.0_f64, 0.0_f64);
-        for tree in self.trees() {
-            let speed = self.fastest_point(tree, &place, v);
-            (fastest, next) = (fastest.max(speed), next.max(fastest.min(speed)));
-        }
-        fastest + next
-    }
-
-    /// Upper bound on the speed of all points of a tree, m/s.
-    fn fastest_point(&self, tree: &Tree, place: impl Fn(usize) -> Vector3<f64>, v: &[f64]) -> f64 {
-        let v = &v[tree.velocities.clone()];
-        let linear = match v {
-            [x, y, z, ..] if tree.is_free => (x * x + y * y + z * z).sqrt(),
-            _ => 0.0,
-        };
-        let half = tree.lead() / 2;
-        let turning: f64 = v[half..].iter().map(|w| w.abs()).sum();
-        let mut reach = tree.reach
-            + self
-                .mechanism
-                .size(self.mechanism.cluster_of_body(tree.bodies.start));
-        if self.has_slides() {
-            // A translation counts as a rotation at an arm of more than one metre.
-            reach += 1.0;
-            let first = place(tree.bodies.start);
-            let farthest = tree.bodies.clone().map(|body| (place(body) - first).norm());
-            reach = farthest.fold(reach, f64::max);
-        }
-        let couplings = (self.mechanism.links.iter()).filter_map(|link| link.joint.coupling());
-        let coupled: f64 = couplings.map(|coupling| coupling.ratio.abs()).sum();
-        linear + turning * reach * (1.0 + coupled)
     }
 
     /// Indices of the joints with dry friction, ascending.
@@ -298,6 +263,12 @@ impl Model {
     #[must_use]
     pub fn has_rollers(&self) -> bool {
         self.wheels.iter().any(|wheel| wheel.rollers.is_some())
+    }
+
+    /// Materials with a friction of their own.
+    #[must_use]
+    pub fn own_frictions(&self) -> &Arc<[OwnFriction]> {
+        &self.own_frictions
     }
 
     /// Whether any wheel yields where it touches.

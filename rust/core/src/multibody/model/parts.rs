@@ -44,6 +44,8 @@ pub struct Wheel {
     pub rounding: f64,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
     pub rollers: Option<[f64; 2]>,
+    /// Friction across over that along, if its material states both.
+    pub across: Option<f64>,
     /// Height of the grousers over the rim, m. Only sand feels them.
     pub grouser_height: f64,
     /// Number of grousers around the rim.

@@ -29,6 +29,20 @@ const NO_MOVE: f64 = 1e-6;
 /// together: in a machine that is its own mirror image one of a pair must not go first.
 pub(super) const ALIKE: f64 = 1.0 - 1e-6;
 
+/// Change of the velocities, relative to those that the impulses cause, that removing null vectors
+/// may cause.
+const NULL_VELOCITY: f64 = 1e-13;
+
+/// Change of the impulses at another application of `α (W + α)⁻¹`, relative to the largest, up to
+/// which they are null vectors.
+const NULL_CHANGE: f64 = 1e-5;
+
+/// Most applications.
+const MOST_NULL_STEPS: usize = 4;
+
+/// Excess over a cone, relative to the largest impulse, that counts as rounding.
+const AT_REST_IN_CONE: f64 = 1e-13;
+
 /// Most reversals of friction.
 const REVERSALS: f64 = 2.0;
 
@@ -164,6 +178,74 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         }
         let [relative, velocity] = self.residual().map(|square| square.get(lane).sqrt());
         Residual { relative, velocity }
+    }
+
+    /// The last `α` of a lane, 1/kg.
+    #[inline(always)]
+    pub(crate) fn alpha_of(&self, lane: usize) -> f64 {
+        self.alpha.get(lane)
+    }
+
+    /// Takes from the impulses of the lanes of a mask, whose contacts stick or are open, their part
+    /// in the null space of W, with the factors of the last step. Returns the lanes where that
+    /// leaves the velocities as they are and the impulses within their cones; the others keep
+    /// theirs.
+    ///
+    /// `α (W + α)⁻¹` leaves that part and shrinks all others by `α/(λ + α)`. It is applied until
+    /// another time changes so little that what is left of them moves nothing.
+    #[inline(always)]
+    pub(crate) fn remove_null_part<S: System<T, B>>(
+        &mut self,
+        system: &mut S,
+        lanes: T::Mask,
+    ) -> T::Mask {
+        let zero = self.mean.like(0.0);
+        let mut size = zero;
+        for i in system.places() {
+            self.trial[i] = self.p[i];
+            for p in &self.p[i] {
+                size = p.abs().max(size);
+            }
+        }
+        let share = zero.like(NULL_VELOCITY) * (self.mean / self.alpha);
+        let tolerated = share.min(zero.like(NULL_CHANGE)) * size;
+        let mut done = !lanes & lanes;
+        for _ in 0..MOST_NULL_STEPS {
+            for i in system.places() {
+                self.renewed[i] = self.trial[i];
+            }
+            system.solve(&self.modes, &mut self.trial);
+            let mut change = zero;
+            for i in system.places() {
+                for k in 0..3 {
+                    let (scaled, last) = (self.alpha * self.trial[i][k], self.renewed[i][k]);
+                    change = (scaled - last).abs().max(change);
+                    // A lane that is done waits for the others as it is.
+                    self.trial[i][k] = T::select(done, last, scaled);
+                }
+            }
+            done = done | (change.le(tolerated) & lanes);
+            if (lanes & !done).bits() == 0 {
+                break;
+            }
+        }
+        let nothing = zero.like(-AT_REST_IN_CONE) * size;
+        for i in system.places() {
+            let (p, mu) = (&self.p[i], self.laws[i].mu);
+            let null = &self.trial[i];
+            let own = [p[0] - null[0], p[1] - null[1], p[2] - null[2]];
+            let norm = (own[1] * own[1] + own[2] * own[2]).sqrt();
+            done = done & nothing.le(own[0]) & (nothing.le(mu * own[0] - norm));
+            self.renewed[i] = own;
+        }
+        select::<T, B>(system.places(), done, &self.renewed, &mut self.p);
+        done
+    }
+
+    /// Whether a lane's contact touches, and whether it sticks.
+    #[inline(always)]
+    pub(crate) fn mode_of(&self, place: usize, lane: usize) -> (bool, bool) {
+        (self.closed[place].get(lane), self.sticks[place].get(lane))
     }
 
     /// Where squares of the residual are within tolerances.

@@ -4,7 +4,7 @@ use super::contact::{CompositeContact, GrainTouch};
 use super::parts::CompositeScratch;
 use super::touches;
 use crate::contact::{Activation, Contact, generalized_impulse};
-use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
+use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact, Work};
 use crate::multibody::Configuration;
 use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
@@ -291,13 +291,14 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         options: &StepOptions,
         start: Start<'_, Both>,
         v_end: &[f64],
-        out: &mut [f64],
+        out: &mut [Work],
     ) {
         let (_, start) = self.starts(start);
         let (_, v_end) = self.halves(v_end);
-        let mut of_clusters = vec![0.0; self.tree.n_clusters()];
+        let mut of_clusters = vec![Work::default(); self.tree.n_clusters()];
         self.tree.work(options, start, v_end, &mut of_clusters);
-        out.fill(of_clusters.iter().sum());
+        let whole = of_clusters.into_iter().reduce(|a, b| a + b);
+        out.fill(whole.unwrap_or_default());
     }
 
     fn accept(&mut self) {

@@ -5,12 +5,22 @@ use super::held_tree::TangentScene;
 use super::scratch::{Correction, Tangent};
 use super::varying_sand::VaryingSand;
 use crate::contact::clusters_of;
+use crate::integrator::UnilateralContact;
+use crate::integrator::carried_velocity::{Carried, Moving};
 use crate::integrator::held_step::SAME;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
+use crate::integrator::work::Work;
 use crate::multibody::Configuration;
 use crate::multibody::bias::bias;
 use crate::multibody::energy::energies;
 use crate::scalar::{Dual, Lane, Vec3};
+
+/// Positions at the end of a step: before and after the projection.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    End,
+    Reached,
+}
 
 /// Relative difference of velocities that is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -397,21 +407,92 @@ impl<T: Lane> Tangent<T> {
         if self.corrections.iter().any(|own| *own != Correction::None) {
             self.correct(scene);
         }
+        if scene.held.step.projection.is_none() {
+            self.reached.clone_from(&self.end);
+            return;
+        }
+        let before = self.moving(scene, Place::End);
         T::vectorize(
             token,
             #[inline(always)]
             || {
-                if scene.held.step.projection.is_some() {
-                    let mechanism = scene.model.mechanism();
-                    (self.reached).set_moved(mechanism, &self.end, &self.displacement, 1.0);
-                } else {
-                    self.reached.clone_from(&self.end);
-                }
+                let mechanism = scene.model.mechanism();
+                (self.reached).set_moved(mechanism, &self.end, &self.displacement, 1.0);
             },
         );
-        if scene.held.step.projection.is_some() {
-            self.close_end(scene, true);
-            self.reached.normalise();
+        self.close_end(scene, true);
+        self.reached.normalise();
+        self.carry_velocity(scene, &before);
+    }
+
+    /// Kinetic energy and momentum of each group with the velocity at the end, before or after the
+    /// projection.
+    fn moving(&mut self, scene: &TangentScene<'_>, place: Place) -> Vec<Moving<Dual<T>>> {
+        let q = match place {
+            Place::End => &self.end,
+            Place::Reached => &self.reached,
+        };
+        let (mechanism, scratch) = (scene.model.mechanism(), &mut self.energy_scratch);
+        let gravity = Vec3::splat(self.token, scene.options.gravity.into());
+        let found = energies(mechanism, &self.inertias, q, &self.v_end, gravity, scratch);
+        let zero = Dual::splat(self.token, 0.0);
+        let none = Moving {
+            kinetic: zero,
+            momentum: Vec3::new(zero, zero, zero),
+        };
+        let mut all = vec![none; found.len()];
+        for (own, group) in found.iter().zip(&self.group_of) {
+            all[*group].kinetic += own.energy.kinetic;
+            all[*group].momentum += own.momentum;
+        }
+        for (cluster, group) in self.group_of.iter().enumerate() {
+            if mechanism.is_held(cluster) {
+                all[*group].momentum = none.momentum;
+            }
+        }
+        all
+    }
+
+    /// The velocities of the groups that were moved at their projected positions, see
+    /// [`crate::integrator::carried_velocity`]. `before`: at those before it.
+    fn carry_velocity(&mut self, scene: &TangentScene<'_>, before: &[Moving<Dual<T>>]) {
+        let step = &scene.held.step;
+        let Some(projection) = &step.projection else {
+            return;
+        };
+        let after = self.moving(scene, Place::Reached);
+        let mechanism = scene.model.mechanism();
+        for (group, (before, after)) in before.iter().zip(after).enumerate() {
+            let of_contact = |key| self.group_of[clusters_of(scene.model, key)[0]];
+            let contacts = step.contacts.iter().zip(&projection.moved);
+            let mut own = contacts.filter(|(contact, _)| of_contact(&contact.key) == group);
+            if !own.clone().any(|(_, is_moved)| *is_moved) {
+                continue;
+            }
+            let is_alone = own.all(|(contact, _)| contact.is_internal());
+            let lanes = if is_alone {
+                u32::MAX >> (32 - T::LANES)
+            } else {
+                0
+            };
+            let is_alone = T::mask(self.token, lanes);
+            let clusters = (0..self.group_of.len()).filter(|own| self.group_of[*own] == group);
+            let masses = clusters.map(|own| self.inertias.mass_of(mechanism, own));
+            let mass = masses.reduce(|a, b| a + b).unwrap_or(self.inertias.mass);
+            let carried = Carried::new(*before, after, mass, is_alone);
+            let Vec3 { x, y, z } = carried.common;
+            let trees = mechanism.trees.iter();
+            for tree in trees.filter(|tree| self.group_of[tree.cluster] == group) {
+                let own = &mut self.v_end[tree.velocities.clone()];
+                for v in &mut *own {
+                    *v *= carried.share;
+                }
+                if tree.is_free {
+                    for (v, common) in own.iter_mut().zip([x, y, z]) {
+                        *v += common;
+                    }
+                }
+            }
         }
     }
 
@@ -427,8 +508,9 @@ impl<T: Lane> Tangent<T> {
         let (h, theta) = step;
         let (zero, one) = (h.like(0.0), h.like(1.0));
         let (places, velocities) = (&self.start.joints, [&self.v[..], &self.v_end]);
-        let mut works = vec![zero; mechanism.n_clusters()];
-        (self.drives).work(mechanism, step, places, velocities, &mut works);
+        let mut of_drives = vec![Work::none(zero); mechanism.n_clusters()];
+        (self.drives).work(mechanism, step, places, velocities, &mut of_drives);
+        let mut works: Vec<Dual<T>> = of_drives.iter().map(Work::total).collect();
         let speeds = self.v.iter().zip(&self.v_end).enumerate();
         for (force, (k, (v, end))) in self.applied.iter().zip(speeds) {
             works[mechanism.cluster_of_velocity(k)] +=

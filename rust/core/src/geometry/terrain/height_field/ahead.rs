@@ -308,7 +308,7 @@ mod tests {
                     }
                     Primitive::Vertex(vertex) => {
                         let near = dispatch::point_at_vertex(&shape, vertex, &base);
-                        touches = is_shallow(near.gap) && vertex.admits(&near.n);
+                        touches = is_shallow(near.gap) && dispatch::pushes(vertex, &shape, &near.n);
                     }
                     Primitive::Plane(_) | Primitive::Sphere(_) => {}
                 }

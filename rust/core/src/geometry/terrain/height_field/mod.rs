@@ -338,6 +338,12 @@ impl HeightField {
         }
     }
 
+    /// Visits the borders of a cell's faces.
+    fn visit_rims_of(&self, [i, j]: [usize; 2], visit: &mut dyn FnMut(&super::Rim)) {
+        let first = number(j * self.columns + i);
+        self.patch([i, j]).visit_borders(first, visit);
+    }
+
     /// The cell under a place, and u and v within it; None off the map.
     #[inline]
     fn cell_at(&self, x: f64, z: f64) -> Option<([usize; 2], [f64; 2])> {

@@ -61,6 +61,10 @@ impl HeightField {
         let Some([columns, rows]) = self.cells_within(&part.centre, ends) else {
             return;
         };
+        let floor = part.centre.y - around(&Vector3::y());
+        if self.tiles.highest_of(columns, rows) < floor {
+            return;
+        }
         T::vectorize(
             token,
             #[inline(always)]
@@ -225,7 +229,7 @@ mod tests {
             }
             Primitive::Vertex(vertex) => {
                 let near = dispatch::point_at_vertex(shape, vertex, base);
-                if near.gap <= reach && vertex.admits(&near.n) {
+                if near.gap <= reach && dispatch::pushes(vertex, shape, &near.n) {
                     gap = near.gap;
                 }
             }

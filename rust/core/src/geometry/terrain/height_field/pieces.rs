@@ -3,9 +3,12 @@
 use nalgebra::Vector3;
 
 use super::{Half, HeightField, Place};
-use crate::geometry::terrain::Primitive;
 use crate::geometry::terrain::plane::Plane;
 use crate::geometry::terrain::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
+use crate::geometry::terrain::{Primitive, Rim};
+
+/// Number of the vertex among a corner's pieces.
+const VERTEX: u32 = 5;
 
 /// Neighbours of a vertex: columns and rows.
 const SPOKES: [Place; 6] = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
@@ -85,13 +88,17 @@ impl Patch<'_> {
 
     /// Start and end of an edge, world, m.
     #[inline]
-    fn ends(&self, [u, v]: Place, k: u32) -> [Vector3<f64>; 2] {
-        let end = match k {
+    fn ends(&self, place: Place, k: u32) -> [Vector3<f64>; 2] {
+        [self.point(place), self.point(Self::end_of(place, k))]
+    }
+
+    #[inline]
+    fn end_of([u, v]: Place, k: u32) -> Place {
+        match k {
             2 => [u + 1, v],
             3 => [u, v + 1],
             _ => [u + 1, v + 1],
-        };
-        [self.point([u, v]), self.point(end)]
+        }
     }
 
     /// The wall of a face with the unit normal n at an edge of which it is the first face (0) or
@@ -110,17 +117,73 @@ impl Patch<'_> {
         Hinge::new(&start, &end, normals).walls[number]
     }
 
+    /// Visits the borders of the cell's faces.
+    pub(super) fn visit_borders(&self, first: u32, visit: &mut dyn FnMut(&Rim)) {
+        let number = |[u, v]: Place| {
+            let [i, j] = self.corner;
+            let corner = usize::try_from((j + v) * super::narrow(self.field.columns) + i + u);
+            super::number(corner.unwrap_or(0)) + VERTEX
+        };
+        for (k, half) in [Half::Low, Half::High].into_iter().enumerate() {
+            let Some(normal) = self.normal(([0, 0], half)) else {
+                continue;
+            };
+            for (wall, (place, edge, side)) in Self::edges_of(half).into_iter().enumerate() {
+                if self.normal(Self::faces_at(place, edge)[1 - side]).is_some() {
+                    continue;
+                }
+                let mut ends = [place, Self::end_of(place, edge)];
+                if side == 1 {
+                    ends.reverse();
+                }
+                let [start, end] = ends.map(|place| self.point(place));
+                visit(&Rim {
+                    face: first + u32::from(k == 1),
+                    wall,
+                    piece: None,
+                    corners: ends.map(number),
+                    start,
+                    end,
+                    normal,
+                    beyond: None,
+                });
+            }
+        }
+    }
+
+    /// The corner with all its neighbours of known height.
+    pub(super) fn neighbours(&self) -> Vertex {
+        let place = self.point([0, 0]);
+        let mut vertex = Vertex {
+            place,
+            spokes: [Vector3::zeros(); MAX_SPOKES],
+            n: 0,
+        };
+        for spoke in SPOKES.map(|other| self.point(other) - place) {
+            if !spoke.y.is_nan() {
+                vertex.spokes[vertex.n] = spoke;
+                vertex.n += 1;
+            }
+        }
+        vertex
+    }
+
+    /// Edges of a face in the order of its walls: whose they are, their number, and whether the face
+    /// is the first or the second at it.
+    fn edges_of(half: Half) -> [(Place, u32, usize); 3] {
+        match half {
+            Half::Low => [([0, 0], 2, 1), ([1, 0], 3, 1), ([0, 0], 4, 0)],
+            Half::High => [([0, 1], 2, 0), ([0, 0], 3, 0), ([0, 0], 4, 1)],
+        }
+    }
+
     /// A face of the cell.
     #[inline]
     pub(super) fn face(&self, half: Half) -> Option<Face> {
         let n = self.normal(([0, 0], half))?;
-        let edges = match half {
-            Half::Low => [([0, 0], 2, 1), ([1, 0], 3, 1), ([0, 0], 4, 0)],
-            Half::High => [([0, 1], 2, 0), ([0, 0], 3, 0), ([0, 0], 4, 1)],
-        };
         Some(Face {
             plane: Plane::through(&self.point([0, 0]), n),
-            walls: edges.map(|(place, k, number)| self.wall(&n, (place, k), number)),
+            walls: Self::edges_of(half).map(|(place, k, number)| self.wall(&n, (place, k), number)),
         })
     }
 

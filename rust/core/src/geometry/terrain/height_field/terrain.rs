@@ -5,7 +5,10 @@ use nalgebra::Vector3;
 use super::{Half, HeightField, PIECES, index, narrow, number};
 use crate::geometry::ray::{self, Hit, Ray};
 use crate::geometry::shape::{Disc, Sphere};
-use crate::geometry::terrain::{Coverage, GROUND, Neighbourhood, Plane, Primitive, Terrain};
+use crate::geometry::terrain::surface::Vertex;
+use crate::geometry::terrain::{
+    Area, Coverage, GROUND, Neighbourhood, Plane, Primitive, Rim, Terrain,
+};
 
 impl Terrain for HeightField {
     fn visit_spheres(&self, _: &Vector3<f64>, _: f64, _: &mut dyn FnMut(u32, &Sphere)) {}
@@ -107,28 +110,52 @@ impl Terrain for HeightField {
             }
             range[axis] = [index(low.floor()), index(high.floor().min(last - 1.0))];
         }
-        if !self.tiles.has_hole() {
-            return Coverage::Known;
+        self.coverage_of_cells(range)
+    }
+
+    fn covers(&self, area: &Area, _: &dyn Fn(u32) -> bool) -> Coverage {
+        let mut range = [[0; 2]; 2];
+        for (axis, n) in [self.columns, self.rows].into_iter().enumerate() {
+            let along = |x: f64| (x - self.origin[axis]) / self.spacing[axis];
+            let [low, high] = area.0[axis].map(along);
+            let last = (n - 1) as f64;
+            if !(low >= -BORDER && high <= last + BORDER) {
+                return Coverage::Unknown(area.middle());
+            }
+            let first = (low + BORDER).floor().clamp(0.0, last - 1.0);
+            let end = ((high - BORDER).ceil() - 1.0).clamp(first, last - 1.0);
+            range[axis] = [index(first), index(end)];
         }
-        let mut hole = None;
-        self.tiles.visit(
-            range[0],
-            range[1],
-            |tile| tile.has_hole,
-            |[i, j]| {
-                for corner in [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]] {
-                    let place = corner.map(narrow);
-                    if self.corner(place).is_nan() {
-                        let [i, j] = corner.map(|k| k as f64);
-                        hole = Some([
-                            self.origin[0] + i * self.spacing[0],
-                            self.origin[1] + j * self.spacing[1],
-                        ]);
-                    }
-                }
-            },
-        );
-        hole.map_or(Coverage::Known, Coverage::Unknown)
+        self.coverage_of_cells(range)
+    }
+
+    fn known_within(&self) -> Option<Area> {
+        let along = |axis: usize, n: usize| {
+            let size = (n - 1) as f64 * self.spacing[axis];
+            [self.origin[axis], self.origin[axis] + size]
+        };
+        Some(Area([along(0, self.columns), along(1, self.rows)]))
+    }
+
+    fn may_end_near(&self, place: &Vector3<f64>, radius: f64) -> bool {
+        self.coverage(place, radius + self.spacing[0].max(self.spacing[1])) != Coverage::Known
+    }
+
+    fn visit_rims(&self, visit: &mut dyn FnMut(&Rim)) {
+        let last = [self.columns - 2, self.rows - 2];
+        for j in 0..=last[1] {
+            let is_outer = j == 0 || j == last[1] || self.tiles.has_hole();
+            let columns = if is_outer { 1 } else { last[0].max(1) };
+            for i in (0..=last[0]).step_by(columns) {
+                self.visit_rims_of([i, j], visit);
+            }
+        }
+    }
+
+    fn rim_corner(&self, id: u32) -> Vertex {
+        let corner = (id / PIECES) as usize;
+        let patch = self.patch([corner % self.columns, corner / self.columns]);
+        patch.neighbours()
     }
 
     fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
@@ -153,6 +180,37 @@ impl Terrain for HeightField {
         None
     }
 }
+
+impl HeightField {
+    /// Whether all corners of ranges of columns and rows of cells (first and last) are known.
+    fn coverage_of_cells(&self, range: [[usize; 2]; 2]) -> Coverage {
+        if !self.tiles.has_hole() {
+            return Coverage::Known;
+        }
+        let mut hole = None;
+        self.tiles.visit(
+            range[0],
+            range[1],
+            |tile| tile.has_hole,
+            |[i, j]| {
+                for corner in [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]] {
+                    let place = corner.map(narrow);
+                    if self.height_at(place).is_nan() {
+                        let [i, j] = corner.map(|k| k as f64);
+                        hole = Some([
+                            self.origin[0] + i * self.spacing[0],
+                            self.origin[1] + j * self.spacing[1],
+                        ]);
+                    }
+                }
+            },
+        );
+        hole.map_or(Coverage::Known, Coverage::Unknown)
+    }
+}
+
+/// How far a rectangle may reach over the border of the map, in cells.
+const BORDER: f64 = 1e-6;
 
 /// How far above the surface a point that is in the ground may seem to be by rounding, m.
 const SURFACE: f64 = 1e-9;

@@ -90,6 +90,9 @@ impl HeightField {
             floor: part.centre.y - around(&Vector3::y()),
             radius,
         };
+        if self.tiles.highest_of(columns, rows) < region.floor {
+            return;
+        }
         let mut found = Found {
             n: 0,
             cells: [([0; 2], 0); MOST_CELLS],

@@ -10,6 +10,7 @@ use super::neighbourhood::ROUNDING;
 use super::planes::{AT_EDGE, HIGH, Heights, LOW, upright};
 use crate::geometry::shape::Disc;
 use crate::geometry::terrain::Neighbourhood;
+use crate::geometry::terrain::surface::BEYOND;
 use crate::scalar::{Lane, Vec3};
 
 /// Square of the length of a normal with a vertical component of 1 up to which a lowest point is
@@ -119,7 +120,7 @@ impl Wheel<'_> {
                 near[half] = near[half] | self.is_over(&planes, &circle, half, spacing);
             }
             for k in 0..3 {
-                let touches = Self::may_touch_between(&planes, &circle, k, edges[k]);
+                let touches = self.may_touch_between(&planes, &circle, k, edges[k]);
                 near[2 + k] = near[2 + k] | (convex[k] & touches);
             }
         }
@@ -231,9 +232,11 @@ impl Wheel<'_> {
     }
 
     /// Where a circle may touch the edge between two planes at a normal between theirs: its lowest
-    /// points over them lie off the faces, beyond the edge. `along`: the edge, m.
+    /// points over them lie off the faces, beyond the edge. A wheel that lies may have a chord of
+    /// its side there. `along`: the edge, m.
     #[inline(always)]
     fn may_touch_between<T: Lane>(
+        &self,
         planes: &Planes<T>,
         circle: &Circle<T>,
         k: usize,
@@ -244,12 +247,16 @@ impl Wheel<'_> {
         let one = planes.normals[first].cross(along).dot(circle.lows[first]);
         let two = planes.normals[second].cross(along).dot(circle.lows[second]);
         let may_be_sharp = unsharp.lt(planes.squares[first]) | unsharp.lt(planes.squares[second]);
-        let is_between = one.lt(rounding) & (-rounding).lt(two);
+        let mut is_between = one.lt(rounding) & (-rounding).lt(two);
+        if self.disc.axle.y.abs() > STANDS {
+            is_between = is_between | !is_between;
+        }
         !(circle.is_beyond[first] | circle.is_beyond[second]) & (is_between | may_be_sharp)
     }
 
     /// Where the tread between the circles may touch the edge between two planes: at a normal
-    /// between theirs that is perpendicular to the axle and to the edge. `along`: the edge, from
+    /// between theirs, or almost ([`bears`](crate::geometry::terrain::surface::Edge::bears)), that is perpendicular to the axle and to the
+    /// edge. `along`: the edge, from
     /// the corner from which the wheel's centre is `from`, m.
     #[inline(always)]
     fn may_cross<T: Lane>(
@@ -273,7 +280,10 @@ impl Wheel<'_> {
         let n = across * T::select(up.lt(number(0.0)), -size, size);
         let height = n.dot(from);
         let is_near = (height - number(self.disc.radius)).le(number(self.reach() + ROUNDING));
-        let tolerance = number(ROUNDING) * length.sqrt();
+        // Unit normals differ by less than these, and these are no longer than 1.5.
+        let bend = first - second;
+        let beyond = number(1.5 * BEYOND) * bend.dot(bend).sqrt();
+        let tolerance = (number(ROUNDING) + beyond) * length.sqrt();
         let is_between =
             first.cross(along).dot(n).lt(tolerance) & (-tolerance).lt(second.cross(along).dot(n));
         // from − n (n · from) + own s = place along
