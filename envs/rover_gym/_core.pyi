@@ -1131,11 +1131,12 @@ class StepReport:
         """Number of contacts whose impulses the motion of the last step does not determine.
 
         0 means that the motion determines the impulses of all contacts. Otherwise other impulses
-        cause the same motion, and the step returns those of least norm within the cones of friction:
-        four corners of a box share its weight like four equal springs. Friction counts: six rigid
-        wheels that drive straight could push sideways against each other, so the number is 6.
-        Contacts that yield, such as wheels with a `stiffness`, have determined impulses. Always 0 for
-        grains. In a group of more than 32 rigid contacts the solver chooses among the impulses.
+        cause the same motion, and the step returns those of least norm within the cones of
+        friction: four corners of a box share its weight like four equal springs. Friction counts:
+        six rigid wheels that drive straight could push sideways against each other, so the number
+        is 6. Contacts that yield, such as wheels with a `stiffness`, have determined impulses.
+        Always 0 for grains. In a group of more than 32 rigid contacts the solver chooses among the
+        impulses.
         """
     def followed_by(self, later: StepReport) -> StepReport:
         """Combines this report with that of the following steps.
