@@ -27,13 +27,13 @@ def test_a_rigid_rover_on_four_wheels_has_the_loads_of_a_lever():
 
 def test_steering_geometry_is_that_of_the_published_figures():
     mars = check_statics(RoverModel.named("mars-rover"))
-    assert (mars.wheelbase, mars.track) == (pytest.approx(2.2), pytest.approx(2.3))
+    assert (mars.wheelbase, mars.track) == (pytest.approx(2.2, abs=1e-4), pytest.approx(2.3, abs=1e-4))
     assert mars.turning_radius == 0.0
     skid = check_statics(RoverModel.named("skid-steered"))
     assert "skid" in skid.turning_centre
     # The built-in rover: 0.66 m from the middle line to an axle, 0.53 m to its side, 0.7 rad of steering.
     ours = check_statics(RoverModel())
-    assert ours.turning_radius == pytest.approx(0.53 + 0.66 / math.tan(0.7), rel=1e-6)
+    assert ours.turning_radius == pytest.approx(0.53 + 0.66 / math.tan(0.7), rel=1e-4)
 
 
 def test_unsteered_wheels_on_two_lines_have_no_turning_centre():
