@@ -114,8 +114,8 @@ pub fn points(
     }
 }
 
-/// Visits the crossings and ends of straight lines, the ends of chords and the crossings of circles.
-/// `sides`: the flat sides that lie along the direction n between the shapes.
+/// Visits the crossings and ends of straight lines, the ends of chords and the crossings of
+/// circles. `sides`: the flat sides that lie along the direction n between the shapes.
 fn visit_lines(
     first: &PlacedShape<'_>,
     second: &PlacedShape<'_>,
