@@ -11,7 +11,7 @@
 //!
 //! A disc that lies flat on an edge has it along a chord and touches it with both ends, along its
 //! axle. The normal that separates most belongs to the lower end; the higher one comes in as the
-//! disc tips over, as rim points do on a plane ([`chord_ends`]). A vertex is a ball of radius
+//! disc tips over, as rim points do on a plane (`chord_ends`). A vertex is a ball of radius
 //! zero: the rim never reaches into it, since it is the edges that lift a rim with a vertex above
 //! it, but a vertex may be beyond the face of the disc.
 //!
