@@ -106,7 +106,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         body.set_item("__doc__", doc)?;
         body.set_item("field", py.None())?;
         body.set_item("value", py.None())?;
-        body.set_item("__slots__", PyTuple::empty(py))?; // instances are Python's own, as bases must be
+        // Instances are Python's own, as bases must be.
+        body.set_item("__slots__", PyTuple::empty(py))?;
         let class = py
             .get_type::<PyType>()
             .call1((name, bases, body))?
