@@ -2,8 +2,8 @@ r"""Energy audit of a rover's steps, from what the public interface shows: it be
 
     gained = T + V + S (after) - T + V + S (before) - sum_j tau_j dphi_j
 
-T and V are kinetic and potential energy, S = sum k (phi - set-point)^2 / 2 is stored by the held steering joints,
-tau_j the commanded torque about joint j and dphi_j the angle turned. A motor whose torque falls with its speed does
+T and V are kinetic and potential energy, S = sum k (phi - set-point)^2 / 2 is stored by the held steering joints, before
+the step at its own set-points. The energy of a simulation contains all three. tau_j the commanded torque about joint j and dphi_j the angle turned. A motor whose torque falls with its speed does
 less work than the commanded torque would, so the difference bounds what the step gained from nowhere. Dampers only take
 energy away.
 
@@ -83,7 +83,7 @@ class Audit:
         """Before steps that somebody else takes, after the commands are given."""
         sim = self.sim
         self._start, self._q, self._v, self._before = sim.snapshot(), sim.q, sim.v, sim.energy()
-        self._time = sim.time
+        self._time, self._held = sim.time, self._stored(self._q)
 
     def end(self, steps: int, status: str, what: str = "") -> bool:
         """After them: enters what they came to.
@@ -107,7 +107,7 @@ class Audit:
             return False
         stored, work = self._stored(q), self._work(after - q)
         at_hand = self._before.kinetic + self._weight + abs(work) + stored
-        gained = self._energy(sim) - self._before.total - stored - work
+        gained = sim.energy().total - (self._before.total - self._held) - stored - work
         gained -= self._swing()
         if gained > GAIN * at_hand or self._yields:
             extra = self._lifted_and_released(steps)
@@ -151,9 +151,6 @@ class Audit:
         )
         self.ledger.note(kind, f"step {self.ledger.steps}: {what}; {rates}")
 
-    def _energy(self, sim: Simulation) -> float:
-        return sim.energy().total + self._stored(sim.q)
-
     def _stored(self, q: Array) -> float:
         off = q[self._steering] - self.sim.steering[self._steered]
         return 0.5 * float(self._stiffness @ (off * off))
@@ -183,8 +180,8 @@ class Audit:
             except StepError:
                 return None
             # Each by its own motors' work: the projection turns joints too.
-            own = self._energy(again) - self._work(again.q - q)
-            without_projection = self._energy(twin) - self._work(twin.q - q) - without.energy_released
+            own = again.energy().total - self._work(again.q - q)
+            without_projection = twin.energy().total - self._work(twin.q - q) - without.energy_released
             lifted += max(own - report.energy_released - without_projection, 0.0)
             released += report.energy_released
         return lifted, released
