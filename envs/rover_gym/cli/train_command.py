@@ -75,6 +75,9 @@ def train(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes that drive the rovers. Default: one per core.")
     ] = None,
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Ray cluster that labels and evaluates: 'auto' or HOST:PORT.")
+    ] = None,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -110,6 +113,7 @@ def train(
                 settings,
                 folder,
                 seed=seed,
+                cluster=ray,
                 workers=workers or len(os.sched_getaffinity(0)),
                 resume=resume and (len(folders) == 1 or (folder / "state.json").exists()),
                 begin=network,
