@@ -8,10 +8,8 @@ from pathlib import Path
 import cloudpickle
 import gymnasium as gym
 import pytest
+from commands import error_of
 from scripts_run import note
-
-from rover_gym import OptionError
-from rover_gym.extras import MissingExtraError
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "training" / "examples" / "rllib.py"
@@ -36,13 +34,14 @@ def test_a_worker_of_ray_that_has_not_imported_the_package_finds_the_environment
     assert done.stdout == "2 RoverCommand-v0\n", done.stderr
 
 
-@pytest.mark.skipif("ray" in sys.modules, reason="Ray is here")
-def test_without_ray_the_error_names_the_extra() -> None:
-    pytest.importorskip("yaml", reason="the extra train is not installed")
-    from rover_gym.learning.cluster import connect  # noqa: PLC0415 - needs the extra
-
-    with pytest.raises((MissingExtraError, OptionError), match=r"rover-gym\[rllib\]|is not the address"):
-        connect("127.0.0.1:1")
+@pytest.mark.parametrize("command", ["evaluate", "train"])
+def test_without_ray_the_error_names_the_extra(command: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
+    monkeypatch.setitem(sys.modules, "ray", None)
+    monkeypatch.chdir(tmp_path)
+    error = error_of(command, "--ray", "auto")
+    assert error == "error: ray is not installed: pip install 'rover-gym[rllib]'\n"
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.nightly(

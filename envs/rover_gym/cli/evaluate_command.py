@@ -95,11 +95,12 @@ def evaluate(
         scenes = [(level, {**arguments, "difficulty": level}) for level in levels]
     for package in ("imageio_ffmpeg", "vtkmodules") if films else ():
         require(package, "render")
+    drive = _driver(ray, threads)
     contenders = _contenders(policies or ["pd"], model)
     check_folder("output", output)
     output.mkdir(parents=True, exist_ok=True)
     seeds = range(seed, seed + episodes)
-    evaluation = _Evaluation(contenders, seeds, output, _driver(ray, threads))
+    evaluation = _Evaluation(contenders, seeds, output, drive)
     with Results(as_json=as_json) as results:
         interrupted = False
         try:

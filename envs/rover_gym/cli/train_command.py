@@ -93,6 +93,8 @@ def train(
     """
     for package in ("yaml", "stable_baselines3"):
         require(package, "train")
+    if ray is not None:
+        require("ray", "rllib")
     from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
     from rover_gym.learning.arc_recipe import train_arcs  # noqa: PLC0415
     from rover_gym.learning.configuration import find_configuration  # noqa: PLC0415
