@@ -178,7 +178,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     os.chdir(folder)
     os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(16)
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     try:
         node = cluster.add_node(num_cpus=1)
         os.environ["RAY_ADDRESS"] = cluster.address  # what "auto" then means

@@ -20,7 +20,15 @@ from rover_gym.cli.console import (
     plain_table,
     progress_bar,
 )
-from rover_gym.cli.options import BUILT_IN, ModelName, complete_policy, complete_terrain, named_model, warn_of_slope
+from rover_gym.cli.options import (
+    BUILT_IN,
+    ModelName,
+    RayAddress,
+    complete_policy,
+    complete_terrain,
+    named_model,
+    warn_of_slope,
+)
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
@@ -68,9 +76,7 @@ def evaluate(
     ),
     films: Annotated[int, typer.Option(min=0, help="Number of fields that are also filmed (extra render).")] = 0,
     threads: Annotated[int, typer.Option(min=1, help="Threads that step the rovers.")] = 1,
-    ray: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Ray cluster whose cores drive: 'auto' or HOST:PORT.")
-    ] = None,
+    ray: RayAddress = None,
     as_json: AsJson = False,
 ) -> None:
     """Drive policies over the same fields and compare success, time, energy and slip.

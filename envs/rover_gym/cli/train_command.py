@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperCommand
 
 from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, plain_table
+from rover_gym.cli.options import RayAddress
 from rover_gym.extras import require
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
@@ -75,9 +76,7 @@ def train(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes that drive the rovers. Default: one per core.")
     ] = None,
-    ray: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Ray cluster that labels and evaluates: 'auto' or HOST:PORT.")
-    ] = None,
+    ray: RayAddress = None,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
     as_json: AsJson = False,
 ) -> None:

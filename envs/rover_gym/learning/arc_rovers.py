@@ -62,9 +62,7 @@ class Group:
         self.returns[:], self.lengths[:] = 0.0, 0
         return self.seen
 
-    def label(
-        self, decisions: int, network: ArcNetwork | None, labelled: float, stray: float
-    ) -> LabelledGroup:
+    def label(self, decisions: int, network: ArcNetwork | None, labelled: float, stray: float) -> LabelledGroup:
         """Drives and labels decisions.
 
         Args:
