@@ -7,6 +7,7 @@
 Needs the extra `rllib`, which pins its own Gymnasium: use a separate virtual environment (`make train-rllib`).
 """
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,15 @@ def configuration(workers: int, envs: int, batch: int, environment: dict[str, An
     return config.learners(num_learners=0).training(train_batch_size_per_learner=batch, **rates)
 
 
+def keep(algorithm: Any, checkpoint: Path) -> None:
+    """Replaces the checkpoint by one of now, which is whole before the former is removed."""
+    new = checkpoint.with_name("checkpoint.new")
+    shutil.rmtree(new, ignore_errors=True)
+    algorithm.save_to_path(new)
+    shutil.rmtree(checkpoint, ignore_errors=True)
+    new.rename(checkpoint)
+
+
 def train(
     workers: int = 2,
     envs: int = 8,
@@ -63,7 +73,7 @@ def train(
         found, seconds = result[ENV_RUNNER_RESULTS], float(result["timers"]["env_runner_sampling_timer"])
         rate = found["num_env_steps_sampled"] / seconds
         alive = algorithm.env_runner_group.num_healthy_remote_workers()
-        algorithm.save_to_path(checkpoint)
+        keep(algorithm, checkpoint)
         typer.echo(
             f"iteration {algorithm.iteration}: return {found.get(EPISODE_RETURN_MEAN)}, {rate:.0f} decisions/s"
             f" while sampling, {alive} workers"
