@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -47,10 +47,15 @@ test: ## set up, and run the checks and tests that a change must pass (what .ci/
 	@$(SIDE_BY_SIDE) lint deny docs
 	@$(MAKE) --no-print-directory test-python
 
-test-all: ## every test there is, as long as it takes: before a release, and before an issue is closed
-	$(MAKE) --no-print-directory test TIER=all
-	$(MAKE) --no-print-directory torture TORTURE="--rounds 1 --no-table"
-	$(MAKE) --no-print-directory same-bits
+# One part goes on after another has failed; the last lines tell how each ended.
+PARTS = lint types deny docs test-rust test-python torture same-bits train-rllib
+
+test-all: ## every test there is, as long as it takes, and a table of its parts: before a release, and before an issue is closed
+	@failed=0; table=; for part in $(PARTS); do \
+	  begin=$$SECONDS; ended=passed; \
+	  $(MAKE) --no-print-directory $$part TIER=all TORTURE="--rounds 1 --no-table" || { ended=failed; failed=1; }; \
+	  table+=$$(printf '%-12s %s %6d s' $$part $$ended $$((SECONDS - begin)))$$'\n'; \
+	done; printf '\n%s' "$$table"; exit $$failed
 
 check: lint types deny ## lint, types, licences and sources, Rust and Python: what the commit hooks call
 
@@ -84,7 +89,7 @@ SAME_DRAWS = $(if $(filter all,$(TIER)),,--hypothesis-seed=1)
 test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of arithmetic)
 	$(if $(filter all,$(TIER)),CARGO_PROFILE_DEV_DEBUG_ASSERTIONS=true CARGO_PROFILE_DEV_OVERFLOW_CHECKS=true) $(SAME_CASES) $(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
 
-test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only, and the longest ten
+test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test $(if $(filter all,$(TIER)),ray) ## the Python tests only, and the longest ten
 	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10 $(SAME_DRAWS)
 
 same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
@@ -127,9 +132,11 @@ train: $(STAMPS)/test $(STAMPS)/release ## train a network for the rocks (minute
 	$(BIN)/rover train rocks
 	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 pd scan --difficulty 1
 
-train-rllib: ## train Rover-v0 on a local Ray with 2 workers; Ray wants a virtual environment of its own
-	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
+train-rllib: $(STAMPS)/release ray ## train Rover-v0 on a local Ray with 2 workers (two minutes), under runs/
 	$(VENV)-rllib/bin/python training/examples/rllib.py --workers 2 --iterations 4
+
+ray: ## make the virtual environment of Ray, which pins other versions: .venv-rllib
+	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
 
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
@@ -186,7 +193,7 @@ clean: ## remove everything that make made, but for runs/
 
 # One list for every Python from 3.11 on, versions only.
 pin = $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate \
-	--custom-compile-command "make pins" --output-file requirements/$(1).txt pyproject.toml
+	--custom-compile-command "make pins" --excludes requirements/without/processor.txt --output-file requirements/$(1).txt pyproject.toml
 
 # pip fetches uv, and uv, which is several times faster, the rest.
 $(STAMPS)/venv: requirements/demo.txt
@@ -195,26 +202,34 @@ $(STAMPS)/venv: requirements/demo.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "$$(grep '^uv==' $<)"
 	@mkdir -p $(@D) && touch $@
 
-# Debian packages: installed where that is allowed, otherwise named.
+# Debian packages: installed where that is allowed, otherwise named; tried once.
 $(STAMPS)/debian-%: requirements/debian/%.txt | $(STAMPS)/venv
-	@if command -v dpkg-query > /dev/null; then \
-	  missing=$$(for name in $$(cat $<); do dpkg-query -W -f '$${Status}' $$name 2> /dev/null | grep -q 'ok installed' || echo $$name; done); \
-	  if [ -n "$$missing" ] && [ $$(id -u) = 0 ]; then \
-	    apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends $$missing > /dev/null; \
-	  elif [ -n "$$missing" ]; then echo "please install: sudo apt-get install" $$missing; fi; \
-	else echo "not Debian: rendering and the browser tests need what these Debian packages hold:" $$(cat $<); fi
+	@packaging/debian-packages $<
 	@touch $@
 
 $(STAMPS)/debian-test: | $(STAMPS)/debian-demo # one apt-get at a time
 
-$(STAMPS)/demo $(STAMPS)/test $(STAMPS)/cross: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
+$(STAMPS)/demo $(STAMPS)/cross: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
 	$(UV) --requirement $<
 	@touch $@
 
-# Ray pins its own Gymnasium, so these two go into an environment that has nothing else.
-$(STAMPS)/ray: requirements/rllib.txt pyproject.toml Cargo.lock $(shell find rust -type f) $(STAMPS)/venv
-	$(UV) --requirement $<
-	$(BIN)/python -m maturin develop --release --uv --quiet
+# PyTorch comes from its own index where that can be reached: the build for processors, or for the graphics card that is
+# there. Elsewhere it is the one of the list, which loads CUDA's libraries even without a card; a list has those of them
+# that it cannot do without.
+define with_torch
+	@if UV_HTTP_RETRIES=0 UV_HTTP_TIMEOUT=10 $(UV) --dry-run --no-deps --reinstall --torch-backend auto $$(grep '^torch==' $<) > /dev/null 2>&1; then \
+	  grep -v '^nvidia-\|^cuda-' $< > $@.txt && $(UV) --torch-backend auto --requirement $@.txt; \
+	else $(UV) --no-deps --requirement $<; fi
+endef
+
+$(STAMPS)/test: requirements/test.txt $(STAMPS)/venv
+	$(with_torch)
+	@touch $@
+
+# Ray pins its own Gymnasium, so it has an environment of its own, which finds the package in this folder.
+$(STAMPS)/ray: requirements/rllib.txt $(STAMPS)/venv
+	$(with_torch)
+	@echo $(CURDIR)/envs > $$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/rover_gym.pth
 	@touch $@
 
 # An engine that cannot be installed is left out of the comparison, which says so.

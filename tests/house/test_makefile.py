@@ -15,15 +15,70 @@ def phony_targets() -> set[str]:
     return set(line.split())
 
 
-def test_plain_make_lists_every_target_with_one_line() -> None:
-    # As from a shell: under `make test` the outer make's settings would speak in.
+def make(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs make as from a shell: under `make test` the outer make's settings would speak in."""
     environment = {
         name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")
     }
-    output = subprocess.run(["make"], cwd=ROOT, env=environment, check=True, capture_output=True, text=True).stdout  # noqa: S607
+    command = ["make", *arguments]
+    return subprocess.run(command, cwd=ROOT, env=environment, check=False, capture_output=True, text=True)
+
+
+def test_plain_make_lists_every_target_with_one_line() -> None:
+    output = make().stdout
     described = dict(re.findall(r"^make ([a-z-]+) +(\S.*)$", output, flags=re.MULTILINE))
     assert described.keys() == phony_targets()
     assert len(output.splitlines()) == len(described)
+
+
+def test_a_part_of_test_all_that_fails_does_not_stop_the_others() -> None:
+    """After one failure of the Python tests neither the campaign nor the bits had run."""
+    done = make("test-all", "PARTS=no-such-target help")
+    table = [line.split() for line in done.stdout.splitlines()[-2:]]
+    assert [row[:2] for row in table] == [["no-such-target", "failed"], ["help", "passed"]]
+    assert all(row[2].isdigit() for row in table)
+    assert done.returncode != 0
+    assert make("test-all", "PARTS=help help").returncode == 0
+
+
+def test_test_all_has_every_part_of_make_test() -> None:
+    (parts,) = re.findall(r"^PARTS = (.*)$", MAKEFILE, flags=re.MULTILINE)
+    (recipe,) = re.findall(r"^test: .*\n((?:\t.*\n)+)", MAKEFILE, flags=re.MULTILINE)
+    called = {word for line in recipe.splitlines() for word in line.split() if word in phony_targets()}
+    assert called | {"torture", "same-bits", "train-rllib"} == set(parts.split())
+    assert {"lint", "test-rust", "test-python"} <= called
+
+
+def apt_get(folder: Path, script: str) -> subprocess.CompletedProcess[str]:
+    """Installs a list of packages, as root, none of which is there, with an `apt-get` of our own."""
+    programs = {"apt-get": script, "dpkg-query": "exit 1", "id": "echo 0"}
+    for name, lines in programs.items():
+        program = folder / name
+        program.write_text(f"#!/bin/sh\n{lines}\n", encoding="utf-8")
+        program.chmod(0o755)
+    (folder / "list.txt").write_text("one\ntwo\n", encoding="utf-8")
+    environment = {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}", "LIMIT": "0.3", "PAUSE": "0"}
+    command = [ROOT / "packaging" / "debian-packages", folder / "list.txt"]
+    return subprocess.run(command, env=environment, check=False, capture_output=True, text=True, timeout=20)
+
+
+def test_a_mirror_that_does_not_answer_does_not_hang_make_test(tmp_path: Path) -> None:
+    """`apt-get` waited for its mirror without end, and `make test` with it."""
+    done = apt_get(tmp_path, "exec sleep 1000")
+    assert done.returncode == 0
+    assert done.stderr.count("longer than 0.3 s") == 3
+    assert done.stderr.splitlines()[-1].endswith("sudo apt-get install one two")
+
+
+def test_packages_are_installed_at_the_second_try(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    done = apt_get(tmp_path, f'echo "$@" >> {log}; [ "$(grep -c update {log})" = 2 ]')
+    calls = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
+    assert ["update" in call for call in calls] == [True, True, False, False]
+    assert [call[-2:] for call in calls[2:]] == [["one", "two"]] * 2
+    assert "--download-only" in calls[2]
+    assert "--no-download" in calls[3]
+    assert (done.returncode, done.stderr.count("try"), "NOT INSTALLED" in done.stderr) == (0, 1, False)
 
 
 def test_ci_calls_the_readmes_test_command_and_nothing_else() -> None:

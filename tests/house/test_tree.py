@@ -67,3 +67,16 @@ def test_pins_hold_versions_and_nothing_else() -> None:
         lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
         assert lines
         assert not [line for line in lines if not pin.fullmatch(line)], path.name
+
+
+def test_a_processor_gets_none_of_what_only_a_graphics_card_needs() -> None:
+    """The environment of `make test` held a gigabyte of a compiler for graphics cards."""
+    requirements = ROOT / "requirements"
+    text = (requirements / "without" / "processor.txt").read_text(encoding="utf-8")
+    left_out = {line for line in text.splitlines() if not line.startswith("#")}
+    assert "triton" in left_out
+    for name in ("test", "rllib"):
+        lines = (requirements / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+        pinned = {line.partition("==")[0] for line in lines}
+        assert "torch" in pinned
+        assert not pinned & left_out

@@ -185,4 +185,7 @@ rover("evaluate", "run", "pd", "--terrain", "plane", "--episodes", "2", "--outpu
 }
 
 #: Extras that serve the repository and not the wheel, with the target that runs them.
-OF_THE_REPOSITORY = {"test": "test", "docs": "docs", "peers": "chart", "rllib": "train-rllib"}
+OF_THE_REPOSITORY = {"test": "test", "docs": "docs", "peers": "chart"}
+
+#: The extra whose promise is the manual's page on clusters.
+CLUSTER = "rllib"

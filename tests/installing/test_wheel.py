@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from installing.promises import BEGIN, OF_THE_REPOSITORY, PROMISES
+from installing.promises import BEGIN, CLUSTER, OF_THE_REPOSITORY, PROMISES
 
 ROOT = Path(__file__).parents[2]
 LONGEST = 60.0  # s of CPU time from `pip install` to the end of the first episode, with what it fetches in pip's cache
@@ -67,7 +67,7 @@ def place(tmp_path: Path) -> Iterator[Path]:
 
 def test_every_extra_has_its_promise() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert PROMISES.keys() - {""} | OF_THE_REPOSITORY.keys() == project["optional-dependencies"].keys()
+    assert PROMISES.keys() - {""} | OF_THE_REPOSITORY.keys() | {CLUSTER} == project["optional-dependencies"].keys()
     assert not PROMISES.keys() & OF_THE_REPOSITORY.keys()
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for target in OF_THE_REPOSITORY.values():
@@ -128,3 +128,12 @@ def test_an_extra_keeps_its_promise_alone(extra: str, place: Path) -> None:
     python = python_of(place / "venv")
     uv("pip", "install", "--quiet", "--python", str(python), f"rover-gym[{extra}] @ {wheel().as_uri()}")
     run(python, "-c", BEGIN + PROMISES[extra], folder=place)
+
+
+@wheels
+@pytest.mark.timeout(2400)
+def test_an_extra_trains_and_evaluates_on_two_nodes_of_ray(place: Path) -> None:
+    uv("venv", "--quiet", "--python", sys.executable, str(place / "venv"))
+    python = python_of(place / "venv")
+    uv("pip", "install", "--quiet", "--python", str(python), f"rover-gym[{CLUSTER}] @ {wheel().as_uri()}")
+    run(python, str(ROOT / "tests" / "training" / "two_nodes.py"), str(place / "run"), folder=place)

@@ -1,7 +1,7 @@
 """`rover evaluate`: policies beside each other on the same seeded episodes."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,15 @@ from rover_gym.cli.console import (
     plain_table,
     progress_bar,
 )
-from rover_gym.cli.options import BUILT_IN, ModelName, complete_policy, complete_terrain, named_model, warn_of_slope
+from rover_gym.cli.options import (
+    BUILT_IN,
+    ModelName,
+    RayAddress,
+    complete_policy,
+    complete_terrain,
+    named_model,
+    warn_of_slope,
+)
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
@@ -35,7 +43,7 @@ from rover_gym.policy.comparison import (
     in_markdown,
     named_contender,
 )
-from rover_gym.policy.evaluation import PolicySummary, summarise
+from rover_gym.policy.evaluation import EvaluatedEpisode, PolicySummary, drive_all, summarise
 from rover_gym.policy.named_policy import NAMES, NAMES_HELP
 from rover_gym.validation import number, refuse
 
@@ -68,6 +76,7 @@ def evaluate(
     ),
     films: Annotated[int, typer.Option(min=0, help="Number of fields that are also filmed (extra render).")] = 0,
     threads: Annotated[int, typer.Option(min=1, help="Threads that step the rovers.")] = 1,
+    ray: RayAddress = None,
     as_json: AsJson = False,
 ) -> None:
     """Drive policies over the same fields and compare success, time, energy and slip.
@@ -92,11 +101,12 @@ def evaluate(
         scenes = [(level, {**arguments, "difficulty": level}) for level in levels]
     for package in ("imageio_ffmpeg", "vtkmodules") if films else ():
         require(package, "render")
+    drive = _driver(ray, threads)
     contenders = _contenders(policies or ["pd"], model)
     check_folder("output", output)
     output.mkdir(parents=True, exist_ok=True)
     seeds = range(seed, seed + episodes)
-    evaluation = _Evaluation(contenders, seeds, output, threads)
+    evaluation = _Evaluation(contenders, seeds, output, drive)
     with Results(as_json=as_json) as results:
         interrupted = False
         try:
@@ -128,13 +138,13 @@ class _Evaluation:
         contenders: Who drives, in the order of the table.
         seeds: Seeds of the episodes.
         output: Folder of the episodes' files.
-        threads: Threads that step the rovers.
+        drive_seeds: Drives one episode per seed, as `drive_all`.
     """
 
     contenders: Sequence[Contender]
     seeds: range
     output: Path
-    threads: int
+    drive_seeds: Callable[..., list[EvaluatedEpisode]]
 
     def __post_init__(self) -> None:
         self.drives: list[PolicySummary] = []
@@ -153,7 +163,7 @@ class _Evaluation:
                     self.seeds,
                     arguments=arguments,
                     files=files,
-                    threads=self.threads,
+                    drive=self.drive_seeds,
                     progress=partial(_show, bar, task, len(self.seeds)),
                 )
                 self.drives.append(summarise(contender.name, found, difficulty))
@@ -170,6 +180,17 @@ class _Evaluation:
                 path = self.output / "films" / f"{_stem(contender.name, difficulty)}-seed{seed}.mp4"
                 film_episode(path, contender.make, {**arguments, **contender.arguments}, seed)
                 yield path
+
+
+def _driver(ray: str | None, threads: int) -> Callable[..., list[EvaluatedEpisode]]:
+    """Drives episodes, as `drive_all`: on a cluster, or on this machine."""
+    if ray is None:
+        return partial(drive_all, threads=threads)
+    require("ray", "rllib")
+    from rover_gym.learning.cluster import connect, drive_on_cluster  # noqa: PLC0415 - needs the extra
+
+    connect(ray)
+    return partial(drive_on_cluster, ray)
 
 
 def _stem(name: str, difficulty: float | None) -> str:

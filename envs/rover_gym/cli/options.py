@@ -98,6 +98,9 @@ def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:
     ]
 
 
+RayAddress = Annotated[
+    str | None, typer.Option("--ray", metavar="ADDRESS", help="Ray cluster whose cores drive: 'auto' or HOST:PORT.")
+]
 ModelName = Annotated[
     str,
     typer.Option(

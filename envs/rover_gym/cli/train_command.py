@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperCommand
 
 from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, plain_table
+from rover_gym.cli.options import RayAddress
 from rover_gym.extras import require
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
@@ -75,6 +76,7 @@ def train(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes that drive the rovers. Default: one per core.")
     ] = None,
+    ray: RayAddress = None,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration as YAML and end.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -90,6 +92,8 @@ def train(
     """
     for package in ("yaml", "stable_baselines3"):
         require(package, "train")
+    if ray is not None:
+        require("ray", "rllib")
     from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
     from rover_gym.learning.arc_recipe import train_arcs  # noqa: PLC0415
     from rover_gym.learning.configuration import find_configuration  # noqa: PLC0415
@@ -110,6 +114,7 @@ def train(
                 settings,
                 folder,
                 seed=seed,
+                cluster=ray,
                 workers=workers or len(os.sched_getaffinity(0)),
                 resume=resume and (len(folders) == 1 or (folder / "state.json").exists()),
                 begin=network,

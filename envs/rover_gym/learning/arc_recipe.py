@@ -32,6 +32,7 @@ from rover_gym.learning.arc_learner import (
     network_of,
 )
 from rover_gym.learning.arc_rovers import Labels, Rovers
+from rover_gym.learning.cluster import ClusterRovers
 from rover_gym.learning.provenance import provenance
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.arc_network import ArcNetwork
@@ -50,6 +51,7 @@ class ArcTraining:
         folder: The run's folder.
         seed: Of network, exploration and fields.
         workers: Processes that drive.
+        cluster: Address of a Ray cluster that labels and evaluates; None for the workers.
         threads: Threads of PyTorch; None for its own choice.
         device: Of PyTorch: "auto", "cpu", "cuda".
         resume: Whether to go on.
@@ -68,6 +70,7 @@ class ArcTraining:
         *,
         seed: int = 1,
         workers: int = 1,
+        cluster: str | None = None,
         threads: int | None = None,
         device: str = "auto",
         resume: bool = False,
@@ -91,7 +94,7 @@ class ArcTraining:
         if threads is not None:
             torch.set_num_threads(threads)
         self.device = chosen_device(device)
-        self.rovers = Rovers(config, workers)
+        self.rovers = Rovers(config, workers) if cluster is None else ClusterRovers(config, workers, cluster)
         self._begun, self._before = time.process_time(), self.state["cpu_seconds"]
 
     def run(self) -> Path:

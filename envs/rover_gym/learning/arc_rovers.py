@@ -28,6 +28,8 @@ from rover_gym.policy.scan_policy import ScanPolicy
 STEPS = 127.0 / LARGEST
 
 Labels = dict[str, npt.NDArray[Any]]
+#: Labels of a group, and how many of its episodes ended, how many of them at the goal.
+LabelledGroup = tuple[Labels, int, int]
 
 
 class Group:
@@ -60,9 +62,7 @@ class Group:
         self.returns[:], self.lengths[:] = 0.0, 0
         return self.seen
 
-    def label(
-        self, decisions: int, network: ArcNetwork | None, labelled: float, stray: float
-    ) -> tuple[Labels, int, int]:
+    def label(self, decisions: int, network: ArcNetwork | None, labelled: float, stray: float) -> LabelledGroup:
         """Drives and labels decisions.
 
         Args:
@@ -129,6 +129,12 @@ def evaluate(network: ArcNetwork, arguments: Mapping[str, Any], seeds: Sequence[
     model = open_model(model) if isinstance(model, str) else model
     scene = {**given, "model": model, **ScanPolicy.arguments(model)}
     return drive_all(lambda env: ArcNetworkPolicy(env, network), seeds, arguments=scene)
+
+
+def join_labels(found: Sequence[LabelledGroup]) -> tuple[Labels, float]:
+    """Labels of several groups, and the share of their episodes that reached the goal."""
+    labels = {name: np.concatenate([one[0][name] for one in found]) for name in found[0][0]}
+    return labels, sum(one[2] for one in found) / max(1, sum(one[1] for one in found))
 
 
 class _Worker:
@@ -231,8 +237,7 @@ class Rovers:
         each = -(-decisions // self.n_groups)
         arrays = None if network is None else dict(network.arrays)
         found = [one for part in self._call("label", [(arrays, each, labelled, stray)] * self.workers) for one in part]
-        labels = {name: np.concatenate([one[0][name] for one in found]) for name in found[0][0]}
-        return labels, sum(one[2] for one in found) / max(1, sum(one[1] for one in found))
+        return join_labels(found)
 
     def begin(self) -> ArcObservation:
         """Starts the episodes of all rovers."""

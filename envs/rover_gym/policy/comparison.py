@@ -83,7 +83,7 @@ def drive_or_reuse(
     *,
     arguments: Mapping[str, Any],
     files: Sequence[Path] = (),
-    threads: int = 1,
+    drive: Callable[..., list[EvaluatedEpisode]] = drive_all,
     progress: Callable[[int], None] = lambda _done: None,
 ) -> list[EvaluatedEpisode]:
     """Drives one episode per seed, or reuses the episodes of an earlier call if nothing has changed.
@@ -95,7 +95,7 @@ def drive_or_reuse(
         seeds: Seeds of the resets.
         arguments: Arguments of `RoverEnv`.
         files: Files that the arguments name: maps, models.
-        threads: Threads that step the rovers.
+        drive: Drives one episode per seed, with the parameters of `drive_all`.
         progress: Called with the number of episodes done.
 
     Raises:
@@ -112,7 +112,7 @@ def drive_or_reuse(
     kept = _kept(path, plain_key)
     if kept is not None:
         return kept
-    drives = drive_all(contender.make, seeds, arguments=environment, threads=threads, progress=progress)
+    drives = drive(contender.make, seeds, arguments=environment, progress=progress)
     plain = {"key": plain_key, "drives": [asdict(drive) for drive in drives]}
     path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
     return drives

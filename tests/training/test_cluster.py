@@ -1,0 +1,58 @@
+"""Training and evaluation on Ray: the page of the manual on a cluster of two nodes, and what Ray's workers get."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cloudpickle
+import gymnasium as gym
+import pytest
+from commands import error_of
+from scripts_run import note
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "training" / "examples" / "rllib.py"
+#: Ray's virtual environment, beside that of the tests as `make ray` makes it.
+RAY = Path(os.environ.get("ROVER_GYM_RAY", f"{sys.prefix}-rllib")) / "bin" / "python"
+
+
+def test_a_worker_of_ray_that_has_not_imported_the_package_finds_the_environment(tmp_path: Path) -> None:
+    """The example's workers got its function by value, and "Environment `RoverCommand` doesn't exist"."""
+    head, _, rest = EXAMPLE.read_text(encoding="utf-8").partition("def make_rovers(")
+    assert "import rover_gym" not in rest
+    names = {"gym": gym, "Any": object, "__name__": "__main__"}
+    exec("from __future__ import annotations\ndef make_rovers(" + rest.partition("\n\n\n")[0], names)  # noqa: S102
+    assert "import gymnasium as gym" in head
+    (tmp_path / "function").write_bytes(cloudpickle.dumps(names["make_rovers"]))
+    script = (
+        "import pickle, sys; make = pickle.load(open(sys.argv[1], 'rb')); assert 'rover_gym' not in sys.modules;"
+        " print(make({'num_envs': 2, 'threads': 1}).num_envs, make({}).spec.id)"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path / "function")]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert done.stdout == "2 RoverCommand-v0\n", done.stderr
+
+
+@pytest.mark.parametrize("command", ["evaluate", "train"])
+def test_without_ray_the_error_names_the_extra(command: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
+    monkeypatch.setitem(sys.modules, "ray", None)
+    monkeypatch.chdir(tmp_path)
+    error = error_of(command, "--ray", "auto")
+    assert error == "error: ray is not installed: pip install 'rover-gym[rllib]'\n"
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.nightly(
+    "tests/training/test_cluster.py::test_a_worker_of_ray_that_has_not_imported_the_package_finds_the_environment"
+)
+@pytest.mark.timeout(1800)
+def test_the_page_holds_on_two_nodes_though_workers_are_lost(tmp_path: Path) -> None:
+    if not RAY.is_file():
+        pytest.skip(f"{RAY} is not there: make ray")
+    script = ROOT / "tests" / "training" / "two_nodes.py"
+    done = subprocess.run([RAY, script, tmp_path], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr[-3000:]
+    note(word for line in done.stdout.splitlines() if line.startswith("$ python ") for word in line.split())
+    assert done.stdout.count("killed ") == 2
