@@ -52,6 +52,7 @@ from rover_gym.cli.options import (
 )
 from rover_gym.cli.tape import Tape, Watched
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.files import write_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.evaluation import Episode, run_episode
@@ -170,7 +171,7 @@ def drive(
             said.show(_table(drives.results, title))
         if folder is not None:
             drives.paths.append(folder / "summary.json")
-            drives.paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+            write_whole(drives.paths[-1], json.dumps(summary, indent=2) + "\n")
         for path in [*drives.paths, *([] if film is None else [film])]:
             if path.exists():
                 said.path("written", path)

@@ -25,6 +25,7 @@ from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.policy_figure import draw_policies
+from rover_gym.files import write_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import (
     Contender,
@@ -181,8 +182,8 @@ def _write(
     rows: Sequence[PolicySummary], table: Sequence[Sequence[str]], report: Mapping[str, Any], output: Path
 ) -> list[Path]:
     """Writes table, data and plot, and returns the files."""
-    (output / "evaluation.md").write_text(in_markdown(table) + "\n", encoding="utf-8")
-    (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    write_whole(output / "evaluation.md", in_markdown(table) + "\n")
+    write_whole(output / "evaluation.json", json.dumps(report, indent=2) + "\n")
     written = [output / "evaluation.md", output / "evaluation.json"]
     try:
         draw_policies(rows, output / "evaluation.png")

@@ -21,6 +21,7 @@ from rover_gym.cli.console import (
     row,
     status,
 )
+from rover_gym.files import write_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
@@ -241,7 +242,7 @@ def _sweep(
     }
     path = output / "soil-curves.json"
     # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
-    path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
+    write_whole(path, json.dumps(numbers, indent=1).replace("NaN", "null") + "\n")
     results.add(**numbers)
     results.path("numbers", path)
     if interrupted:

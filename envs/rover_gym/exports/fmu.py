@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from rover_gym.exports.axes import AXES, Axes, pitch_sign, vector_components
+from rover_gym.files import written_whole
 from rover_gym.mechanics import (
     HeightField,
     OptionError,
@@ -389,11 +390,9 @@ def write_fmu(
         f"binaries/{machine}-{system}/{library.name}": library.read_bytes(),
         "resources/scene.json": scene.encode(),
     }
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with written_whole(path) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
         for place, data in files.items():
             entry = zipfile.ZipInfo(place, STAMP)
             entry.external_attr, entry.compress_type = 0o644 << 16, zipfile.ZIP_DEFLATED
             archive.writestr(entry, data)
-    return path
+    return Path(path)

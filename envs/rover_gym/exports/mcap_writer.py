@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -63,7 +63,8 @@ class McapWriter:
     | `/points`, `/camera` | `foxglove.PointCloud`, `foxglove.CompressedImage` | see `points` and `image` |
 
     Args:
-        path: The file to create, with its folder. An existing file is replaced unless it is being written.
+        path: The file to create, with its folder. An existing file is replaced when the log is closed, unless it is
+            being written.
         model: The rover.
         terrain: The ground.
         goal: Goal on the map (x, z), m.
@@ -260,6 +261,10 @@ class McapWriter:
         """
         self._file.close()
 
+    def discard(self) -> None:
+        """Ends the log and removes it. A file that it was to replace stays."""
+        self._file.discard()
+
     def __enter__(self) -> Self:
         return self
 
@@ -425,11 +430,24 @@ def write_mcap(
             renderer = stack.enter_context(FrameRenderer(run.model, run.terrain, goal=run.goal))
         way, attributes = data["q"][:, [0, 2]], run.trajectory.attributes
         writer = McapWriter(path, run.model, run.terrain, goal=run.goal, attributes=attributes, way=way)
-        stack.enter_context(writer)
+        stack.enter_context(_no_half(writer))
         for i in range(run.n_frames):
             writer.append({name: values[i] for name, values in data.items()})
             if renderer is not None and i in pictured:
                 simulation.set_state(data["q"][i])
                 writer.image(float(run.time[i]), renderer.render(simulation))
             progress(i + 1)
+        writer.close()
     return writer.path
+
+
+@contextmanager
+def _no_half(writer: McapWriter) -> Iterator[None]:
+    """Removes a log that the block does not finish; a full disk is an `OSError` that names the file."""
+    try:
+        yield
+    except BaseException as error:
+        writer.discard()
+        if isinstance(reason := error.__cause__, OSError):
+            raise OSError(reason.errno, reason.strerror, str(writer.path)) from error
+        raise

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from rover_gym.env.start import wheel_centres
 from rover_gym.extras import require
+from rover_gym.files import written_whole
 from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.validation import refuse
@@ -243,7 +244,8 @@ def save_figures(
             figure = figures.Figure(figsize=(width, height))
             draw(figure)
             paths.append(folder / f"{name}.{file_format}")
-            figure.savefig(paths[-1])
+            with written_whole(paths[-1]) as draft:
+                figure.savefig(draft)
     return paths
 
 

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from rover_gym.files import write_whole
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
@@ -207,7 +208,7 @@ def write_xml(root: ET.Element, path: object) -> None:
     """
     ET.indent(root)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-    checked_path(path).write_text(text, encoding="utf-8")
+    write_whole(checked_path(path), text)
 
 
 JOINTS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}

@@ -51,7 +51,9 @@ class Recorder:
     error, and the file stays as the previous flush left it. The file is locked until the recorder is closed.
 
     Args:
-        path: The file to create, with its folder. An existing file is replaced unless it is being recorded or read.
+        path: The file to create, with its folder. An existing file is replaced when the recorder is closed, unless it
+            is being recorded or read; until then the rows are in `NAME.part` beside it, and a full disk leaves it as
+            it was.
         channels: The channels of a row.
         attributes: Metadata of the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
             `describe` takes them from a simulation.
@@ -99,7 +101,7 @@ class Recorder:
             try:
                 self._begin(channels, facts, terrain)
             except BaseException:
-                self._release()
+                self._give_up()
                 raise
 
     def _begin(self, channels: Sequence[Channel], facts: Mapping[str, Any], terrain: Terrain | None) -> None:
@@ -159,6 +161,7 @@ class Recorder:
                     data.resize(data.shape[0] + len(rows), axis=0)
                     data[-len(rows) :] = np.array(rows)
                     rows.clear()
+                    self._disk.is_worth = True
             self._commit()
 
     def note(self, **attributes: str | float) -> None:
@@ -182,6 +185,7 @@ class Recorder:
             if self._release.alive:
                 self.flush()
                 self._file.attrs["complete"] = True
+                self._disk.is_worth = True
                 self._commit()
                 self._release()
 
@@ -208,13 +212,20 @@ class Recorder:
             self._file.flush()
             self._disk.commit()
         except OSError as error:
-            self._release()
-            reason = error.strerror or str(error)
-            stopped = RecordingError(
-                f"{self.path}: the recording stopped: {reason}; {_rows_on_disk(self.path)} rows are on the disk"
-            )
+            replaces = self._disk.replaces
+            self._give_up()
+            rows = 0 if replaces else _rows_on_disk(self.path)
+            kept = "the earlier file is as it was" if replaces else f"{rows} rows are on the disk"
+            stopped = RecordingError(f"{self.path}: the recording stopped: {error.strerror or str(error)}; {kept}")
             stopped.field, stopped.value = "path", str(self.path)
             raise stopped from error
+
+    def _give_up(self) -> None:
+        """Closes the file, and leaves an older one in its place."""
+        if self._release.detach() is not None:
+            with uninterrupted():
+                self._file.close()
+                self._disk.give_up()
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
