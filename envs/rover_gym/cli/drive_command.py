@@ -19,7 +19,6 @@ from rover_gym.cli.console import (
     MOST_EPISODES,
     AsJson,
     Results,
-    check_file,
     plain_errors,
     progress_bar,
 )
@@ -50,6 +49,7 @@ from rover_gym.cli.options import (
     places_on,
     warn_of_slope,
 )
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.cli.tape import Tape, Watched
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.files import write_whole
@@ -141,7 +141,9 @@ def drive(
             refuse(OptionError, "sensor", name, f"must be one of {', '.join(SENSORS)}")
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
-    check_file("film", film)
+    names = (*(f"episode-{one}.h5" for one in range(seed, seed + episodes)), "summary.json")
+    reads = {"the ground": terrain, "the model": model, "the policy": policy}
+    check_paths(reads, film=film, output=Into(folder, names))
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
     scene |= _given({"difficulty": difficulty, "slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading})
     named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})

@@ -15,12 +15,12 @@ from rover_gym.cli.console import (
     MOST_EPISODES,
     AsJson,
     Results,
-    check_folder,
     plain_errors,
     plain_table,
     progress_bar,
 )
 from rover_gym.cli.options import BUILT_IN, ModelName, complete_policy, complete_terrain, named_model, warn_of_slope
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
@@ -94,10 +94,11 @@ def evaluate(
     for package in ("imageio_ffmpeg", "vtkmodules") if films else ():
         require(package, "render")
     contenders = _contenders(policies or ["pd"], model)
-    check_folder("output", output)
-    output.mkdir(parents=True, exist_ok=True)
     seeds = range(seed, seed + episodes)
     evaluation = _Evaluation(contenders, seeds, output, threads)
+    reads = {"the ground": terrain, "the model": model, "the policy": [one.files for one in contenders]}
+    check_paths(reads, output=Into(output, evaluation.names([level for level, _ in scenes], films)))
+    output.mkdir(parents=True, exist_ok=True)
     with Results(as_json=as_json) as results:
         interrupted = False
         try:
@@ -140,6 +141,13 @@ class _Evaluation:
     def __post_init__(self) -> None:
         self.drives: list[PolicySummary] = []
         self.rows: list[PolicySummary] = []
+
+    def names(self, difficulties: Sequence[float | None], films: int) -> list[str]:
+        """The files that are written into the folder."""
+        stems = [_stem(one.name, difficulty) for one in self.contenders for difficulty in difficulties]
+        of_films = [f"films/{stem}-seed{seed}.mp4" for stem in stems for seed in self.seeds[:films]]
+        tables = [f"evaluation.{ending}" for ending in ("md", "json", "png")]
+        return [*tables, *(f"episodes-{stem}.json" for stem in stems), *of_films]
 
     def drive(self, arguments: Mapping[str, Any], difficulty: float | None) -> None:
         """Adds a row for each contender on one ground, and one for all seeds of a trained policy together."""
