@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -20,6 +21,7 @@ from rover_gym.mechanics import (
     OptionError,
     Plane,
     Simulation,
+    SoftGround,
     SphereField,
     Terrain,
     TriangleMesh,
@@ -133,11 +135,11 @@ def _is_structured(variable: UnitVariable) -> bool:
 
 
 #: The version that `rust/fmu/src/scene_file.rs` reads.
-FORMAT = 2
+FORMAT = 3
 
 
 def scene_text(simulation: Simulation, variables: Sequence[UnitVariable]) -> tuple[str, str]:
-    """A simulation in its present state as JSON, and a token that identifies it."""
+    """A simulation in its present state as JSON with a checksum, and a token that identifies it."""
     scene = {
         "format": FORMAT,
         "model": simulation.model.to_text(),
@@ -156,7 +158,12 @@ def scene_text(simulation: Simulation, variables: Sequence[UnitVariable]) -> tup
         ],
     }
     token = hashlib.sha256(json.dumps(scene, sort_keys=True).encode()).hexdigest()[:32]
-    return json.dumps({**scene, "token": token}, allow_nan=False), token
+    return with_checksum(json.dumps({**scene, "token": token}, allow_nan=False)), token
+
+
+def with_checksum(text: str) -> str:
+    """A scene's text with its checksum in a line of its own, without which the unit refuses it."""
+    return f"{text}\nCRC-32 {zlib.crc32(text.encode())}"
 
 
 def _ground(terrain: Terrain) -> dict[str, Any]:
@@ -183,9 +190,10 @@ def _ground(terrain: Terrain) -> dict[str, Any]:
             "origin": list(terrain.origin),
             "material": terrain.material,
         }
-    if isinstance(terrain, TriangleMesh):
-        return _mesh(terrain)
-    raise OptionError(f"terrain: a unit cannot have {terrain!r}")
+    if not isinstance(terrain, TriangleMesh):
+        kind = "sand" if isinstance(terrain, SoftGround) else f"a {type(terrain).__name__}"
+        refuse(OptionError, "terrain", kind, "must be rigid in a unit: a plane, rocks, maps or meshes")
+    return _mesh(terrain)
 
 
 def _mesh(terrain: TriangleMesh) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from rover_gym.record.channels import (
     write_attribute,
     write_description,
 )
+from rover_gym.record.checksums import CHECKSUM, checksum, sum_of_array, sum_of_attributes
 from rover_gym.record.steady_file import FileInUseError, SteadyFile, uninterrupted
 from rover_gym.record.stored_terrain import write_terrain
 from rover_gym.record.trajectory import read_trajectory
@@ -93,6 +94,7 @@ class Recorder:
             channel.name: f"{FRAMES}/{channel.name}" if channel.packed else channel.name for channel in channels
         }
         self._process = os.getpid()
+        self._n_rows, self._attributes, self._sums = 0, -1, dict.fromkeys(self._pending, 0)
         self._disk = _new_file(self.path)
         with uninterrupted():
             self._file: h5py.File = h5py.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
@@ -121,8 +123,12 @@ class Recorder:
                 **(packing if channel.packed else {}),
             )
             write_description(data, channel.unit, channel.description, channel.columns)
+        for channel in channels:
+            if channel.packed:
+                del self._sums[channel.name]
         if terrain is not None:
-            write_terrain(self._file.create_group(TERRAIN), terrain)
+            sums = write_terrain(self._file.create_group(TERRAIN), terrain)
+            self._sums |= {f"{TERRAIN}/{name}": value for name, value in sums.items()}
         self._commit()
 
     def append(self, row: Mapping[str, npt.ArrayLike]) -> None:
@@ -157,9 +163,13 @@ class Recorder:
         with uninterrupted():
             for name, rows in self._pending.items():
                 if rows:
+                    values = np.array(rows)
                     data = self._file[self._places[name]]
                     data.resize(data.shape[0] + len(rows), axis=0)
-                    data[-len(rows) :] = np.array(rows)
+                    data[-len(rows) :] = values
+                    if name in self._sums:
+                        self._sums[name] = sum_of_array(values, self._sums[name])
+                    self._n_rows = len(data)
                     rows.clear()
                     self._disk.is_worth = True
             self._commit()
@@ -174,6 +184,7 @@ class Recorder:
         with uninterrupted():
             for key, value in storable(attributes).items():
                 write_attribute(self._file, key, value)
+            self._attributes = -1
 
     def close(self) -> None:
         """Writes the buffered rows and marks the file complete; a second call does nothing.
@@ -185,6 +196,7 @@ class Recorder:
             if self._release.alive:
                 self.flush()
                 self._file.attrs["complete"] = True
+                self._attributes = -1
                 self._disk.is_worth = True
                 self._commit()
                 self._release()
@@ -208,6 +220,9 @@ class Recorder:
             refuse(RecordingError, "recorder", str(self.path), "belongs to the process that opened it")
 
     def _commit(self) -> None:
+        if self._attributes < 0:  # they have changed
+            self._attributes = sum_of_attributes(self._file)
+        self._file.attrs.modify(CHECKSUM, checksum(self._n_rows, self._attributes, self._sums))
         try:
             self._file.flush()
             self._disk.commit()
