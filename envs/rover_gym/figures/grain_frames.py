@@ -142,7 +142,8 @@ def film_run(
     """
     shown = run.resample(fps)
     # A run that was sampled more coarsely plays at the rate of its samples.
-    rate = min(fps, (shown.n_frames - 1) / float(shown.time[-1] - shown.time[0])) if shown.n_frames > 1 else fps
+    lasts = float(shown.time[-1] - shown.time[0])
+    rate = min(fps, (shown.n_frames - 1) / lasts) if lasts > 0.0 else fps
     drawn = RoverFilm(shown, size) if isinstance(shown, RoverRun) else GrainFilm(shown, size)
     with VideoWriter(path, rate) as video, drawn as film:
         for row in range(shown.n_frames):
