@@ -3,11 +3,16 @@
 import errno
 import itertools
 import os
+import re
 import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from xml.etree import ElementTree
+
+from rover_gym.mechanics import RoverGymError
+from rover_gym.validation import refuse
 
 _NUMBERS = itertools.count()
 
@@ -63,6 +68,22 @@ def write_whole(path: str | Path, content: str | bytes) -> Path:
     with written_whole(path) as draft:
         draft.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
+
+
+#: What XML 1.0 cannot hold.
+NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def check_xml(root: ElementTree.Element, error: type[RoverGymError]) -> None:
+    """Refuses an XML tree with a character that no XML file can hold, such as a control character in a name.
+
+    Raises:
+        RoverGymError: There is one; the error, of the given class, names the attribute.
+    """
+    for element in root.iter():
+        for field, text in (*element.items(), (element.tag, element.text or "")):
+            if found := NOT_IN_XML.search(text):
+                refuse(error, field, text, f"must not hold the character {found[0]!r}, which XML files cannot have")
 
 
 def _put(draft: Path, place: Path) -> None:

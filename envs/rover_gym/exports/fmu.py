@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from rover_gym.exports.axes import AXES, Axes, pitch_sign, vector_components
-from rover_gym.files import written_whole
+from rover_gym.files import check_xml, written_whole
 from rover_gym.mechanics import (
     HeightField,
     OptionError,
@@ -104,6 +104,7 @@ def description_text(
         ElementTree.SubElement(structure, "Output", valueReference=str(variable.reference), dependencies="")
     for variable in outputs:
         ElementTree.SubElement(structure, "InitialUnknown", valueReference=str(variable.reference))
+    check_xml(root, OptionError)
     ElementTree.indent(root)
     text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -115,7 +116,11 @@ class McapWriter:
         self._last: tuple[float, Array] | None = None  # time and velocity of the last row, for the IMU
         self._topics: dict[str, int] = {}
         self._file = McapFile(path)
-        self._file.describe("rover_gym", {name: _text(value) for name, value in facts.items()})
+        try:
+            self._file.describe("rover_gym", {name: _text(value) for name, value in facts.items()})
+        except RecordingError:
+            self._file.discard()
+            raise
 
     @property
     def path(self) -> Path:
@@ -429,25 +434,28 @@ def write_mcap(
 
             renderer = stack.enter_context(FrameRenderer(run.model, run.terrain, goal=run.goal))
         way, attributes = data["q"][:, [0, 2]], run.trajectory.attributes
-        writer = McapWriter(path, run.model, run.terrain, goal=run.goal, attributes=attributes, way=way)
-        stack.enter_context(_no_half(writer))
+        make = partial(McapWriter, path, run.model, run.terrain, goal=run.goal, attributes=attributes, way=way)
+        writer = stack.enter_context(_whole_log(make))
         for i in range(run.n_frames):
             writer.append({name: values[i] for name, values in data.items()})
             if renderer is not None and i in pictured:
                 simulation.set_state(data["q"][i])
                 writer.image(float(run.time[i]), renderer.render(simulation))
             progress(i + 1)
-        writer.close()
     return writer.path
 
 
 @contextmanager
-def _no_half(writer: McapWriter) -> Iterator[None]:
-    """Removes a log that the block does not finish; a full disk is an `OSError` that names the file."""
+def _whole_log(make: Callable[[], McapWriter]) -> Iterator[McapWriter]:
+    """A log that is removed if the block does not finish it; a full disk is an `OSError` that names the file."""
+    writer = None
     try:
-        yield
+        writer = make()
+        yield writer
+        writer.close()
     except BaseException as error:
-        writer.discard()
-        if isinstance(reason := error.__cause__, OSError):
-            raise OSError(reason.errno, reason.strerror, str(writer.path)) from error
+        if writer is not None:
+            writer.discard()
+        if isinstance(error, RecordingError) and isinstance(reason := error.__cause__, OSError):
+            raise OSError(reason.errno, reason.strerror, error.value) from error
         raise

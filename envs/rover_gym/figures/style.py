@@ -74,8 +74,8 @@ STYLE: dict[str, Any] = {
 
 
 def plain(text: str) -> str:
-    """Escapes dollar signs in a file's text, so that they start no formula."""
-    return text.replace("$", r"\$")
+    """Escapes dollar signs in a file's text, so that they start no formula, and drops what cannot be printed."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else " " for letter in text).replace("$", r"\$")
 
 
 class Drawing(NamedTuple):
@@ -162,7 +162,7 @@ class WheelStyle:
         narrow, wide = min(NESTED_WIDTHS.values()), max(NESTED_WIDTHS.values())
         widths = {n: narrow + (wide - narrow) * row / max(rows[-1], 1) for n, row in zip(backwards, rows, strict=True)}
         colours = dict(zip(names, cycle(COLOURS.values()), strict=False))
-        return cls(names, {name: name for name in names}, colours, widths, (left, right))
+        return cls(names, {name: plain(name) for name in names}, colours, widths, (left, right))
 
     @property
     def share(self) -> str:

@@ -206,9 +206,9 @@ class Sensor(ABC):
         if self.rate is not None:
             number("rate", self.rate, above=0.0)
         self._keep("latency", span("latency", self.latency, at_least=0.0, at_most=MAX_LATENCY))
-        for field in fields(self):
-            if field.name == "mount" and not isinstance(getattr(self, field.name), Mount):
-                refuse(OptionError, "mount", getattr(self, field.name), "must be a Mount")
+        for one in fields(self):
+            if one.name == "mount" and not isinstance(getattr(self, one.name), Mount):
+                refuse(OptionError, "mount", getattr(self, one.name), "must be a Mount")
 
     def _keep(self, field: str, value: object) -> None:
         """Sets a field to its checked value."""
