@@ -141,9 +141,7 @@ def drive(
             refuse(OptionError, "sensor", name, f"must be one of {', '.join(SENSORS)}")
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
-    names = (*(f"episode-{one}.h5" for one in range(seed, seed + episodes)), "summary.json")
-    reads = {"the ground": terrain, "the model": model, "the policy": policy}
-    check_paths(reads, film=film, output=Into(folder, names))
+    _check_paths(folder, film, range(seed, seed + episodes), {"ground": terrain, "model": model, "policy": policy})
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
     scene |= _given({"difficulty": difficulty, "slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading})
     named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
@@ -182,6 +180,12 @@ def drive(
         if drives.interrupted:
             typer.echo(f"interrupted: {len(drives.results)} of {episodes} episodes are done", err=True)
             raise typer.Exit(INTERRUPTED)
+
+
+def _check_paths(folder: Path | None, film: Path | None, seeds: Sequence[int], read: Mapping[str, str]) -> None:
+    """Refuses places that cannot be written, or at which an episode would replace another file of the command."""
+    names = (*(f"episode-{seed}.h5" for seed in seeds), "summary.json")
+    check_paths({f"the {what}": path for what, path in read.items()}, film=film, output=Into(folder, names))
 
 
 def _given(options: Mapping[str, Any]) -> dict[str, Any]:
