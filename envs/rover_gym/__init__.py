@@ -5,6 +5,7 @@ The package consists of the subpackages below. Each one may import those above i
     mechanics      the compiled core: models, grounds, simulations, the contact solver
     validation     argument checks, with errors that name the field
     extras         optional packages
+    files          files written whole or not at all
     rotations      rotations as matrices, vectors, quaternions
     polytopes      convex hulls of a few points, boxes around shapes
     derivatives    products with the derivatives of trajectories, also in PyTorch and JAX

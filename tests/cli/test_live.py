@@ -25,7 +25,9 @@ rover = partial(commands.rover, "live")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
-def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "sigterm"])
+def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(ending: signal.Signals, tmp_path: Path) -> None:
+    """SIGTERM left a recording without rows."""
     command = [
         sys.executable,
         "-c",
@@ -59,7 +61,7 @@ def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(tmp_path: P
             end = time.monotonic() + 30.0
             while json.loads(page.recv(timeout=20.0)).get("state", {}).get("rows", 0) < 10:
                 assert time.monotonic() < end
-        process.send_signal(signal.SIGINT)
+        process.send_signal(ending)
         output, errors = process.communicate(timeout=30.0)
     finally:
         process.kill()

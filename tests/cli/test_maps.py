@@ -8,6 +8,7 @@ import numpy as np
 import pygltflib
 import pytest
 from commands import error_of, output_of, rover
+from forged import without_checksum
 
 from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh, Union
 from rover_gym.ground import parts_of, surfaces_of, triangles_of
@@ -148,6 +149,7 @@ def test_damaged_materials_are_refused(tmp_path: Path) -> None:
             tape.append(sampler.row(simulation, residual=0.0, iterations=0))
         with h5py.File(path, "r+") as file:
             file["terrain"][name].attrs[key] = value
+            without_checksum(file)
         with pytest.raises(RecordingError, match=r"damaged\.h5: terrain: is not a valid ground"):
             read_run(path)
 

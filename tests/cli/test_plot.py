@@ -272,6 +272,21 @@ def test_the_computed_slip_is_near_the_recorded_one(recordings: dict[str, Path])
     assert run.trajectory["slip_ratio"].max() > 0.1
 
 
+@pytest.mark.parametrize("alike", [2, 5])
+def test_a_run_with_equal_times_is_plotted(alike: int, tmp_path: Path) -> None:
+    """Where most rows had one time, a division by zero ended the command."""
+    sim = Simulation(RoverModel())
+    sampler = RoverSampler(sim.model)
+    with Recorder(tmp_path / "run.h5", sampler.channels, describe(sim, "at once"), terrain=sim.terrain) as recorder:
+        for i in range(5):
+            sim.step()
+            recorder.append(dict(sampler.row(sim)) | {"time": 0.1 * max(0, i - alike)})
+    output_of("plot", tmp_path / "run.h5", "--output", tmp_path / "plots")
+    assert (tmp_path / "plots" / "path.png").is_file()
+    held = np.zeros(5)
+    assert smooth(held, np.arange(5.0), 0.5) == pytest.approx(2.0, abs=1e-6)
+
+
 def test_smoothing_keeps_a_constant_and_the_area_of_a_spike_and_leaves_gaps() -> None:
     time = np.linspace(0.0, 2.0, 201)
     assert smooth(time, np.full(201, 3.0), 0.5) == pytest.approx(np.full(201, 3.0))

@@ -153,7 +153,7 @@ def test_a_file_of_an_older_version_is_refused_by_its_version(tmp_path: Path) ->
         recorder.append({"time": 0.0})
     with h5py.File(tmp_path / "old.h5", "a") as file:
         file.attrs["format_version"] = 1
-    with pytest.raises(RecordingError, match="of version 1, this rover-gym reads 3"):
+    with pytest.raises(RecordingError, match="of version 1, this rover-gym reads 3 and 4"):
         read_trajectory(tmp_path / "old.h5")
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from forged import sealed
 from gymnasium.vector import AutoresetMode
 from refusals import refused
 
@@ -267,7 +268,7 @@ def damage(part: str, change: Callable[[Any], Any]) -> Callable[[Any], Any]:
 def without_distance(progress: bytes) -> bytes:
     """The same progress, but that the distance to the goal is nan."""
     away = EpisodeRun.from_bytes(RoverEnv().task.rules, progress).info()["distance_to_goal"]
-    return progress.replace(struct.pack("<d", away), struct.pack("<d", np.nan))
+    return sealed(progress[:-4].replace(struct.pack("<d", away), struct.pack("<d", np.nan)))
 
 
 def other_progress() -> bytes:

@@ -363,3 +363,8 @@ BAD: list[tuple[Callable[[], Any], str]] = [
 def test_bad_input_is_refused_by_name(make: Callable[[], Any], field: str) -> None:
     with refused(OptionError, field):
         make()
+
+
+def test_a_mount_takes_solid_and_position_by_their_places() -> None:
+    """`Mount(solid, position)`, as one would write it, was a TypeError."""
+    assert Mount("trunk", (0.1, 0.2, 0.0)) == Mount(solid="trunk", position=(0.1, 0.2, 0.0))

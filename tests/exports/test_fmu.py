@@ -1,6 +1,7 @@
 """Units run in a standard importer bit for bit as the native simulation, and refuse what the standard forbids."""
 
 import re
+import shutil
 import zipfile
 from collections.abc import Callable, Iterator
 from ctypes import CDLL, c_double, c_size_t, c_uint32
@@ -336,7 +337,8 @@ def test_another_instance_takes_the_state(master: Callable[[Simulation], Master]
 MISUSES: list[tuple[Callable[[Master], Any], str]] = [
     (lambda unit: unit.set(wheel_torque__FL=np.nan), "wheel_torque.FL: must be finite, is NaN"),
     (lambda unit: unit.set(wheel_torque__FR=1.0, steering__FL=np.inf), "steering.FL: must be finite, is inf"),
-    (lambda unit: unit.set(steering__FL=3.0), "set_points[0]: must be within ±0.7 rad, is 3"),
+    (lambda unit: unit.set(steering__BR=3.0), "steering.BR: must be within ±0.7 rad, is 3"),  # was set_points[5]
+    (lambda unit: unit.set(steering__FL=1e300), "steering.FL: must be within ±0.7 rad, is 1e300"),  # was 301 digits
     (lambda unit: unit.set(friction=0.5), "friction: cannot be set in the state StepMode"),
     (lambda unit: unit.set(q__x=0.5), "q.x: cannot be set in the state StepMode"),
     (lambda unit: unit.fmu.setFloat64([9999], [1.0]), "valueReferences: 9999 is no variable of this type"),
@@ -454,7 +456,7 @@ def test_every_function_of_the_standard_is_there() -> None:
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda text: text.replace('"format": 2', '"format": 3'), "format: must be 2, is 3"),
+        (lambda text: text.replace('"format": 3', '"format": 4'), "format: must be 3, is 4"),
         (lambda text: text[:500], "scene.json: EOF while parsing"),
         (lambda text: text.replace('"friction": 0.7', '"friction": -0.7'), "settings.friction: must be finite"),
         (lambda text: text.replace('"token": "', '"token": "x'), "instantiationToken: must be"),
@@ -466,13 +468,57 @@ def test_a_damaged_scene_is_not_instantiated(
     path = write_fmu(simulation_on(Plane()), tmp_path / "a.fmu")
     with zipfile.ZipFile(path) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
-    files["resources/scene.json"] = damage(files["resources/scene.json"].decode()).encode()
+    text, _, _ = files["resources/scene.json"].decode().rpartition("\nCRC-32 ")
+    files["resources/scene.json"] = units.with_checksum(damage(text)).encode()
     with zipfile.ZipFile(path, "w") as archive:
         for name, data in files.items():
             archive.writestr(name, data)
     with pytest.raises(Exception, match="Failed to instantiate"):
         Master(unpacked(path, tmp_path / "unit"))
     assert message in capfd.readouterr().out
+
+
+def test_a_scene_with_a_flipped_bit_is_not_instantiated(
+    plane_unit: Unit, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A changed digit was another scene."""
+    description, folder = plane_unit
+    shutil.copytree(folder, tmp_path / "unit")
+    path = tmp_path / "unit" / "resources" / "scene.json"
+    sound, draw = path.read_bytes(), np.random.default_rng(3)
+    places = [*draw.integers(0, len(sound), 20), len(sound) - 1, len(sound) - 12]
+    for place in places:
+        damaged = bytearray(sound)
+        damaged[place] ^= 1 << int(draw.integers(7))
+        path.write_bytes(damaged)
+        with pytest.raises(Exception, match="Failed to instantiate"):
+            Master((description, str(tmp_path / "unit")))
+    assert capfd.readouterr().out.count("scene.json: ") == len(places)
+    path.write_bytes(sound)
+    Master((description, str(tmp_path / "unit"))).fmu.freeInstance()
+
+
+def test_a_saved_state_with_a_flipped_bit_is_refused(
+    on_plane: tuple[Master, Simulation], capfd: pytest.CaptureFixture[str]
+) -> None:
+    """544 of 600 were taken for another state."""
+    unit, sim = on_plane
+    unit.start()
+    unit.step()
+    state = unit.fmu.getFMUState()
+    data, draw = bytes(unit.fmu.serializeFMUState(state)), np.random.default_rng(600)
+    for _ in range(600):
+        damaged = bytearray(data)
+        for bit in draw.integers(0, 8 * len(data), int(draw.integers(1, 4))):
+            damaged[bit // 8] ^= 1 << int(bit % 8)
+        if bytes(damaged) != data:
+            with pytest.raises(FMICallException):
+                unit.fmu.deserializeFMUState(bytes(damaged))
+    assert "serializedState: is damaged (the checksum does not fit)" in capfd.readouterr().out
+    unit.fmu.setFMUState(unit.fmu.deserializeFMUState(data))
+    unit.step()
+    sim.step(20)
+    assert_same(unit, sim)
 
 
 def test_equal_scenes_make_equal_units(tmp_path: Path) -> None:

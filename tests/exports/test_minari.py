@@ -89,6 +89,8 @@ def test_random_actions_drive_any_environment(
         (["a-v0", "--environment", "RoverGoal-v0"], "--policy: must be 'random' for this environment"),
         (["a-v0", "--policy", "nobody"], "--policy: must be 'pd', 'sand', 'scan', "),
         (["../a-v0"], "NAME: must be NAME-vN"),
+        (["t/x-v0"], "NAME: must be NAME-vN"),  # Minari's own ValueError came
+        (["tt/x-v007"], "NAME: must be NAME-vN"),
         (["a"], "NAME: must be NAME-vN"),
         (["a-v0", "--difficulty", "nan"], "--difficulty: must be finite"),
     ],

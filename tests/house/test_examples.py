@@ -1,12 +1,18 @@
 """The Python blocks of the README and of the manual run as they stand."""
 
+import itertools
 import re
+import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
+from click.exceptions import Exit
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
+from rover_gym.cli.usage import UsageError
 
 ROOT = Path(__file__).parents[2]
 PAGES = (
@@ -79,3 +85,34 @@ def test_the_commands_of_the_readme_are_known() -> None:
     assert commands
     for command in commands:
         assert CliRunner().invoke(app, [command, "--help"]).exit_code == 0
+
+
+def command_lines() -> list[pytest.param]:
+    """Every call of `rover` in the pages, the tutorials and the decisions, in blocks and within lines."""
+    found = []
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+        for block in re.findall(r"^```(?:console|bash|sh)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL):
+            lines = [line.strip().removeprefix("$ ") for line in block.splitlines()]
+            found += [(page, line) for line in lines if line.startswith("rover ")]
+        found += [(page, line) for line in re.findall(r"`(rover [a-z][^`]*)`", text) if " -" in line]
+    return [pytest.param(line, id=f"{page.relative_to(ROOT)}: {line}") for page, line in found]
+
+
+@pytest.mark.parametrize("line", command_lines())
+def test_a_command_line_of_the_manual_is_one(line: str) -> None:
+    """`rover export onnx anywhere -o` stood there, and `-o` is no option."""
+    line = re.sub(r"\$\{\w+:-(\w+)\}", r"\1", re.split(r" [|>] ", line)[0])  # a variable has its default
+    words = shlex.split(re.sub(r"\[|\]| \.\.\.", "", line), comments=True)[1:]
+    for choice in itertools.product(*(word.split("|") for word in words)):
+        command: Any = get_command(app)
+        rest = list(choice)
+        while rest and hasattr(command, "commands"):
+            command = command.commands[rest.pop(0)]
+        try:
+            command.make_context("rover", rest)
+        except Exit:
+            pass  # help or the version
+        except UsageError as error:
+            if "does not exist" not in str(error):  # of a file that the reader has
+                raise

@@ -65,7 +65,8 @@ def heard(page: Any, key: str, condition: Callable[[Any], bool] = lambda _: True
     """The next message of a kind that satisfies a condition."""
     end = time.monotonic() + 20.0
     while time.monotonic() < end:
-        message = json.loads(page.recv(timeout=20.0))
+        received = page.recv(timeout=20.0)
+        message = json.loads(received) if isinstance(received, str) else {}
         if key in message and condition(message[key]):
             return message[key]
     raise AssertionError(f"no {key} came")
@@ -83,7 +84,7 @@ def test_a_page_hears_states_and_drives(served: Served) -> None:
         say(page, do="change", name="friction", value=0.25)
         assert heard(page, "state", lambda state: state["scene"]["friction"] == 0.25)
         say(page, do="change", name="ground", value="moon")
-        assert "must be one of" in heard(page, "state", lambda state: "ground" in state["notice"])["notice"]
+        assert "must be one of" in heard(page, "error")
 
 
 def test_a_browser_that_vanishes_stops_the_rover_and_frees_the_wheel(served: Served) -> None:
@@ -134,6 +135,27 @@ def test_malformed_messages_are_answered_and_the_drive_goes_on(served: Served, m
         assert heard(page, "error")
         at = served.loop.state.time
         assert heard(page, "state", lambda state: state["time"] > at)
+
+
+@pytest.mark.parametrize(
+    ("message", "what"),
+    [({"do": "change", "name": "friction", "value": -1}, "friction: "), ({"do": "rock", "radius": 99}, "radius: ")],
+)
+def test_what_the_drive_refuses_is_answered_with_an_error(served: Served, message: dict[str, Any], what: str) -> None:
+    """It came as a notice of the state, where the manual promises an error."""
+    with served.page() as page:
+        say(page, **message)
+        assert heard(page, "error").startswith(what)
+        assert served.loop.state.notice == ""
+
+
+def test_a_message_is_json_however_it_is_spaced(served: Served) -> None:
+    """`{"do": "watch"}` was refused for its space."""
+    with served.page() as page:
+        page.send('{ "do" : "watch" }')
+        assert pictures(page, 1.0)
+        page.send('{"do": "watch", "more": 1}')
+        assert "do: must be one of drive, " in heard(page, "error")
 
 
 @pytest.mark.parametrize("origin", ["http://example.org", "null", "https://127.0.0.1", "http://127.0.0.1:1"])

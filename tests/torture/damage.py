@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from forged import sealed
 
 from rover_gym import (
     HeightField,
@@ -252,7 +253,8 @@ def snapshots(random: Random, ledger: Ledger) -> None:
     sim: Any = make()
     data = sim.snapshot().to_bytes()
     for _ in range(15):
-        damaged = mutate_bytes(random, data)
+        # With the checksum of the changed bytes, or as a disk damages them.
+        damaged = sealed(mutate_bytes(random, data[:-4])) if random.random() < 0.7 else mutate_bytes(random, data)
         snapshot = attempt(ledger, "from_bytes", lambda damaged=damaged: Snapshot.from_bytes(damaged))
         if snapshot is None:
             continue

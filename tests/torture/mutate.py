@@ -17,6 +17,7 @@ import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from forged import without_checksum
 
 from torture.hostile import NUMBERS, TEXTS
 
@@ -168,6 +169,8 @@ def mutate_hdf5(rng: np.random.Generator, path: Path, elsewhere: Path) -> None:
     import h5py  # noqa: PLC0415 - optional, as it is in the package
 
     with h5py.File(path, "r+") as file:
+        if rng.random() < 0.7:  # otherwise the checksum tells it before anything else does
+            without_checksum(file)
         owners = [file, *(item for item in file.values() if isinstance(item, h5py.Group))]
         owner = owners[rng.integers(len(owners))]
         names = sorted(owner)

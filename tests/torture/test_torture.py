@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_gym import Simulation, SphereField
-from torture import on_purpose
+from torture import doors, on_purpose
 from torture.audit import Audit
 from torture.drives import MODEL
 from torture.law import violation
@@ -46,6 +46,18 @@ def test_damaged_recordings_and_policies_are_refused_or_sound(name: str) -> None
     assert not broken, "\n".join(broken)
     assert row.ledger.steps >= 150
     assert row.ledger.refused > row.ledger.steps // 2, "or nothing was damaged"
+
+
+@pytest.mark.parametrize("regime", doors.REGIMES, ids=lambda regime: regime.name)
+def test_doors_to_other_programs_refuse_what_is_wrong(regime: Regime) -> None:
+    for package in ("fmpy", "websockets"):
+        pytest.importorskip(package)
+    row = Row(regime, Ledger())
+    for case in range(min(4, regime.cases)):
+        row.ledger.merge(play(regime.name, case), case)
+    broken = list(row.complaints())
+    assert not broken, "\n".join(broken)
+    assert row.ledger.steps
 
 
 def test_a_case_is_the_same_twice() -> None:

@@ -1,12 +1,12 @@
-"""Shared parts of the commands: output, progress bars, checks of output paths, and error handling."""
+"""Shared parts of the commands: output, progress bars and error handling."""
 
-import errno
 import functools
 import inspect
 import json
 import math
 import os
-import stat
+import signal
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,6 +25,7 @@ from typer.models import ArgumentInfo
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, RoverGymError, __version__
 from rover_gym.models import RobotFileWarning
+from rover_gym.record.steady_file import ENDING
 from rover_gym.validation import refuse
 
 P = ParamSpec("P")
@@ -106,59 +107,11 @@ def say_path(what: str, path: Path) -> None:
     typer.echo(_printable(f"{what}: {path}"))
 
 
-def check_file(option: str, path: Path | None) -> None:
-    """Refuses a file that cannot be written, before the work starts. Leaves nothing behind.
-
-    Raises:
-        OptionError: It cannot be written.
-    """
-    if path is None:
-        return
-    with _tried(option, path, path.parent):
-        is_new = not path.exists()
-        if not is_new and not stat.S_ISREG(path.stat().st_mode):
-            raise OSError(errno.EINVAL, "not a regular file")
-        with path.open("ab"):
-            pass
-        if is_new:
-            path.unlink()
-
-
-def check_folder(option: str, path: Path | None) -> None:
-    """Refuses a folder that cannot be written into, before the work starts. Leaves nothing behind.
-
-    Raises:
-        OptionError: It cannot be written into.
-    """
-    if path is None:
-        return
-    with _tried(option, path, path):
-        probe = path / f".rover-{os.getpid()}"
-        probe.touch()
-        probe.unlink()
-
-
-@contextmanager
-def _tried(option: str, path: Path, folder: Path) -> Iterator[None]:
-    """Creates a folder for the block, and afterwards removes the parts that did not exist before."""
-    try:
-        missing = [place for place in (folder, *folder.parents) if not place.exists()]
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            yield
-        finally:
-            for place in missing:
-                if place.exists():
-                    place.rmdir()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        refuse(OptionError, option, str(path), f"cannot be written ({reason})")
-
-
 def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
     """Turns every error of a command into one line on standard error and an exit code.
 
-    The exit code is 2 for errors that the user can fix, 1 for unexpected ones, and 130 for an interruption. Numbers
+    The exit code is 2 for errors that the user can fix, 1 for unexpected ones, and 130 for an interruption. What else
+    ends a program, such as a system that shuts down, does so as Ctrl-C does: recordings are finished. Numbers
     that are not finite or too large are refused here, for all options. An error that names an
     argument names its option instead.
     """
@@ -171,12 +124,31 @@ def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
-        with one_line(options), _plain_warnings():
+        with one_line(options), _ended_as_by_ctrl_c(), _plain_warnings():
             for name, value in kwargs.items():
                 _check_number(name, value)
             return command(*args, **kwargs)
 
     return guarded
+
+
+@contextmanager
+def _ended_as_by_ctrl_c() -> Iterator[None]:
+    """Lets signals that would kill the program (SIGTERM, SIGHUP) interrupt the block as Ctrl-C does."""
+    deadly: list[signal.Signals] = []
+    if threading.current_thread() is threading.main_thread():
+        deadly = [one for one in ENDING if signal.getsignal(one) is signal.SIG_DFL]
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    for one in deadly:
+        signal.signal(one, interrupt)
+    try:
+        yield
+    finally:
+        for one in deadly:
+            signal.signal(one, signal.SIG_DFL)
 
 
 @contextmanager

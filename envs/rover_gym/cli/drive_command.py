@@ -19,7 +19,6 @@ from rover_gym.cli.console import (
     MOST_EPISODES,
     AsJson,
     Results,
-    check_file,
     plain_errors,
     progress_bar,
 )
@@ -50,8 +49,10 @@ from rover_gym.cli.options import (
     places_on,
     warn_of_slope,
 )
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.cli.tape import Tape, Watched
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.files import write_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.evaluation import Episode, run_episode
@@ -140,7 +141,7 @@ def drive(
             refuse(OptionError, "sensor", name, f"must be one of {', '.join(SENSORS)}")
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
-    check_file("film", film)
+    _check_paths(folder, film, range(seed, seed + episodes), {"ground": terrain, "model": model, "policy": policy})
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
     scene |= _given({"difficulty": difficulty, "slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading})
     named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
@@ -170,7 +171,7 @@ def drive(
             said.show(_table(drives.results, title))
         if folder is not None:
             drives.paths.append(folder / "summary.json")
-            drives.paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+            write_whole(drives.paths[-1], json.dumps(summary, indent=2) + "\n")
         for path in [*drives.paths, *([] if film is None else [film])]:
             if path.exists():
                 said.path("written", path)
@@ -179,6 +180,12 @@ def drive(
         if drives.interrupted:
             typer.echo(f"interrupted: {len(drives.results)} of {episodes} episodes are done", err=True)
             raise typer.Exit(INTERRUPTED)
+
+
+def _check_paths(folder: Path | None, film: Path | None, seeds: Sequence[int], read: Mapping[str, str]) -> None:
+    """Refuses places that cannot be written, or at which an episode would replace another file of the command."""
+    names = (*(f"episode-{seed}.h5" for seed in seeds), "summary.json")
+    check_paths({f"the {what}": path for what, path in read.items()}, film=film, output=Into(folder, names))
 
 
 def _given(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,6 @@ from rover_gym.cli.console import (
     MOST_EPISODES,
     AsJson,
     Results,
-    check_folder,
     plain_errors,
     plain_table,
     progress_bar,
@@ -29,10 +28,12 @@ from rover_gym.cli.options import (
     named_model,
     warn_of_slope,
 )
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.policy_figure import draw_policies
+from rover_gym.files import write_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import (
     Contender,
@@ -103,10 +104,11 @@ def evaluate(
         require(package, "render")
     drive = _driver(ray, threads)
     contenders = _contenders(policies or ["pd"], model)
-    check_folder("output", output)
-    output.mkdir(parents=True, exist_ok=True)
     seeds = range(seed, seed + episodes)
     evaluation = _Evaluation(contenders, seeds, output, drive)
+    reads = {"the ground": terrain, "the model": model, "the policy": [one.files for one in contenders]}
+    check_paths(reads, output=Into(output, evaluation.names([level for level, _ in scenes], films)))
+    output.mkdir(parents=True, exist_ok=True)
     with Results(as_json=as_json) as results:
         interrupted = False
         try:
@@ -149,6 +151,13 @@ class _Evaluation:
     def __post_init__(self) -> None:
         self.drives: list[PolicySummary] = []
         self.rows: list[PolicySummary] = []
+
+    def names(self, difficulties: Sequence[float | None], films: int) -> list[str]:
+        """The files that are written into the folder."""
+        stems = [_stem(one.name, difficulty) for one in self.contenders for difficulty in difficulties]
+        of_films = [f"films/{stem}-seed{seed}.mp4" for stem in stems for seed in self.seeds[:films]]
+        tables = [f"evaluation.{ending}" for ending in ("md", "json", "png")]
+        return [*tables, *(f"episodes-{stem}.json" for stem in stems), *of_films]
 
     def drive(self, arguments: Mapping[str, Any], difficulty: float | None) -> None:
         """Adds a row for each contender on one ground, and one for all seeds of a trained policy together."""
@@ -202,8 +211,8 @@ def _write(
     rows: Sequence[PolicySummary], table: Sequence[Sequence[str]], report: Mapping[str, Any], output: Path
 ) -> list[Path]:
     """Writes table, data and plot, and returns the files."""
-    (output / "evaluation.md").write_text(in_markdown(table) + "\n", encoding="utf-8")
-    (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    write_whole(output / "evaluation.md", in_markdown(table) + "\n")
+    write_whole(output / "evaluation.json", json.dumps(report, indent=2) + "\n")
     written = [output / "evaluation.md", output / "evaluation.json"]
     try:
         draw_policies(rows, output / "evaluation.png")

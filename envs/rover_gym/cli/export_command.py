@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import gymnasium as gym
 import typer
 
-from rover_gym.cli.console import MOST_EPISODES, check_file, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import MOST_EPISODES, plain_errors, progress_bar, say_path
 from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
@@ -28,6 +28,7 @@ from rover_gym.cli.options import (
     places_on,
     warn_of_slope,
 )
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_writer import FPS, write_mcap
 from rover_gym.exports.minari_data import write_dataset
@@ -59,9 +60,7 @@ def mcap(
     require("mcap.writer", "logs")
     path = run.with_suffix(".mcap") if output is None else output
     saved = read_run(run)
-    if path.exists() and path.samefile(run):
-        refuse(OptionError, "output", str(path), "would replace the run itself")
-    check_file("output", path)
+    check_paths({"the run": run}, output=path)
     with progress_bar() as bar:
         task = bar.add_task("rows", total=saved.n_frames, state="")
         write_mcap(saved, path, images=images, fps=fps, progress=lambda n: bar.update(task, completed=n))
@@ -80,7 +79,7 @@ def onnx(
 ) -> None:
     """Write a policy's network as ONNX, with the normalisation of its inputs."""
     require("onnx", "onnx")
-    check_file("output", output)
+    check_paths({"the policy": policy}, output=output)
     say_path("ONNX", write_onnx(policy, output))
 
 
@@ -110,7 +109,7 @@ def fmu(
 ) -> None:
     """Write a rover at the start of an episode as an FMI 3.0 co-simulation unit."""
     fmu_library()
-    check_file("output", output)
+    check_paths({"the ground": terrain, "the model": model}, output=output)
     terrain = chosen_terrain(terrain, difficulty)
     warn_of_slope(slope, friction)
     arguments: dict[str, Any] = {"terrain": terrain, "friction": friction, "time_step": time_step}
@@ -158,6 +157,7 @@ def dataset(
     require("minari", "data")
     if environment not in ENVIRONMENTS:
         refuse(OptionError, "environment", environment, f"must be one of {', '.join(ENVIRONMENTS)}")
+    check_paths(output=Into(output))
     given = {"terrain": terrain, "difficulty": difficulty, "model": None if model == BUILT_IN else model}
     arguments: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     make: Callable[[gym.Env[Any, Any]], Policy] = partial(RandomPolicy, seed=seed)

@@ -36,6 +36,7 @@ def collapse(
     """Let a round column of balls collapse on a floor; record it and say how far it spreads."""
     from rover_gym.grains.bed_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
 
+    given.check("collapse")
     options = given.options
     with status("filling the tube"):
         sim = column(balls, tube, radius, seed=given.seed, **options)
@@ -65,6 +66,7 @@ def silo(
     from rover_gym.grains.bed_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import silo as scene  # noqa: PLC0415 - as above
 
+    given.check("silo")
     options = given.options
     with status("filling the silo"):
         sim = scene(balls, tube, hole, radius, seed=given.seed, **options)
@@ -98,6 +100,7 @@ def drum(
     from rover_gym.grains.bed_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import slopes  # noqa: PLC0415 - as above
 
+    given.check("drum")
     options = given.options
     with status("filling the drum"):
         sim = scene(balls, wall, length, rate, radius, seed=given.seed, **options)
@@ -127,6 +130,7 @@ def sphere(
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import penetration_depths, striking_sphere  # noqa: PLC0415 - as above
 
+    given.check("sphere")
     options = given.options
     with status("settling the bed"):
         bed = settled_balls(balls, width, width, **radii(radius), seed=given.seed, **options)
@@ -177,6 +181,7 @@ def rover(
     from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - as above
 
+    given.check("rover", model)
     chosen = _on_wheels(model, wheel_width)
     options = given.options
     with status("settling the bed"):
@@ -219,6 +224,7 @@ def track(
     from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
 
+    given.check("track", model)
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
     if number("length", length) < 2.0 * chosen.clear_radius:
         refuse(
@@ -269,6 +275,7 @@ def pit(
     from rover_gym.grains.bed_scenes import rover_before_pit  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.grains.pit import Pit  # noqa: PLC0415 - as above
 
+    given.check("pit", model)
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
     hole = Pit(begin=chosen.clear_radius, length=length, width=width, depth=depth, bank_deg=bank_deg)
     options = given.options

@@ -10,7 +10,6 @@ from rover_gym.cli.console import (
     AsJson,
     Results,
     Row,
-    check_folder,
     plain_errors,
     progress_bar,
     row,
@@ -18,6 +17,7 @@ from rover_gym.cli.console import (
 )
 from rover_gym.cli.grains_options import EARTH, FOLDER, Balls, Friction, Gravity, Output, Seed, TimeStep, Tolerance
 from rover_gym.cli.options import takes
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.validation import number
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Bench:
     as_json: AsJson = False
 
     def __post_init__(self) -> None:
-        check_folder("output", self.output)
+        check_paths(output=Into(self.output))
         number("ball_radius", self.ball_radius, above=0.0)
 
     @property

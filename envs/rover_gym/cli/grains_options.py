@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import AsJson, Results, Row, check_folder, row, status
+from rover_gym.cli.console import AsJson, Results, Row, row, status
+from rover_gym.cli.paths import Into, check_paths
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun, Recordable
@@ -44,8 +45,9 @@ class BallScene:
     output: Output = FOLDER
     as_json: AsJson = False
 
-    def __post_init__(self) -> None:
-        check_folder("output", self.output)
+    def check(self, name: str, model: str | None = None) -> None:
+        """Refuses places that the recording of this name and its film cannot take, before the work starts."""
+        check_paths({"the model": model}, output=Into(self.output, (f"{name}.h5", f"{name}.mp4")))
 
     @property
     def options(self) -> dict[str, Any]:

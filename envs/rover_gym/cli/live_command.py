@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rover_gym.cli.console import check_folder, plain_errors
+from rover_gym.cli.console import plain_errors
 from rover_gym.cli.newest import say_how_to_watch
 from rover_gym.cli.options import (
     BUILT_IN,
@@ -25,6 +25,7 @@ from rover_gym.cli.options import (
     named_ground,
     named_model,
 )
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.extras import require
 from rover_gym.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
 from rover_gym.live.live_scene import BY_HAND
@@ -74,7 +75,7 @@ def live(
     require("websockets", "replay")
     if mcap:
         require("mcap", "logs")
-    check_folder("output", output)
+    check_paths(output=Into(output))
     choices, scene = LiveChoices(), LiveScene()
     named = chosen_terrain(terrain, difficulty)
     grounds: dict[str, str | Terrain] = dict(choices.grounds)

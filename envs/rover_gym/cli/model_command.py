@@ -10,8 +10,9 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.console import AsJson, Results, check_file, plain_errors, plain_table
+from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table
 from rover_gym.cli.options import complete_model
+from rover_gym.cli.paths import check_paths
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.model_drawing import write_model_picture
 from rover_gym.figures.style import check_format
@@ -84,10 +85,7 @@ def import_model(
         require("matplotlib", "demo")
     picture = picture or output.with_suffix(".png")
     check_format(picture.suffix.removeprefix("."))
-    for option, path in (("output", output), ("picture", picture)):
-        if path.exists() and file.exists() and path.samefile(file):
-            refuse(OptionError, option, str(path), "would replace the file that is read")
-        check_file(option, path)
+    check_paths({"the file that is read": file}, output=output, picture=picture)
     options: dict[str, object] = {"forward": forward, "ignore": ignore or ()}
     options |= {"torque_limit": torque_limit, "wheel_width": wheel_width, "wheel_stiffness": wheel_stiffness}
     options |= {"wheels": _radii(wheel), "steering": _pairs(steering)}
@@ -135,7 +133,7 @@ def show(*, name: Named, picture: Picture = None, as_json: AsJson = False) -> No
     if picture is not None:
         require("matplotlib", "demo")
         check_format(picture.suffix.removeprefix("."))
-        check_file("picture", picture)
+        check_paths({"the model": name}, picture=picture)
     found = open_model(name)
     with Results(as_json=as_json) as results:
         _say_solids(results, found)

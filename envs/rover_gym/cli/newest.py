@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from rover_gym.cli.console import check_folder
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
@@ -26,7 +26,7 @@ def recording_folder(output: Path | None, usual: Path, *, wanted: bool) -> Path 
     if not wanted:
         return None
     try:
-        check_folder("output", output or usual)
+        check_paths(output=Into(output or usual))
     except (OptionError, OSError) as error:
         if output is not None:
             raise

@@ -9,8 +9,9 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, row
+from rover_gym.cli.console import AsJson, Results, plain_errors, row
 from rover_gym.cli.options import takes, warn_of_slope
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.cli.soil_command import soil
 from rover_gym.mechanics import (
     BallSimulation,
@@ -73,9 +74,6 @@ class Course:
     ] = None
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar")
     as_json: AsJson = False
-
-    def __post_init__(self) -> None:
-        check_folder("output", self.output)
 
     @property
     def options(self) -> dict[str, Any]:
@@ -179,6 +177,8 @@ def _run(sim: PlanarSimulation, who: str, given: Course, path: Path) -> None:
     longest = LONGEST if given.duration is None else given.duration
     farthest = given.distance or (FARTHEST if given.duration is None else math.inf)
     start = float(sim.q[0])
+    figure = path.with_suffix(".png")
+    check_paths({"the table": given.table}, output=Into(path.parent, (path.name, figure.name)))
     title = f"{who} on {_words(sim.ground)}"
     with Results(as_json=given.as_json) as results:
 
@@ -200,4 +200,4 @@ def _run(sim: PlanarSimulation, who: str, given: Course, path: Path) -> None:
         results.path("trajectory", path)
         from rover_gym.figures import draw_overview  # noqa: PLC0415 - matplotlib is slow to load
 
-        results.path("figure", draw_overview(run, path.with_suffix(".png")))
+        results.path("figure", draw_overview(run, figure))

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
-from rover_gym.cli.console import check_file, check_folder, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import plain_errors, progress_bar, say_path
 from rover_gym.cli.newest import newest_run, show_in_browser
 from rover_gym.cli.options import OpenIt, complete_recording
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.extras import require
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.mechanics import OptionError
@@ -59,20 +60,19 @@ def replay(
     if not (html or vrml or gltf or film):
         html = run.with_suffix(".html")
     wanted = {"html": html, "vrml": vrml, "gltf": gltf, "film": film}
+    beside = None if ghost is None else newest_run(ghost)
     saved = open_run(run)
     kind = _KINDS[type(saved)]
     if gltf is not None:
         require("pygltflib", "replay")  # before the first file is written
+    check_paths({"the run": run, "the ghost": beside}, **wanted)
     for option, path in wanted.items():
-        if path is not None and path.exists() and path.samefile(run):
-            refuse(OptionError, option, str(path), "would replace the run itself")
-        check_file(option, path)
         if path is not None and option not in kind[0]:
             refuse(OptionError, option, str(path), kind[1])
     frames = saved.resample(fps)
     if html is not None:
-        beside = None if ghost is None else read_run(newest_run(ghost)).resample(fps)
-        say_path("page", write_page(frames, html, follow=follow, ghost=beside))
+        shadow = None if beside is None else read_run(beside).resample(fps)
+        say_path("page", write_page(frames, html, follow=follow, ghost=shadow))
         show_in_browser(html, wanted=show)
     if vrml is not None and isinstance(frames, RoverRun):
         say_path("VRML", write_vrml(frames, vrml))
@@ -126,9 +126,10 @@ def plot(
     recording = newest_run(recording)
     folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
     run = open_run(recording)
-    check_folder("output", folder)
-    from rover_gym.figures import draw_run  # noqa: PLC0415 - slow to load, and a bad file is told at once
+    from rover_gym.figures.drawing import draw_run, drawable  # noqa: PLC0415 - slow, and a bad file is told at once
 
+    names = [f"{name}.{file_format}" for name in (*drawable(run), "overview")]
+    check_paths({"the run": recording}, output=Into(folder, names))
     paths = draw_run(run, folder, file_format=file_format, with_overview=overview)
     for path in paths:
         say_path("figure", path)

@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from rover_gym.cli.console import AsJson, Results, Row, check_folder, plain_errors, progress_bar, row
+from rover_gym.cli.console import AsJson, Results, Row, plain_errors, progress_bar, row
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.reproduction import SceneResult, inclined_plane, sphere_rug
 from rover_gym.reproduction.scene_runs import distance_to_siconos
@@ -34,7 +35,7 @@ def report(
     Siconos 4.4, which ran the same scene.
     """
     options: dict[str, Any] = {"time_step": time_step, "variant": variant, "stabilisation": stabilisation}
-    check_folder("output", output)
+    check_paths(output=Into(output, ("trajectory.h5", "rug.h5")))
     paths = (output / "trajectory.h5", output / "rug.h5")
     with Results(as_json=as_json) as results:
         with results.keeping("trajectory", *paths), progress_bar() as bar:

@@ -11,6 +11,7 @@ import typer
 from rich.table import Table
 
 from rover_gym.cli.console import AsJson, Results, plain_errors
+from rover_gym.cli.paths import check_paths
 from rover_gym.mechanics import OptionError
 from rover_gym.models import open_model
 from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
@@ -243,6 +244,7 @@ def convert(
     wheel: Annotated[str, typer.Option(help="Name of the wheel, for all rows.")] = "wheel",
 ) -> None:
     """Rewrite a table of runs in the columns, units and signs that `read_runs` takes."""
+    check_paths({"the source": source}, target=target)
     n = convert_runs(source, target, column, wheel)
     typer.echo(f"{target}: {n} runs")
 

@@ -15,12 +15,13 @@ from rover_gym.cli.console import (
     INTERRUPTED,
     AsJson,
     Results,
-    check_folder,
     plain_errors,
     progress_bar,
     row,
     status,
 )
+from rover_gym.cli.paths import Into, check_paths
+from rover_gym.files import write_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
@@ -91,7 +92,8 @@ def soil(
     as_json: AsJson = False,
 ) -> None:
     """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
-    check_folder("output", output)
+    names = ("soil-curves.json", "soil-curves.png") if sweep else ("soil.h5", "soil.png", "soil.mp4")
+    check_paths(output=Into(output, names))
     slowness = float(np.sqrt(EARTH / gravity))
     options: dict[str, Any] = {
         "gravity": (0.0, -gravity),
@@ -241,7 +243,7 @@ def _sweep(
     }
     path = output / "soil-curves.json"
     # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
-    path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
+    write_whole(path, json.dumps(numbers, indent=1).replace("NaN", "null") + "\n")
     results.add(**numbers)
     results.path("numbers", path)
     if interrupted:

@@ -13,8 +13,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, plain_table
+from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table
 from rover_gym.cli.options import RayAddress
+from rover_gym.cli.paths import Into, check_paths
 from rover_gym.extras import require
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
@@ -26,6 +27,9 @@ LARGEST = 498  # the largest seed: the fields of all seeds stay below the evalua
 
 
 SEEDS = ("--seeds", "--seed")
+
+#: Files of a run that a user may have named as an input.
+WRITTEN = (ARCS_FILE, f"best/{ARCS_FILE}", "config.yaml")
 
 
 class ManySeeds(TyperCommand):
@@ -103,11 +107,13 @@ def train(
     if show:
         typer.echo(path.read_text(encoding="utf-8"), nl=False)
         return
-    check_folder("output", output)
+    check_paths(output=Into(output))
     if steps is not None and settings.ppo is not None:
         settings = replace(settings, ppo=replace(settings.ppo, decisions=steps))
     network = None if begin is None else _network(begin)
     folders = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
+    for folder in () if resume else folders.values():
+        check_paths({"the configuration": path, "the network": begin}, output=Into(folder, WRITTEN))
     with Results(as_json=as_json) as results:
         for seed, folder in folders.items():
             train_arcs(

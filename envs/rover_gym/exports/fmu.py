@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,11 +15,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from rover_gym.exports.axes import AXES, Axes, pitch_sign, vector_components
+from rover_gym.files import check_xml, written_whole
 from rover_gym.mechanics import (
     HeightField,
     OptionError,
     Plane,
     Simulation,
+    SoftGround,
     SphereField,
     Terrain,
     TriangleMesh,
@@ -101,6 +104,7 @@ def description_text(
         ElementTree.SubElement(structure, "Output", valueReference=str(variable.reference), dependencies="")
     for variable in outputs:
         ElementTree.SubElement(structure, "InitialUnknown", valueReference=str(variable.reference))
+    check_xml(root, OptionError)
     ElementTree.indent(root)
     text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return text
@@ -132,11 +136,11 @@ def _is_structured(variable: UnitVariable) -> bool:
 
 
 #: The version that `rust/fmu/src/scene_file.rs` reads.
-FORMAT = 2
+FORMAT = 3
 
 
 def scene_text(simulation: Simulation, variables: Sequence[UnitVariable]) -> tuple[str, str]:
-    """A simulation in its present state as JSON, and a token that identifies it."""
+    """A simulation in its present state as JSON with a checksum, and a token that identifies it."""
     scene = {
         "format": FORMAT,
         "model": simulation.model.to_text(),
@@ -155,7 +159,12 @@ def scene_text(simulation: Simulation, variables: Sequence[UnitVariable]) -> tup
         ],
     }
     token = hashlib.sha256(json.dumps(scene, sort_keys=True).encode()).hexdigest()[:32]
-    return json.dumps({**scene, "token": token}, allow_nan=False), token
+    return with_checksum(json.dumps({**scene, "token": token}, allow_nan=False)), token
+
+
+def with_checksum(text: str) -> str:
+    """A scene's text with its checksum in a line of its own, without which the unit refuses it."""
+    return f"{text}\nCRC-32 {zlib.crc32(text.encode())}"
 
 
 def _ground(terrain: Terrain) -> dict[str, Any]:
@@ -182,9 +191,10 @@ def _ground(terrain: Terrain) -> dict[str, Any]:
             "origin": list(terrain.origin),
             "material": terrain.material,
         }
-    if isinstance(terrain, TriangleMesh):
-        return _mesh(terrain)
-    raise OptionError(f"terrain: a unit cannot have {terrain!r}")
+    if not isinstance(terrain, TriangleMesh):
+        kind = "sand" if isinstance(terrain, SoftGround) else f"a {type(terrain).__name__}"
+        refuse(OptionError, "terrain", kind, "must be rigid in a unit: a plane, rocks, maps or meshes")
+    return _mesh(terrain)
 
 
 def _mesh(terrain: TriangleMesh) -> dict[str, Any]:
@@ -389,11 +399,9 @@ def write_fmu(
         f"binaries/{machine}-{system}/{library.name}": library.read_bytes(),
         "resources/scene.json": scene.encode(),
     }
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with written_whole(path) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
         for place, data in files.items():
             entry = zipfile.ZipInfo(place, STAMP)
             entry.external_attr, entry.compress_type = 0o644 << 16, zipfile.ZIP_DEFLATED
             archive.writestr(entry, data)
-    return path
+    return Path(path)

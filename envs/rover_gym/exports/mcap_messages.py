@@ -226,7 +226,8 @@ class McapFile:
     """Writes messages to topics. The file has no index until it is closed.
 
     Args:
-        path: The file to create, with its folder. An existing file is replaced unless it is being written.
+        path: The file to create, with its folder. An existing file is replaced when this one is closed, unless it is
+            being written.
 
     Raises:
         RecordingError: The file is in use.
@@ -325,7 +326,13 @@ class McapFile:
         if self.is_open:
             self._must_be_open()
             self._tried(self._finish)
+            self._disk.is_worth = True
             self._release()
+
+    def discard(self) -> None:
+        """Ends the file and removes it; an older one stays."""
+        self._release.detach()
+        self._disk.discard()
 
     def _start(self) -> None:
         self._writer.start(library="rover-gym")
@@ -356,12 +363,13 @@ class McapFile:
                 self._disk.commit()
                 self._disk.seek(place)
                 self._committed, self._n_safe = place, self._written
+                self._disk.is_worth |= self._n_safe > 0
         except OSError as error:
-            self._release()
-            reason = error.strerror or str(error)
-            stopped = RecordingError(
-                f"{self.path}: the recording stopped: {reason}; {self._n_safe} messages are on the disk"
-            )
+            replaces = self._disk.replaces
+            self._release.detach()
+            self._disk.give_up()
+            kept = "the earlier file is as it was" if replaces else f"{self._n_safe} messages are on the disk"
+            stopped = RecordingError(f"{self.path}: the recording stopped: {error.strerror or str(error)}; {kept}")
             stopped.field, stopped.value = "path", str(self.path)
             raise stopped from error
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -63,7 +64,8 @@ class McapWriter:
     | `/points`, `/camera` | `foxglove.PointCloud`, `foxglove.CompressedImage` | see `points` and `image` |
 
     Args:
-        path: The file to create, with its folder. An existing file is replaced unless it is being written.
+        path: The file to create, with its folder. An existing file is replaced when the log is closed, unless it is
+            being written.
         model: The rover.
         terrain: The ground.
         goal: Goal on the map (x, z), m.
@@ -114,7 +116,11 @@ class McapWriter:
         self._last: tuple[float, Array] | None = None  # time and velocity of the last row, for the IMU
         self._topics: dict[str, int] = {}
         self._file = McapFile(path)
-        self._file.describe("rover_gym", {name: _text(value) for name, value in facts.items()})
+        try:
+            self._file.describe("rover_gym", {name: _text(value) for name, value in facts.items()})
+        except RecordingError:
+            self._file.discard()
+            raise
 
     @property
     def path(self) -> Path:
@@ -259,6 +265,10 @@ class McapWriter:
             RecordingError: The disk is full; committed messages stay readable.
         """
         self._file.close()
+
+    def discard(self) -> None:
+        """Ends the log and removes it. A file that it was to replace stays."""
+        self._file.discard()
 
     def __enter__(self) -> Self:
         return self
@@ -424,8 +434,8 @@ def write_mcap(
 
             renderer = stack.enter_context(FrameRenderer(run.model, run.terrain, goal=run.goal))
         way, attributes = data["q"][:, [0, 2]], run.trajectory.attributes
-        writer = McapWriter(path, run.model, run.terrain, goal=run.goal, attributes=attributes, way=way)
-        stack.enter_context(writer)
+        make = partial(McapWriter, path, run.model, run.terrain, goal=run.goal, attributes=attributes, way=way)
+        writer = stack.enter_context(_whole_log(make))
         for i in range(run.n_frames):
             writer.append({name: values[i] for name, values in data.items()})
             if renderer is not None and i in pictured:
@@ -433,3 +443,19 @@ def write_mcap(
                 writer.image(float(run.time[i]), renderer.render(simulation))
             progress(i + 1)
     return writer.path
+
+
+@contextmanager
+def _whole_log(make: Callable[[], McapWriter]) -> Iterator[McapWriter]:
+    """A log that is removed if the block does not finish it; a full disk is an `OSError` that names the file."""
+    writer = None
+    try:
+        writer = make()
+        yield writer
+        writer.close()
+    except BaseException as error:
+        if writer is not None:
+            writer.discard()
+        if isinstance(error, RecordingError) and isinstance(reason := error.__cause__, OSError):
+            raise OSError(reason.errno, reason.strerror, error.value) from error
+        raise

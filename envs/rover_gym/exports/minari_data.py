@@ -21,8 +21,8 @@ from rover_gym.validation import checked, refuse, whole
 if TYPE_CHECKING:
     from rover_gym.policy.named_policy import Policy
 
-#: Allowed names of data sets.
-NAME = re.compile(r"(?:[A-Za-z][A-Za-z0-9_-]*/)*[A-Za-z][A-Za-z0-9_-]*-v\d+")
+#: Allowed names of data sets, which Minari takes as they are: a namespace has two characters or more.
+NAME = re.compile(r"(?![A-Za-z]/[^/]*$)(?:[A-Za-z][A-Za-z0-9_-]*/)*[A-Za-z][A-Za-z0-9_-]*-v(?:0|[1-9]\d{0,5})")
 #: Environment variable with Minari's folder of data sets.
 PLACE = "MINARI_DATASETS_PATH"
 
@@ -74,7 +74,8 @@ def write_dataset(
     """
     minari = require("minari", "data")
     if not NAME.fullmatch(name):
-        refuse(OptionError, "name", name, "must be NAME-vN or NAMESPACE/NAME-vN, of letters, digits, _ and -")
+        reason = "must be NAME-vN or NAMESPACE/NAME-vN, of letters, digits, _ and -, the namespace of two or more"
+        refuse(OptionError, "name", name, reason)
     if environment not in ENVIRONMENTS:
         refuse(OptionError, "environment", environment, f"must be one of {', '.join(ENVIRONMENTS)}")
     chosen = [whole("seeds", seed) for seed in seeds]

@@ -11,6 +11,7 @@ import numpy as np
 from rover_gym.exports.onnx_arcs import arcs_model
 from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 from rover_gym.extras import MissingExtraError, require
+from rover_gym.files import write_whole
 from rover_gym.policy.arc_forecast import FORECAST_FILE, OUTPUTS
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
@@ -42,11 +43,7 @@ def write_onnx(policy: str | Path, path: str | Path) -> Path:
         MissingExtraError: An extra is not installed.
     """
     require("onnx", "onnx")
-    graph = onnx_policy(policy)
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(graph.SerializeToString())
-    return path
+    return write_whole(path, onnx_policy(policy).SerializeToString())
 
 
 @checked(policy=Path)

@@ -62,7 +62,8 @@ def smooth(time: Array, values: Array, window: float) -> Array:
     """
     if len(time) < 3:
         return values
-    half = max(round(0.5 * window / float(np.median(np.diff(time)))), 1)
+    step = max(float(np.median(np.diff(time))), 1e-6 * window)  # times may be the same
+    half = max(round(0.5 * window / step), 1)
     weights = np.hanning(2 * half + 3)[1:-1]
     columns = values.reshape(len(values), -1)
     known = np.isfinite(columns)

@@ -10,10 +10,12 @@ import numpy.typing as npt
 
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.rover_film import RoverFilm, ShownSample
+from rover_gym.files import written_whole
 from rover_gym.mechanics import Plane
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.rendering import FrameRenderer, VideoWriter
 from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR
+from rover_gym.rendering.render_options import whole_film
 from rover_gym.replay.grain_scene import eye_path, floor_of, start_view, tile_of
 from rover_gym.replay.scenery import vessel_meshes, vessel_poses, wall_polygons, wall_poses
 
@@ -112,10 +114,9 @@ def draw_grains(run: GrainRun, path: str | Path, *, row: int = -1, size: tuple[i
     """
     with GrainFilm(run, size) as film:
         image = film.frame(row)
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    require("matplotlib.image", "demo").imsave(path, image, format="png")
-    return path
+    with written_whole(path) as draft:
+        require("matplotlib.image", "demo").imsave(draft, image, format="png")
+    return Path(path)
 
 
 def film_run(
@@ -141,7 +142,8 @@ def film_run(
     """
     shown = run.resample(fps)
     # A run that was sampled more coarsely plays at the rate of its samples.
-    rate = min(fps, (shown.n_frames - 1) / float(shown.time[-1] - shown.time[0])) if shown.n_frames > 1 else fps
+    lasts = float(shown.time[-1] - shown.time[0])
+    rate = min(fps, (shown.n_frames - 1) / lasts) if lasts > 0.0 else fps
     drawn = RoverFilm(shown, size) if isinstance(shown, RoverRun) else GrainFilm(shown, size)
     with VideoWriter(path, rate) as video, drawn as film:
         for row in range(shown.n_frames):
@@ -182,7 +184,8 @@ def draw_soil(run: SoilRun, path: str | Path, *, row: int = -1) -> Path:
     """
     figure, axes = _sheet(run)
     _paint(axes, run, row)
-    figure.savefig(path, dpi=100)
+    with written_whole(path) as draft:
+        figure.savefig(draft, dpi=100)
     return Path(path)
 
 
@@ -201,7 +204,7 @@ def film_soil(run: SoilRun, path: str | Path, *, frames_per_second: int = 25) ->
         # yuv420p halves both sides of the picture, so both must be even.
         even = ["-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2", "-pix_fmt", "yuv420p"]
         writer = FFMpegWriter(fps=frames_per_second, codec="libx264", extra_args=even)
-        with writer.saving(figure, str(path), dpi=100):
+        with whole_film(path) as draft, writer.saving(figure, str(draft), dpi=100):
             for row in range(run.n_frames):
                 _paint(axes, run, row)
                 writer.grab_frame()

@@ -186,7 +186,8 @@ def slip_of_wheels(run: GrainRun) -> Array:
         return np.full(centres.shape[:2], np.nan)
     heading = run.trajectory["q"][:, 4]
     ahead = np.stack((np.cos(heading), np.zeros_like(heading), -np.sin(heading)), axis=1)
-    travel = np.einsum("nwi,ni->nw", np.gradient(centres, run.time, axis=0), ahead)
+    with np.errstate(divide="ignore", invalid="ignore"):  # between equal times there is no speed
+        travel = np.einsum("nwi,ni->nw", np.gradient(centres, run.time, axis=0), ahead)
     rims = of_wheels(run.rover, "v") * run.rover.model.wheel_radii
     travel, rims = smooth(run.time, travel, WINDOW), smooth(run.time, rims, WINDOW)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rover_gym.extras import require
+from rover_gym.files import written_whole
 from rover_gym.policy.evaluation import IntervalEstimate, PolicySummary
 from rover_gym.policy.named_policy import NAMES
 
@@ -39,4 +40,5 @@ def draw_policies(rows: Sequence[PolicySummary], path: Path) -> None:
         axis.grid(axis="x", alpha=0.3)
     names = [row.policy if row.difficulty is None else f"{row.policy}, {row.difficulty:g}" for row in rows]
     axes[0].set_yticks(places, names)
-    figure.savefig(path, dpi=110)
+    with written_whole(path) as draft:
+        figure.savefig(draft, dpi=110)

@@ -22,6 +22,7 @@ from rover_gym.figures.style import (
     panel_legend,
     title,
 )
+from rover_gym.files import written_whole
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 from rover_gym.soil.soil_trials import Pull, SoilDrive
 
@@ -175,7 +176,8 @@ def draw_curves(
         verticalalignment="top",
         fontsize=11.0,
     )
-    figure.savefig(path, dpi=100)
+    with written_whole(path) as draft:
+        figure.savefig(draft, dpi=100)
     return Path(path)
 
 

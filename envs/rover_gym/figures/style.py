@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from rover_gym.env.start import wheel_centres
 from rover_gym.extras import require
+from rover_gym.files import written_whole
 from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.validation import refuse
@@ -73,8 +74,8 @@ STYLE: dict[str, Any] = {
 
 
 def plain(text: str) -> str:
-    """Escapes dollar signs in a file's text, so that they start no formula."""
-    return text.replace("$", r"\$")
+    """Escapes dollar signs in a file's text, so that they start no formula, and drops what cannot be printed."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else " " for letter in text).replace("$", r"\$")
 
 
 class Drawing(NamedTuple):
@@ -161,7 +162,7 @@ class WheelStyle:
         narrow, wide = min(NESTED_WIDTHS.values()), max(NESTED_WIDTHS.values())
         widths = {n: narrow + (wide - narrow) * row / max(rows[-1], 1) for n, row in zip(backwards, rows, strict=True)}
         colours = dict(zip(names, cycle(COLOURS.values()), strict=False))
-        return cls(names, {name: name for name in names}, colours, widths, (left, right))
+        return cls(names, {name: plain(name) for name in names}, colours, widths, (left, right))
 
     @property
     def share(self) -> str:
@@ -243,7 +244,8 @@ def save_figures(
             figure = figures.Figure(figsize=(width, height))
             draw(figure)
             paths.append(folder / f"{name}.{file_format}")
-            figure.savefig(paths[-1])
+            with written_whole(paths[-1]) as draft:
+                figure.savefig(draft)
     return paths
 
 

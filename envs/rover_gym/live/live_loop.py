@@ -92,7 +92,7 @@ class LiveLoop:
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._rover, self._folder, self._mcap, self._clock = rover, Path(recordings), mcap, clock
-        self._commands: queue.Queue[Command] = queue.Queue(MOST_WAITING)
+        self._commands: queue.Queue[tuple[Command, Callable[[str], None]]] = queue.Queue(MOST_WAITING)
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._past = Past()
         self._recording: LiveRecording | None = None
@@ -108,8 +108,13 @@ class LiveLoop:
         self._look()
         self.state = self._current()
 
-    def send(self, command: Command) -> None:
+    def send(self, command: Command, failed: Callable[[str], None] | None = None) -> None:
         """Hands in a command.
+
+        Args:
+            command: The command.
+            failed: Called in the drive's thread with the reason if the command cannot be carried out; by default
+                `LiveState.notice` has it.
 
         Raises:
             CommandError: Too many commands wait, or the loop has stopped; this one is dropped.
@@ -117,7 +122,7 @@ class LiveLoop:
         if self._stopping.is_set():
             refuse(CommandError, "command", command, "was not executed: the drive is over")
         try:
-            self._commands.put_nowait(command)
+            self._commands.put_nowait((command, self.tell if failed is None else failed))
         except queue.Full:
             refuse(CommandError, "command", command, f"was not executed: {MOST_WAITING} commands are waiting already")
         self._wake.set()
@@ -198,13 +203,13 @@ class LiveLoop:
     def _obey(self) -> None:
         while True:
             try:
-                command = self._commands.get_nowait()
+                command, failed = self._commands.get_nowait()
             except queue.Empty:
                 return
             try:
                 self._carry_out(command)
             except EXPECTED as error:
-                self.tell(str(error))
+                failed(str(error))
 
     def _carry_out(self, command: Command) -> None:
         match command:

@@ -6,6 +6,7 @@ import asyncio
 import json
 import math
 import time
+from contextlib import suppress
 from itertools import cycle, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,8 +33,8 @@ STATES = 10.0
 #: Most pages at a time.
 MOST_PAGES = 16
 TITLE = "rover live"
-#: With this message a page asks for the scene and its frames, binary.
-WATCH = '{"do":"watch"}'
+#: With these commands a page asks for the wheel, and for the scene and its frames, binary.
+TAKE, WATCH = {"do": "take"}, {"do": "watch"}
 #: What the page may do besides showing itself: talk with its own server.
 CONNECTION = "'self'"
 
@@ -89,16 +90,19 @@ class LiveServer:
         self._pages.append(page)
         if self._at_wheel is None:
             self._at_wheel = page
-        tasks = {"tell": asyncio.ensure_future(self._tell(page))}
+        errors: asyncio.Queue[str] = asyncio.Queue()
+        tasks = {
+            "tell": asyncio.ensure_future(self._tell(page)),
+            "answer": asyncio.ensure_future(_answer(page, errors)),
+        }
         try:
             await page.send(json.dumps({"choices": self._offer()}))
             async for message in page:
-                if message == WATCH:
-                    tasks.setdefault("show", asyncio.ensure_future(self._show(page)))
-                    continue
-                answer = self._hear(page, message)
-                if answer:
-                    await page.send(json.dumps({"error": answer}))
+                try:
+                    if self._hear(page, message, errors) and "show" not in tasks:
+                        tasks["show"] = asyncio.ensure_future(self._show(page))
+                except RoverGymError as error:
+                    errors.put_nowait(str(error))
         except closed:
             pass  # the browser has vanished: the command that it gave last runs out
         finally:
@@ -108,27 +112,37 @@ class LiveServer:
             if self._at_wheel is page:
                 self._at_wheel = None
 
-    def _hear(self, page: Any, message: object) -> str:
-        """Carries out a message; returns what is wrong with it, "" for nothing."""
-        try:
-            entries = read_message(message)
-            if entries["do"] == "take":
-                self._at_wheel = page
-                return ""
-            command = command_of(entries)
-            if self._at_wheel is None:
-                self._at_wheel = page
-            if self._at_wheel is not page:
-                refuse(
-                    CommandError,
-                    "do",
-                    entries["do"],
-                    "is allowed on the page in control only, and another page is in control",
-                )
-            self._loop.send(command)
-        except RoverGymError as error:
-            return str(error)
-        return ""
+    def _hear(self, page: Any, message: object, errors: asyncio.Queue[str]) -> bool:
+        """Carries out a message; returns whether the page asks for the scene.
+
+        What the drive refuses later, when it carries out the command, goes to `errors`.
+
+        Raises:
+            RoverGymError: The message is none, or not from the page at the wheel.
+        """
+        entries = read_message(message)
+        if entries == TAKE:
+            self._at_wheel = page
+        if entries in (TAKE, WATCH):
+            return entries == WATCH
+        command = command_of(entries)
+        if self._at_wheel is None:
+            self._at_wheel = page
+        if self._at_wheel is not page:
+            refuse(
+                CommandError,
+                "do",
+                entries["do"],
+                "is allowed on the page in control only, and another page is in control",
+            )
+        server = asyncio.get_running_loop()
+
+        def tell(error: str) -> None:
+            with suppress(RuntimeError):  # the server has stopped
+                server.call_soon_threadsafe(errors.put_nowait, error)
+
+        self._loop.send(command, tell)
+        return False
 
     async def _tell(self, page: Any) -> None:
         """Sends the states to a page; a page that is slow gets fewer."""
@@ -187,6 +201,16 @@ class LiveServer:
             "gravity": list(GRAVITY),
             "rock": list(ROCK_RADII),
         }
+
+
+async def _answer(page: Any, errors: asyncio.Queue[str]) -> None:
+    """Tells a page what was wrong with its messages."""
+    closed = require("websockets.exceptions", "replay").ConnectionClosed
+    try:
+        while True:
+            await page.send(json.dumps({"error": await errors.get()}))
+    except closed:
+        return
 
 
 def _plain(state: LiveState) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from rover_gym.files import check_xml, write_whole
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
@@ -202,12 +203,13 @@ def write_xml(root: ET.Element, path: object) -> None:
     """Writes an indented file.
 
     Raises:
-        ModelError: `path` is not a path.
+        ModelError: `path` is not a path, or a name has a character that XML cannot hold.
         OSError: The file cannot be written.
     """
+    check_xml(root, ModelError)
     ET.indent(root)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-    checked_path(path).write_text(text, encoding="utf-8")
+    write_whole(checked_path(path), text)
 
 
 JOINTS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}

@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
+from rover_gym.files import write_whole
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.file_writing import write_mjcf, write_urdf
 from rover_gym.models.import_report import ImportReport
@@ -49,7 +50,7 @@ def to_file(self: RoverModel, path: str | os.PathLike[str]) -> None:  # noqa: D4
     Raises:
         OSError: The file cannot be written.
     """
-    checked_path(path).write_text(self.to_text(), encoding="utf-8", newline="\n")
+    write_whole(checked_path(path), self.to_text())
 
 
 def from_urdf(

@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.files import written_whole
 from rover_gym.policy.arc_driver import N_ARCS, SIZES, ArcObservation
 from rover_gym.policy.network_files import LARGEST_WEIGHT, PolicyError, read_arrays
 from rover_gym.policy.scan_policy import SCAN
@@ -63,7 +65,9 @@ class ArcNetwork:
 
     def save(self, path: Path) -> None:
         """Writes the arrays in half precision as a compressed `.npz` file."""
-        np.savez_compressed(path, **{name: value.astype(np.float16) for name, value in self.arrays.items()})  # type: ignore[arg-type]
+        rows: dict[str, Any] = {name: value.astype(np.float16) for name, value in self.arrays.items()}
+        with written_whole(path) as draft, draft.open("wb") as file:
+            np.savez_compressed(file, **rows)
 
     @classmethod
     def read(cls, path: Path) -> "ArcNetwork":

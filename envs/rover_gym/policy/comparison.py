@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
+from rover_gym.files import write_whole
 from rover_gym.mechanics import RoverModel
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.arc_network_policy import ARCS_FILE
@@ -114,7 +115,7 @@ def drive_or_reuse(
         return kept
     drives = drive(contender.make, seeds, arguments=environment, progress=progress)
     plain = {"key": plain_key, "drives": [asdict(drive) for drive in drives]}
-    path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
+    write_whole(path, json.dumps(plain) + "\n")
     return drives
 
 

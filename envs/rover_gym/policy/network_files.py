@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.files import written_whole
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.policy.features import LARGEST_FEATURE
 from rover_gym.validation import refuse
@@ -104,7 +105,8 @@ class Network:
         layers |= {f"bias_{i}": bias for i, bias in enumerate(self.biases)}
         layers |= {"mean": self.mean, "deviation": self.deviation}
         rows: dict[str, Any] = {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in layers.items()}
-        np.savez_compressed(path, **rows)
+        with written_whole(path) as draft, draft.open("wb") as file:
+            np.savez_compressed(file, **rows)
 
     @classmethod
     def read(cls, path: Path) -> "Network":

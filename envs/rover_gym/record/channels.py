@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 
 FORMAT = "rover-gym trajectory"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
+READ_VERSIONS = (3, 4)  # 3 has no checksum of attributes
 #: HDF5 format version: the oldest with checksummed metadata; every HDF5 since 2008 reads it.
 LIBRARY = "v108"
 TERRAIN = "terrain"  # the group that holds the ground

@@ -31,6 +31,7 @@ from rover_gym.record.channels import (
     write_attribute,
     write_description,
 )
+from rover_gym.record.checksums import CHECKSUM, checksum, sum_of_array, sum_of_attributes
 from rover_gym.record.steady_file import FileInUseError, SteadyFile, uninterrupted
 from rover_gym.record.stored_terrain import write_terrain
 from rover_gym.record.trajectory import read_trajectory
@@ -51,7 +52,9 @@ class Recorder:
     error, and the file stays as the previous flush left it. The file is locked until the recorder is closed.
 
     Args:
-        path: The file to create, with its folder. An existing file is replaced unless it is being recorded or read.
+        path: The file to create, with its folder. An existing file is replaced when the recorder is closed, unless it
+            is being recorded or read; until then the rows are in `NAME.part` beside it, and a full disk leaves it as
+            it was.
         channels: The channels of a row.
         attributes: Metadata of the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
             `describe` takes them from a simulation.
@@ -91,6 +94,7 @@ class Recorder:
             channel.name: f"{FRAMES}/{channel.name}" if channel.packed else channel.name for channel in channels
         }
         self._process = os.getpid()
+        self._n_rows, self._attributes, self._sums = 0, -1, dict.fromkeys(self._pending, 0)
         self._disk = _new_file(self.path)
         with uninterrupted():
             self._file: h5py.File = h5py.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
@@ -99,7 +103,7 @@ class Recorder:
             try:
                 self._begin(channels, facts, terrain)
             except BaseException:
-                self._release()
+                self._give_up()
                 raise
 
     def _begin(self, channels: Sequence[Channel], facts: Mapping[str, Any], terrain: Terrain | None) -> None:
@@ -119,8 +123,12 @@ class Recorder:
                 **(packing if channel.packed else {}),
             )
             write_description(data, channel.unit, channel.description, channel.columns)
+        for channel in channels:
+            if channel.packed:
+                del self._sums[channel.name]
         if terrain is not None:
-            write_terrain(self._file.create_group(TERRAIN), terrain)
+            sums = write_terrain(self._file.create_group(TERRAIN), terrain)
+            self._sums |= {f"{TERRAIN}/{name}": value for name, value in sums.items()}
         self._commit()
 
     def append(self, row: Mapping[str, npt.ArrayLike]) -> None:
@@ -155,10 +163,15 @@ class Recorder:
         with uninterrupted():
             for name, rows in self._pending.items():
                 if rows:
+                    values = np.array(rows)
                     data = self._file[self._places[name]]
                     data.resize(data.shape[0] + len(rows), axis=0)
-                    data[-len(rows) :] = np.array(rows)
+                    data[-len(rows) :] = values
+                    if name in self._sums:
+                        self._sums[name] = sum_of_array(values, self._sums[name])
+                    self._n_rows = len(data)
                     rows.clear()
+                    self._disk.is_worth = True
             self._commit()
 
     def note(self, **attributes: str | float) -> None:
@@ -171,6 +184,7 @@ class Recorder:
         with uninterrupted():
             for key, value in storable(attributes).items():
                 write_attribute(self._file, key, value)
+            self._attributes = -1
 
     def close(self) -> None:
         """Writes the buffered rows and marks the file complete; a second call does nothing.
@@ -182,6 +196,8 @@ class Recorder:
             if self._release.alive:
                 self.flush()
                 self._file.attrs["complete"] = True
+                self._attributes = -1
+                self._disk.is_worth = True
                 self._commit()
                 self._release()
 
@@ -204,17 +220,27 @@ class Recorder:
             refuse(RecordingError, "recorder", str(self.path), "belongs to the process that opened it")
 
     def _commit(self) -> None:
+        if self._attributes < 0:  # they have changed
+            self._attributes = sum_of_attributes(self._file)
+        self._file.attrs.modify(CHECKSUM, checksum(self._n_rows, self._attributes, self._sums))
         try:
             self._file.flush()
             self._disk.commit()
         except OSError as error:
-            self._release()
-            reason = error.strerror or str(error)
-            stopped = RecordingError(
-                f"{self.path}: the recording stopped: {reason}; {_rows_on_disk(self.path)} rows are on the disk"
-            )
+            replaces = self._disk.replaces
+            self._give_up()
+            rows = 0 if replaces else _rows_on_disk(self.path)
+            kept = "the earlier file is as it was" if replaces else f"{rows} rows are on the disk"
+            stopped = RecordingError(f"{self.path}: the recording stopped: {error.strerror or str(error)}; {kept}")
             stopped.field, stopped.value = "path", str(self.path)
             raise stopped from error
+
+    def _give_up(self) -> None:
+        """Closes the file, and leaves an older one in its place."""
+        if self._release.detach() is not None:
+            with uninterrupted():
+                self._file.close()
+                self._disk.give_up()
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -3,6 +3,8 @@
 HDF5 aborts the process if it cannot write a file that it closes, for example on a full disk. Here it writes to memory,
 and `commit` writes to the disk: it first reserves the missing space, then writes the new pages, then the changed ones.
 Without enough space the file stays as the last commit left it. The file is locked while it is open.
+
+A file that is to replace an older one is written as `NAME.part` beside it, and takes its place when it is closed.
 """
 
 from __future__ import annotations
@@ -10,13 +12,14 @@ from __future__ import annotations
 import errno
 import os
 import signal
-import stat
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING
+
+from rover_gym.files import regular_place
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,6 +29,9 @@ if sys.platform != "win32":
     import fcntl
 
 PAGE = 1 << 16  # bytes that are buffered and written as a unit
+
+#: Signals that end a program by an exception, where it has a handler for them.
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 NO_LOCKS = frozenset({errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS})  # file system without locks
 
@@ -51,10 +57,14 @@ def lock(descriptor: int, *, shared: bool = False) -> None:
 
 
 class SteadyFile:
-    """A new file, or an existing one emptied, with the file methods that h5py needs.
+    """A new file, with the file methods that h5py needs.
 
     Args:
-        path: The file to create, or to replace unless it is locked.
+        path: The file to create. An older file stays until this one is closed, which replaces it.
+
+    Attributes:
+        place: Where the bytes are while it is open: the file itself, or `NAME.part` beside an older one.
+        is_worth: Whether it holds something for which an older file may go.
 
     Raises:
         FileInUseError: The file is locked; it has not changed.
@@ -62,15 +72,20 @@ class SteadyFile:
     """
 
     def __init__(self, path: Path) -> None:
-        if path.exists() and not stat.S_ISREG(path.stat().st_mode):  # opening a pipe would wait for its reader
-            raise OSError(errno.EINVAL, "is not a regular file")
-        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
+        self._path = self.place = regular_place(path)  # opening a pipe would wait for its reader
+        self._descriptor = _open_locked(self._path)
+        self._older: int | None = None
         try:
-            lock(self._descriptor)
+            if os.fstat(self._descriptor).st_size > 0:
+                self._older = self._descriptor
+                self.place = self._path.with_name(f"{self._path.name}.part")
+                self._descriptor = _open_locked(self.place)
             os.ftruncate(self._descriptor, 0)
         except OSError:
-            os.close(self._descriptor)
+            self._close_descriptors()
             raise
+        self.is_worth = False
+        self._process = os.getpid()
         self._pages: dict[int, bytearray] = {}  # pages changed since the last commit
         self._place = self._size = self._committed = 0
 
@@ -143,12 +158,37 @@ class SteadyFile:
         self._committed = self._size
         self._pages.clear()
 
+    @property
+    def replaces(self) -> bool:
+        """Whether there is an older file."""
+        return self._older is not None
+
     def close(self) -> None:
-        """Closes the file as the last commit left it."""
-        if self._descriptor >= 0:
-            os.close(self._descriptor)
-            self._descriptor = -1
-            self._pages.clear()
+        """Closes the file as the last commit left it. It replaces an older one if it is worth it."""
+        self._end(keep=self._committed > 0 and (self.is_worth or not self.replaces))
+
+    def give_up(self) -> None:
+        """Closes a file that could not be written: an older one stays, and a new one stays as last committed."""
+        self._end(keep=self._committed > 0 and not self.replaces)
+
+    def discard(self) -> None:
+        """Closes the file and removes it; an older one stays."""
+        self._end(keep=False)
+
+    def _end(self, *, keep: bool) -> None:
+        is_open, is_own = self._descriptor >= 0, os.getpid() == self._process
+        if is_open:
+            self._close_descriptors()
+        self._descriptor = -1
+        self._pages.clear()
+        if is_own and not keep and (is_open or not self.replaces):
+            self.place.unlink(missing_ok=True)
+        elif is_own and is_open and self.replaces:
+            self.place.replace(self._path)
+
+    def _close_descriptors(self) -> None:
+        for descriptor in {self._descriptor, self._descriptor if self._older is None else self._older}:
+            os.close(descriptor)
 
     def _page(self, number: int) -> bytearray:
         """The present content of a page; for a changed page, the buffer itself."""
@@ -177,6 +217,16 @@ class SteadyFile:
             _write_all(self._descriptor, memoryview(zeros), start)
 
 
+def _open_locked(path: Path) -> int:
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
+    try:
+        lock(descriptor)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
 def _write_all(descriptor: int, data: memoryview, place: int) -> None:
     os.lseek(descriptor, place, os.SEEK_SET)
     while data:
@@ -185,20 +235,22 @@ def _write_all(descriptor: int, data: memoryview, place: int) -> None:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """A block after which an interrupt (SIGINT) that came within it is handled.
+    """A block after which a signal that ends the program is handled, if it came within the block.
 
     HDF5 crashes the process when a callback that writes for it ends with an exception. Blocks may be nested. Outside
     the main thread, which alone handles signals, the block does nothing.
     """
-    handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield
-        return
-    held: list[FrameType | None] = []
-    signal.signal(signal.SIGINT, lambda _, frame: held.append(frame))
+    handlers = {}
+    if threading.current_thread() is threading.main_thread():
+        known = {one: signal.getsignal(one) for one in ENDING}
+        handlers = {one: handler for one, handler in known.items() if callable(handler)}
+    held: list[tuple[int, FrameType | None]] = []
+    for one in handlers:
+        signal.signal(one, lambda number, frame: held.append((number, frame)))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, handler)
-        if held:
-            handler(signal.SIGINT, held[-1])
+        for one, handler in handlers.items():
+            signal.signal(one, handler)
+        for number, frame in held[:1]:
+            handlers[signal.Signals(number)](number, frame)

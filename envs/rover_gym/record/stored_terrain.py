@@ -17,6 +17,7 @@ import numpy.typing as npt
 from rover_gym.ground import parts_of, plane_of, spheres_of, surfaces_of
 from rover_gym.mechanics import HeightField, Plane, SphereField, Terrain, TriangleMesh
 from rover_gym.record.channels import write_attribute, write_description, write_texts
+from rover_gym.record.checksums import sum_of_array
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -48,8 +49,8 @@ def is_stored(name: str) -> bool:
     return name in PLAIN_GROUND or SURFACE.fullmatch(name) is not None
 
 
-def write_terrain(group: h5py.Group, terrain: Terrain) -> None:
-    """Stores a terrain in an HDF5 group."""
+def write_terrain(group: h5py.Group, terrain: Terrain) -> dict[str, int]:
+    """Stores a terrain in an HDF5 group, and returns the checksums of its data sets by their names."""
     fields = [part for part in parts_of(terrain) if isinstance(part, SphereField)]
     plane, (centres, radii), surfaces = plane_of(terrain), spheres_of(terrain), surfaces_of(terrain)
     write_attribute(group, "kind", "surface" if surfaces else "sphere_field" if len(radii) else "plane")
@@ -77,6 +78,7 @@ def write_terrain(group: h5py.Group, terrain: Terrain) -> None:
             data = _write(group, f"{name}_vertices", surface.vertices, "m", "vertices of the mesh, world", axes)
             _write(group, f"{name}_triangles", surface.triangles, "1", "triangles, by the numbers of their vertices")
         write_attribute(data, "material", surface.material)
+    return {name: sum_of_array(data[()]) for name, data in group.items()}
 
 
 def _write(

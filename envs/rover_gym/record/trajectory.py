@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +17,9 @@ import numpy.typing as npt
 from rover_gym.mechanics import RoverGymError, Terrain, Union
 from rover_gym.record.channels import (
     FORMAT,
-    FORMAT_VERSION,
     FRAMES,
     OBJECTS,
+    READ_VERSIONS,
     SIGNATURE,
     TERRAIN,
     RecordingError,
@@ -26,6 +27,7 @@ from rover_gym.record.channels import (
     refuse_field,
     sound,
 )
+from rover_gym.record.checksums import CHECKSUM, SINCE, checksum, sum_of_array, sum_of_attributes
 from rover_gym.record.steady_file import FileInUseError, lock
 from rover_gym.record.stored_terrain import MATERIALS, Stored, is_stored, stored_parts
 from rover_gym.validation import refuse
@@ -123,13 +125,15 @@ class _Reader:
     def __init__(self, h5py: Any, path: Path, size: int) -> None:
         self._h5py, self._path, self._size = h5py, path, size
         self._room = LARGEST_EXPANSION * size  # bytes that may still be read
+        self._sums: dict[str, int] = {}  # of the ground's data sets
 
     def trajectory(self, file: h5py.File) -> Trajectory:
         if "format" not in file.attrs or "format_version" not in file.attrs:
             refuse(RecordingError, "path", str(self._path), f"is not a {FORMAT}")
         version = self._attribute(file, "format_version")
-        if version != FORMAT_VERSION:
-            reason = f"is a {FORMAT} of version {version}, this rover-gym reads {FORMAT_VERSION}: record it again"
+        if version not in READ_VERSIONS:
+            read = " and ".join(map(str, READ_VERSIONS))
+            reason = f"is a {FORMAT} of version {version}, this rover-gym reads {read}: record it again"
             refuse(RecordingError, "path", str(self._path), reason)
         if self._attribute(file, "format") != FORMAT:
             refuse(RecordingError, "path", str(self._path), f"is not a {FORMAT}")
@@ -144,16 +148,35 @@ class _Reader:
         if not sets:
             refuse_field(self._path, "file", None, "holds no data set")
         rows = min(len(data) for data in sets.values())  # a kill during a flush leaves some data sets longer
+        stated = self._stated(file, version)
+        if stated is not None:
+            if not 0 <= stated[0] <= rows:
+                self._refuse_sum()
+            rows = int(stated[0])
         units = {name: self._attribute(data, "unit") for name, data in sets.items()}
         for name, unit in units.items():
             if not isinstance(unit, str):
                 refuse_field(self._path, f"{name}.unit", unit, "must be text")
-        return Trajectory(
-            data={name: np.asarray(data[:rows], dtype=np.float64) for name, data in sets.items()},
-            units=units,
-            attributes={key: self._decoded(key, self._attribute(file, key)) for key in file.attrs},
-            terrain=terrain,
-        )
+        attributes = {key: self._decoded(key, self._attribute(file, key)) for key in file.attrs if key != CHECKSUM}
+        arrays = {name: np.asarray(data[:rows], dtype=np.float64) for name, data in sets.items()}
+        if stated is not None:
+            sums = self._sums | {name: sum_of_array(values) for name, values in arrays.items()}
+            if not np.array_equal(stated, checksum(rows, sum_of_attributes(file, self._size), sums)):
+                self._refuse_sum()
+        return Trajectory(data=arrays, units=units, attributes=attributes, terrain=terrain)
+
+    def _stated(self, file: h5py.File, version: object) -> npt.NDArray[np.int64] | None:
+        """The file's checksum; None for a file of a version that has none."""
+        if version < SINCE:  # type: ignore[operator]
+            return None
+        stated = np.asarray(self._attribute(file, CHECKSUM))
+        if stated.shape != (3,) or stated.dtype != np.int64:
+            self._refuse_sum()
+        return stated
+
+    def _refuse_sum(self) -> NoReturn:
+        reason = "does not fit: the file is damaged, or another program has changed it"
+        refuse_field(self._path, CHECKSUM, "another one", reason)
 
     def frames(self, file: h5py.File, name: str, rows: npt.ArrayLike | None) -> npt.NDArray[np.float32]:
         if FRAMES not in file or name not in self._item(file, FRAMES):
@@ -208,15 +231,21 @@ class _Reader:
         whole = math.prod(data.chunks) * data.dtype.itemsize + 4 * data.fletcher32
         packed = data.compression is not None
         wrong: list[int] = []
+        places: set[tuple[int, ...]] = set()
 
         def look(chunk: Any) -> None:
             fits = 4 < chunk.size <= self._size if packed else chunk.size == whole
             if not fits or chunk.byte_offset + chunk.size > self._size:
                 wrong.append(chunk.size)
+            if chunk.filter_mask == 0:  # no filter was left out, so that the checksum is read
+                places.add(chunk.chunk_offset)
 
         data.id.chunk_iter(look)
         if wrong:
             refuse_field(self._path, field, wrong[0], "has a chunk that is not in the file, of so many bytes")
+        steps = [range(0, n, step) for n, step in zip(data.shape, data.chunks, strict=True)]
+        if len(places) < math.prod(map(len, steps)) or not places >= set(itertools.product(*steps)):
+            refuse_field(self._path, field, len(places), "lacks chunks, or their checksums; it has")
 
     def _take(self, field: str, shape: tuple[int, ...], itemsize: int) -> None:
         size = math.prod(shape) * itemsize
@@ -268,6 +297,7 @@ class _Reader:
                     refuse_field(self._path, f"{TERRAIN}/{name}", "a group", "must be an array of floats")
                 self._check(f"{TERRAIN}/{name}", data, single=name.endswith("_heights"))
                 values = np.asarray(data[()], dtype=f"f{data.dtype.itemsize}")
+                self._sums[f"{TERRAIN}/{name}"] = sum_of_array(values)
                 given[name] = Stored(values, {key: self._attribute(data, key) for key in MATERIALS})
         try:
             parts = stored_parts(given)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
-from collections.abc import Mapping
+import struct
+import subprocess
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 from rover_gym.extras import MissingExtraError
+from rover_gym.files import written_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import known_keys, refuse, vector, whole
 
@@ -110,11 +115,49 @@ def _check_camera(field: str, value: object) -> Camera:
 QUALITY = 7  # of imageio-ffmpeg's 0 to 10
 
 
+@contextmanager
+def whole_film(path: str | Path) -> Iterator[Path]:
+    """Gives the block an mp4 file to encode into, which takes the place of `path` when the block ends.
+
+    Raises:
+        OSError: The encoder did not finish the film, as on a full disk; an older file stays as it was.
+    """
+    try:
+        with written_whole(path) as draft:
+            yield draft
+            if not _is_finished(draft):
+                raise _failed(path)
+    except (BrokenPipeError, subprocess.CalledProcessError) as error:
+        raise _failed(path) from error
+
+
+def _failed(path: str | Path) -> OSError:
+    return OSError(errno.EIO, "the film was not finished; is the disk full?", str(path))
+
+
+def _is_finished(film: Path) -> bool:
+    """Whether an mp4 file has all its parts: the encoder may end without an error and leave half of one."""
+    kinds, place, size = set(), 0, film.stat().st_size
+    with film.open("rb") as file:
+        while place < size:
+            file.seek(place)
+            length, kind = struct.unpack(">I4s", file.read(8).ljust(8, b"\0"))
+            if length == 1:
+                (length,) = struct.unpack(">Q", file.read(8).ljust(8, b"\0"))
+            if length < 8:
+                return False
+            kinds.add(kind)
+            place += length
+    return place == size and b"moov" in kinds
+
+
 class VideoWriter:
     """Writes frames of one size to an mp4 file; a context manager.
 
+    The file is there once it is finished; an existing one is replaced then. An error leaves the existing one.
+
     Args:
-        path: The file to write; an existing file is replaced. Its folder is created with the first frame.
+        path: The file to write. Its folder is created with the first frame.
         fps: Frames per second.
 
     Raises:
@@ -133,14 +176,15 @@ class VideoWriter:
         self._fps = fps
         self._write_frames: Any = imageio_ffmpeg.write_frames
         self._writer: Generator[None, npt.NDArray[np.uint8] | None, None] | None = None
+        self._written = ExitStack()
 
     def append(self, frame: npt.NDArray[np.uint8]) -> None:
         """Adds a frame (height, width, 3) uint8 with even height and width."""
         if self._writer is None:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+            draft = self._written.enter_context(whole_film(self.path))
             height, width, _ = frame.shape
             self._writer = self._write_frames(
-                str(self.path),
+                str(draft),
                 (width, height),
                 fps=self._fps,
                 quality=QUALITY,
@@ -148,10 +192,21 @@ class VideoWriter:
                 ffmpeg_log_level="error",
             )
             self._writer.send(None)
-        self._writer.send(frame)
+        try:
+            self._writer.send(frame)
+        except OSError as error:  # the encoder has ended, and its words name the draft
+            raise _failed(self.path) from error
 
     def close(self) -> None:
-        """Finishes the file."""
+        """Finishes the file.
+
+        Raises:
+            OSError: The disk is full.
+        """
+        self._end()
+        self._written.close()
+
+    def _end(self) -> None:
         if self._writer is not None:
             self._writer.close()
             self._writer = None
@@ -162,4 +217,5 @@ class VideoWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        self._end()
+        self._written.__exit__(kind, error, trace)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.extras import require
+from rover_gym.files import write_whole
 from rover_gym.mechanics import __version__
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, Colour, Part, sphere_mesh
 from rover_gym.replay.scenery import coloured_meshes, goal_parts, ground_tiles, parts_by_solid, spheres, surfaces
@@ -58,10 +59,7 @@ def write_gltf(run: RoverRun, path: str | Path) -> Path:
             writer.add_node(f"sphere_{i}", ball, translation=centre.tolist(), scale=[float(radius)] * 3)
     turns = continuous(quaternions(run.rotations))[..., [1, 2, 3, 0]]
     writer.add_motion(run.title, run.time - run.time[0], run.positions, turns)
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(writer.binary())
-    return path
+    return write_whole(path, writer.binary())
 
 
 class _Writer:

@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rover_gym.files import written_whole
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.mechanics import OptionError
 from rover_gym.planar.planar_run import PlanarRun
@@ -69,11 +70,9 @@ def write_page(run: SavedRun, path: str | Path, *, follow: bool = True, ghost: R
         "samples": SAMPLES,
         "pieces": -(-run.n_frames // SAMPLES),
     }
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8") as file:
+    with written_whole(path) as draft, draft.open("w", encoding="utf-8") as file:
         file.writelines(page_parts(run.title, "recorded", _packed(scene.message(), scene.pieces(run.n_frames))))
-    return path
+    return Path(path)
 
 
 def page_parts(title: str, kind: str, contents: Iterable[str] = (), more: str = "") -> Iterator[str]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.files import written_whole
 from rover_gym.rendering.appearance import (
     GROUND_COLOUR,
     GROUND_COLOUR_2,
@@ -59,12 +60,10 @@ def write_vrml(run: RoverRun, path: str | Path) -> Path:
     Raises:
         OSError: The file cannot be written.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="\n") as file:
+    with written_whole(path) as draft, draft.open("w", encoding="utf-8", newline="\n") as file:
         for line in _lines(run):
             file.write(line + "\n")
-    return path
+    return Path(path)
 
 
 def _lines(run: RoverRun) -> Iterator[str]:

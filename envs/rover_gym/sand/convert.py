@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.extras import require
+from rover_gym.files import written_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.sand.measurements import COLUMNS
 
@@ -37,7 +38,7 @@ def convert_runs(source: Path, target: Path, columns: Sequence[str], wheel: str)
         if column and column not in known:
             raise OptionError(f"column: {source.name} has no column {column!r}; it has {', '.join(known)}")
     rows = [_row(cells, terms, wheel, f"{source.name}: {where}") for where, cells in lines]
-    with target.open("w", newline="", encoding="utf-8") as file:
+    with written_whole(target) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         writer.writerows(rows)

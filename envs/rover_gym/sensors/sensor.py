@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from typing import TypeAlias
 
@@ -39,8 +39,8 @@ class Mount:
         OptionError: A number is not finite, or the position is beyond 1 km.
     """
 
-    solid: str | None = None
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    solid: str | None = field(default=None, kw_only=False)
+    position: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), kw_only=False)
     heading_deg: float = 0.0
     pitch_deg: float = 0.0
     roll_deg: float = 0.0
@@ -206,9 +206,9 @@ class Sensor(ABC):
         if self.rate is not None:
             number("rate", self.rate, above=0.0)
         self._keep("latency", span("latency", self.latency, at_least=0.0, at_most=MAX_LATENCY))
-        for field in fields(self):
-            if field.name == "mount" and not isinstance(getattr(self, field.name), Mount):
-                refuse(OptionError, "mount", getattr(self, field.name), "must be a Mount")
+        for one in fields(self):
+            if one.name == "mount" and not isinstance(getattr(self, one.name), Mount):
+                refuse(OptionError, "mount", getattr(self, one.name), "must be a Mount")
 
     def _keep(self, field: str, value: object) -> None:
         """Sets a field to its checked value."""

@@ -152,3 +152,39 @@ pub fn within(field: impl Fn() -> String, value: f64, range: Range) -> Result<f6
         value,
     })
 }
+
+/// Longest number that a message writes out: a double with all its digits is no longer.
+const MOST_DIGITS: usize = 24;
+
+/// A message whose long numbers have an exponent: `1e300` instead of 301 digits.
+#[must_use]
+pub fn legible(message: &str) -> String {
+    let is_part = |c: char| c.is_ascii_digit() || c == '.';
+    let mut written = String::with_capacity(message.len());
+    let mut rest = message;
+    while let Some(begin) = rest.find(is_part) {
+        let (before, from) = rest.split_at(begin);
+        let (number, after) = from.split_at(from.find(|c: char| !is_part(c)).unwrap_or(from.len()));
+        written.push_str(before);
+        match number.parse::<f64>() {
+            Ok(value) if number.len() > MOST_DIGITS => written += &format!("{value:?}"),
+            _ => written.push_str(number),
+        }
+        rest = after;
+    }
+    written + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_number_is_written_with_an_exponent() {
+        let large = format!("speed: is {}, not 3.5 m", -1e300);
+        assert_eq!(legible(&large), "speed: is -1e300, not 3.5 m");
+        assert_eq!(legible(&format!("is {}", 1e-300)), "is 1e-300");
+        let short = "1.2.3 of 0.30000000000000004.";
+        assert_eq!(legible(short), short);
+    }
+}

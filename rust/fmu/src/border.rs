@@ -17,6 +17,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::ptr;
 
+use rover_core::quantity::legible;
+
 use crate::refusal::Refusal;
 use crate::saved::Saved;
 use crate::scene_file::SceneFile;
@@ -48,7 +50,7 @@ impl Log {
             Status::Fatal => c"logStatusFatal",
             _ => c"logStatusError",
         };
-        let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
+        let text = CString::new(legible(message).replace('\0', " ")).unwrap_or_default();
         if let Some(write) = self.write {
             // SAFETY: the importer's own function and environment; both texts outlive the call.
             unsafe { write(self.environment, status, category.as_ptr(), text.as_ptr()) }

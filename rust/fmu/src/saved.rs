@@ -1,5 +1,6 @@
 //! The state of a unit, which a master keeps, restores, and writes as bytes.
 
+use rover_core::simulation::sealed::{seal, unseal};
 use rover_core::simulation::{RoverScene, Snapshot};
 use serde::{Deserialize, Serialize};
 
@@ -23,13 +24,14 @@ pub struct Saved {
 }
 
 impl Saved {
-    /// As bytes, from which [`Self::from_bytes`] reads the same.
+    /// The state as bytes with a checksum, for [`Self::from_bytes`].
     pub fn to_bytes(&self) -> Result<Vec<u8>, Refusal> {
-        postcard::to_stdvec(self).map_err(|e| damaged(&e))
+        Ok(seal(postcard::to_stdvec(self).map_err(|e| damaged(&e))?))
     }
 
     /// Reads exactly these bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Refusal> {
+        let bytes = unseal(bytes).map_err(|e| damaged(&e))?;
         let (saved, rest) = postcard::take_from_bytes(bytes).map_err(|e| damaged(&e))?;
         if rest.is_empty() {
             return Ok(saved);
@@ -40,8 +42,8 @@ impl Saved {
     }
 }
 
-fn damaged(e: &postcard::Error) -> Refusal {
+fn damaged(e: &impl ToString) -> Refusal {
     Refusal::State {
-        message: format!("is damaged ({e})"),
+        message: format!("is damaged ({})", e.to_string()),
     }
 }

@@ -8,14 +8,18 @@ use rover_core::geometry::{HeightField, Plane, SphereField, Terrain, TriangleMes
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
 use rover_core::law::materials::{MaterialPair, Materials};
 use rover_core::nalgebra::Vector3;
-use rover_core::simulation::{AnySnapshot, RoverScene, Snapshot};
+use rover_core::simulation::sealed::{checksum, unseal};
+use rover_core::simulation::{AnySnapshot, CommandError, RoverScene, Snapshot};
 use rover_core::solver::{Method, SolverOptions};
 use serde::Deserialize;
 
 use crate::refusal::Refusal;
 
 /// The version of the format that is read.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
+
+/// What follows the scene's text in the file: the checksum of the text.
+const CHECKSUM: &str = "\nCRC-32 ";
 
 /// What a variable of the unit is.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
@@ -147,12 +151,18 @@ impl SceneFile {
             message,
         };
         let text = std::fs::read_to_string(&path).map_err(|e| refuse(e.to_string()))?;
-        let file: File = serde_json::from_str(&text).map_err(|e| refuse(e.to_string()))?;
+        let (text, sum) = (text.rsplit_once(CHECKSUM))
+            .ok_or_else(|| refuse("ends before its checksum".to_owned()))?;
+        if sum != checksum(text.as_bytes()).to_string() {
+            return Err(refuse("is damaged (the checksum does not fit)".to_owned()));
+        }
+        let file: File = serde_json::from_str(text).map_err(|e| refuse(e.to_string()))?;
         if file.format != FORMAT {
             let found = file.format;
             return Err(refuse(format!("format: must be {FORMAT}, is {found}")));
         }
-        let start = match postcard::from_bytes(&file.snapshot) {
+        let snapshot = unseal(&file.snapshot).map_err(|e| refuse(format!("snapshot: {e}")))?;
+        let start = match postcard::from_bytes(snapshot) {
             Ok(AnySnapshot::Rover(start)) => start,
             Ok(_) => return Err(refuse("snapshot: must be a rover's".to_owned())),
             Err(e) => return Err(refuse(format!("snapshot: {e}"))),
@@ -167,6 +177,30 @@ impl SceneFile {
                 .map(|variable| (variable.reference, variable))
                 .collect(),
         })
+    }
+}
+
+impl SceneFile {
+    /// The refusal of a command, which names the variable in the place of the command's entry.
+    pub fn refusal(&self, channel: Channel, error: CommandError) -> Refusal {
+        let CommandError::BeyondLimit {
+            index,
+            value,
+            limit,
+            ..
+        } = error
+        else {
+            return error.into();
+        };
+        let mut variables = self.variables.values();
+        match variables.find(|one| one.channel == channel && one.index == index) {
+            Some(variable) => Refusal::OutOfRange {
+                name: variable.name.clone(),
+                range: format!("within ±{limit} rad"),
+                value: variable.sign * value,
+            },
+            None => error.into(),
+        }
     }
 }
 

@@ -314,10 +314,12 @@ impl Unit {
         // A rover takes both or neither: the steering is the one that it may refuse.
         let rover = anew.as_mut().unwrap_or(&mut self.rover);
         if let Some(steering) = &inputs.steering {
-            rover.set_steering(steering)?;
+            let set = rover.set_steering(steering);
+            set.map_err(|e| self.scene.refusal(Channel::Steering, e))?;
         }
         if let Some(torques) = &inputs.torques {
-            rover.set_wheel_torques(torques)?;
+            let set = rover.set_wheel_torques(torques);
+            set.map_err(|e| self.scene.refusal(Channel::WheelTorque, e))?;
         }
         if let Some(rover) = anew {
             self.rover = rover;

@@ -15,7 +15,7 @@ use crate::errors::{Kind, Result, Value};
 use crate::infos::info;
 use crate::reading::{place, points};
 use crate::simulation::Simulation;
-use crate::snapshot::{damaged, read_bytes};
+use crate::snapshot::{read_bytes, written_bytes};
 
 /// State of an episode of a driving task, beside its simulation.
 ///
@@ -228,11 +228,8 @@ impl EpisodeRun {
 
     /// The state of the episode as bytes, for `from_bytes`.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
-        let state = postcard::to_stdvec(&self.0.state());
-        Ok(PyBytes::new(
-            py,
-            &state.map_err(|e| damaged("episode", &e))?,
-        ))
+        let state = written_bytes(&self.0.state(), "episode")?;
+        Ok(PyBytes::new(py, &state))
     }
 
     /// Restores an episode.

@@ -17,6 +17,7 @@ use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::{ModelError, StateError};
 use rover_core::problem::ProblemError;
+use rover_core::quantity::legible;
 use rover_core::simulation::{BatchError, CommandError, SnapshotError};
 
 /// Result of a call that may raise a Python exception.
@@ -155,7 +156,7 @@ impl From<BorderError> for PyErr {
             };
             let raise = || -> PyResult<PyErr> {
                 let class = classes[error.kind as usize].bind(py);
-                let instance = class.call1((shortened(error.message),))?;
+                let instance = class.call1((shortened(&error.message),))?;
                 instance.setattr("field", error.field)?;
                 let value = match value {
                     Value::Nothing | Value::Raised(_) => py.None(),
@@ -189,7 +190,8 @@ impl From<Infallible> for BorderError {
 }
 
 /// A message that may hold a long text that was given.
-fn shortened(message: String) -> String {
+fn shortened(message: &str) -> String {
+    let message = legible(message);
     if message.chars().count() <= LONGEST_MESSAGE {
         return message;
     }

@@ -4,9 +4,11 @@ use std::hash::{DefaultHasher, Hasher};
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use rover_core::simulation::sealed::{seal, unseal};
 use rover_core::simulation::{
     AnySnapshot, GrainBed, PlanarScene, RoverScene, Scene, Simulation, Snapshot as SnapshotOf,
 };
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::arguments;
@@ -81,10 +83,17 @@ pub fn damaged(field: &str, reason: &impl ToString) -> BorderError {
     Kind::State.error(field, message, Value::Nothing)
 }
 
+/// A value as bytes, for [`read_bytes`].
+pub fn written_bytes<T: Serialize>(value: &T, field: &str) -> Result<Vec<u8>> {
+    let bytes = postcard::to_stdvec(value).map_err(|e| damaged(field, &e))?;
+    Ok(seal(bytes))
+}
+
 /// Reads exactly these bytes.
 pub fn read_bytes<T: DeserializeOwned>(data: &Bound<'_, PyAny>, field: &str) -> Result<T> {
     let wrong = |_| arguments::refused(data, Kind::State, "data", "bytes");
     let data: &[u8] = data.extract().map_err(wrong)?;
+    let data = unseal(data).map_err(|e| damaged(field, &e))?;
     match postcard::take_from_bytes(data).map_err(|e| damaged(field, &e))? {
         (kept, []) => Ok(kept),
         (_, rest) => {
@@ -96,7 +105,7 @@ pub fn read_bytes<T: DeserializeOwned>(data: &Bound<'_, PyAny>, field: &str) -> 
 
 impl Snapshot {
     fn bytes(&self) -> Result<Vec<u8>> {
-        postcard::to_stdvec(&self.0).map_err(|e| damaged("snapshot", &e))
+        written_bytes(&self.0, "snapshot")
     }
 }
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.files import written_whole
 from rover_gym.grains.ball_bed import BallBed
 from rover_gym.mechanics import GrainSimulation, OptionError, Plane, RoverGrainSimulation, RoverModel, Simulation
 from rover_gym.validation import checked, number, refuse
@@ -270,9 +271,8 @@ def write_table(points: Sequence[DataclassInstance], path: str | Path) -> Path:
     rows: list[Any] = list(points)
     if not rows or not all(is_dataclass(point) and not isinstance(point, type) for point in rows):
         refuse(OptionError, "points", points, "must be points of one test, one or more")
-    path = Path(path)
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with written_whole(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(rows[0])], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(point) for point in rows)
-    return path
+    return Path(path)

@@ -2,7 +2,8 @@
 //!
 //! - [`scene`]: what can be simulated, and the data needed to continue; [`stepping`]: the one
 //!   simulation of all scenes;
-//! - [`state`], [`active_contact`]: its state, its contacts; [`any_snapshot`]: what files keep;
+//! - [`state`], [`active_contact`]: its state, its contacts; [`any_snapshot`]: what files keep,
+//!   [`sealed`] with a checksum;
 //! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
 //!   [controls](rover_controls), its [contacts](rover_contacts), its [fast steps](fallback), its
 //!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step by a [`differentiator`],
@@ -63,6 +64,7 @@ mod rover_quick;
 pub mod rover_rays;
 mod rover_sand;
 pub mod scene;
+pub mod sealed;
 pub mod state;
 pub mod step_parameter;
 pub mod stepping;
