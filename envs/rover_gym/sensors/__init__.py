@@ -4,10 +4,12 @@ from rover_gym.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.sensors.inertial_unit import InertialUnit
 from rover_gym.sensors.sensor import Mount, Sensor
 from rover_gym.sensors.sensor_suite import (
+    RoverCourseVectorEnv,
     RoverGrainsVectorEnv,
     SensorObservation,
     SensorSuite,
     SensorVectorObservation,
+    make_course_vector,
     make_grains_rover,
     make_grains_vector,
     make_rover,
@@ -22,12 +24,14 @@ __all__ = [
     "LaserScanner",
     "MotorSensors",
     "Mount",
+    "RoverCourseVectorEnv",
     "RoverGrainsVectorEnv",
     "Sensor",
     "SensorObservation",
     "SensorSuite",
     "SensorVectorObservation",
     "WheelEncoders",
+    "make_course_vector",
     "make_grains_rover",
     "make_grains_vector",
     "make_rover",

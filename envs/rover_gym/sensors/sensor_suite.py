@@ -19,6 +19,7 @@ from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
 from rover_gym.env.observation import Mask
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.task import MAX_COURSE_STEPS
 from rover_gym.mechanics import OptionError, RoverModel, StateError
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
@@ -382,6 +383,18 @@ def make_rover_vector(
     """
     env = make(num_envs, **arguments)
     return env if sensors is None else SensorVectorObservation(env, sensors)
+
+
+class RoverCourseVectorEnv(RoverVectorEnv):
+    """A vector of rovers that drive courses of waypoints, with the time limit of `RoverWaypoints-v0`."""
+
+    #: Steps until truncation unless others are given.
+    own_limit: ClassVar[int] = MAX_COURSE_STEPS
+
+
+def make_course_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """Makes a `RoverCourseVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
+    return make_rover_vector(num_envs, make=RoverCourseVectorEnv, **arguments)
 
 
 def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:

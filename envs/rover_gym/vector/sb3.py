@@ -18,7 +18,7 @@ from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.batch import BatchSnapshot, Drawn
 from rover_gym.env.generators import check_seed
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
+from rover_gym.env.task import check_actions
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, StateError
 from rover_gym.validation import Range, refuse
@@ -67,7 +67,7 @@ class RoverVecEnv(VecEnv):
     Args:
         n_envs: Number of rovers.
         threads: Threads that step the rovers; None for one per core.
-        max_episode_steps: Steps until truncation; None for no limit.
+        max_episode_steps: Steps until truncation; None for 1200, -1 for no limit.
         **arguments: Arguments of `RoverEnv`.
     """
 
@@ -77,7 +77,7 @@ class RoverVecEnv(VecEnv):
         n_envs: int,
         *,
         threads: int | None = None,
-        max_episode_steps: int | None = MAX_EPISODE_STEPS,
+        max_episode_steps: int | None = None,
         **arguments: Unpack[RoverArguments],
     ) -> None:
         #: The same rovers as a vector of Gymnasium.

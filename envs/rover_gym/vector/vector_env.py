@@ -17,7 +17,7 @@ from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import Range, mapping, refuse
+from rover_gym.validation import Range, mapping, refuse, whole
 
 _Info = dict[str, Any]
 
@@ -31,7 +31,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     Args:
         num_envs: Number of rovers.
         threads: Threads that step the rovers; None for one per core.
-        max_episode_steps: Steps until truncation; None for no limit.
+        max_episode_steps: Steps until truncation; None for `own_limit`, -1 for no limit, as in `gymnasium.make`.
         autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, as Gymnasium defines them.
         **arguments: Arguments of `RoverEnv`.
 
@@ -43,21 +43,23 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     #: The class of one rover.
     env_class: ClassVar[type[RoverEnv]] = RoverEnv
 
+    #: Steps until truncation unless others are given.
+    own_limit: ClassVar[int] = MAX_EPISODE_STEPS
+
     @takes_arguments
     def __init__(
         self,
         num_envs: int = 1,
         *,
         threads: int | None = None,
-        max_episode_steps: int | None = MAX_EPISODE_STEPS,
+        max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **arguments: Unpack[RoverArguments],
     ) -> None:
         super().__init__()
         self.autoreset_mode = _check_mode(autoreset_mode)
-        self.batch = self.env_class.make_batch(
-            num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments
-        )
+        limit = episode_limit(max_episode_steps, self.own_limit)
+        self.batch = self.env_class.make_batch(num_envs, threads=threads, max_episode_steps=limit, **arguments)
         self.num_envs = self.batch.n
         self.envs = tuple(self.env_class.row(self.batch, i) for i in range(self.num_envs))
         self.metadata = {**self.prototype.metadata, "autoreset_mode": self.autoreset_mode}
@@ -212,6 +214,28 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
+
+
+def episode_limit(given: object, own: int) -> int | None:
+    """Steps until truncation, or None for no limit, from an argument with the meaning it has in `gymnasium.make`.
+
+    Args:
+        given: None for the environment's own limit, -1 for no limit, or a number of steps.
+        own: The environment's own limit.
+
+    Raises:
+        OptionError: `given` is none of these.
+    """
+    if given is None:
+        return own
+    if (
+        isinstance(given, (bool, np.timedelta64))
+        or not isinstance(given, (int, np.integer))
+        or given < -1
+        or given == 0
+    ):
+        refuse(OptionError, "max_episode_steps", given, "must be a whole number from 1, -1 for no limit, or None")
+    return None if given == -1 else whole("max_episode_steps", given, at_least=1)
 
 
 def _check_mode(mode: object) -> AutoresetMode:
