@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Self, Unpack
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments, with_tables
 from rover_gym.env.batch import RoverBatch
@@ -15,6 +16,7 @@ from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.play_keys import keys_to_action, pushed
 from rover_gym.env.sand_ground import soil_of
+from rover_gym.env.spec_json import RoverSpec, rover_spec
 from rover_gym.env.start import Domain, Rocks, Start
 from rover_gym.env.task import Task, check_actions
 from rover_gym.mechanics import CommandError, EpisodeRun, RoverGrainSimulation, RoverModel, Simulation
@@ -268,6 +270,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     _renderer: "FrameRenderer | None" = None
+    _spec: RoverSpec | None = None
     _drawn_scene: tuple[list[Any], tuple[float, float]] | None = None
 
     @takes_arguments
@@ -299,6 +302,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     def task(self) -> Task:
         """The checked arguments."""
         return self.batch.task
+
+    @property
+    def spec(self) -> RoverSpec | None:
+        """The specification that `gymnasium.make` has made the environment from; its `to_json` writes objects, too."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, value: EnvSpec | None) -> None:
+        self._spec = rover_spec(value)
 
     @property
     def render_mode(self) -> str | None:  # type: ignore[override] # read-only here

@@ -1,9 +1,9 @@
 """The sensors of one rover or of a vector: when each is sampled, and the wrappers that add readings to observations."""
 
 import copy
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import gymnasium as gym
 import numpy as np
@@ -21,6 +21,7 @@ from rover_gym.env.observation import Mask
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_COURSE_STEPS
 from rover_gym.mechanics import OptionError, RoverModel, StateError
+from rover_gym.sensors.named_sensor import sensor_of
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
 from rover_gym.vector.vector_env import RoverVectorEnv
@@ -35,6 +36,9 @@ STREAM = 0x5E45_0125
 SAME_TIME = 1e-9
 
 Readings = dict[str, npt.NDArray[np.float32]]
+
+#: A sensor, or a mapping of its class to its fields.
+SensorLike: TypeAlias = Sensor | Mapping[str, Any]
 
 
 @dataclass
@@ -70,7 +74,7 @@ class SensorSuite:
     """The sensors of a rover.
 
     Args:
-        sensors: Their configurations, with different names.
+        sensors: Their configurations, with different names; a mapping of a class to its fields is one, too.
         model: The rover.
         dt: Control period, s.
 
@@ -79,13 +83,12 @@ class SensorSuite:
             not fit the rover.
     """
 
-    def __init__(self, sensors: Sequence[Sensor], model: RoverModel, dt: float) -> None:
+    def __init__(self, sensors: Sequence[SensorLike], model: RoverModel, dt: float) -> None:
         if isinstance(sensors, Sensor) or not isinstance(sensors, (list, tuple)) or not sensors:
             refuse(OptionError, "sensors", sensors, "must be a list of sensors")
         self.sensors: dict[str, Sensor] = {}
-        for i, sensor in enumerate(sensors):
-            if not isinstance(sensor, Sensor):
-                refuse(OptionError, f"sensors[{i}]", sensor, "must be a sensor of rover_gym.sensors")
+        for i, given in enumerate(sensors):
+            sensor = sensor_of(f"sensors[{i}]", given)
             if sensor.name == STATE or sensor.name in self.sensors:
                 refuse(OptionError, f"sensors[{i}].name", sensor.name, "is used by another sensor")
             self._check_rate(f"sensors[{i}].rate", sensor.rate, dt)
@@ -175,7 +178,9 @@ class SensedRovers:
         suite: The sensors.
     """
 
-    def set_sensors(self, inner: RoverEnv | RoverVectorEnv, rover: RoverEnv, n: int, sensors: Sequence[Sensor]) -> None:
+    def set_sensors(
+        self, inner: RoverEnv | RoverVectorEnv, rover: RoverEnv, n: int, sensors: Sequence[SensorLike]
+    ) -> None:
         """Sets the sensors.
 
         Args:
@@ -246,7 +251,7 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
         OptionError: `env` is another environment, or a sensor does not fit it.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], sensors: Sequence[Sensor]) -> None:
+    def __init__(self, env: gym.Env[Any, Any], sensors: Sequence[SensorLike]) -> None:
         given: object = env
         if not isinstance(given, gym.Env) or not isinstance(given.unwrapped, RoverEnv):
             refuse(OptionError, "env", given, "must be a RoverEnv")
@@ -301,7 +306,7 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
             a sensor does not fit the rover.
     """
 
-    def __init__(self, env: RoverVectorEnv, sensors: Sequence[Sensor]) -> None:
+    def __init__(self, env: RoverVectorEnv, sensors: Sequence[SensorLike]) -> None:
         if not isinstance(env, RoverVectorEnv):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
         if env.autoreset_mode == AutoresetMode.SAME_STEP:
@@ -353,7 +358,7 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
 
 
 def make_rover(
-    *, sensors: Sequence[Sensor] | None = None, make: Callable[..., gym.Env[Any, Any]] = RoverEnv, **arguments: Any
+    *, sensors: Sequence[SensorLike] | None = None, make: Callable[..., gym.Env[Any, Any]] = RoverEnv, **arguments: Any
 ) -> gym.Env[Any, Any]:
     """Makes a `RoverEnv`, wrapped in `SensorObservation` if there are sensors.
 
@@ -369,7 +374,7 @@ def make_rover(
 def make_rover_vector(
     num_envs: int = 1,
     *,
-    sensors: Sequence[Sensor] | None = None,
+    sensors: Sequence[SensorLike] | None = None,
     make: Callable[..., RoverVectorEnv] = RoverVectorEnv,
     **arguments: Any,
 ) -> gym.vector.VectorEnv[Any, Any, Any]:

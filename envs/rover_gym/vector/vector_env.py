@@ -5,6 +5,7 @@ from typing import Any, ClassVar, Unpack
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -15,6 +16,7 @@ from rover_gym.env.episode_scene import ResetOptions
 from rover_gym.env.generators import spread_seeds
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.spec_json import RoverSpec, rover_spec
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import Range, mapping, refuse, whole
@@ -46,6 +48,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     #: Steps until truncation unless others are given.
     own_limit: ClassVar[int] = MAX_EPISODE_STEPS
 
+    _spec: RoverSpec | None = None
+
     @takes_arguments
     def __init__(
         self,
@@ -68,6 +72,15 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         self.single_action_space = self.prototype.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @property
+    def spec(self) -> RoverSpec | None:
+        """The specification that `gymnasium.make_vec` has made the vector from; its `to_json` writes objects, too."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, value: EnvSpec | None) -> None:
+        self._spec = rover_spec(value)
 
     @property
     def prototype(self) -> RoverEnv:
