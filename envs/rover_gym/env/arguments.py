@@ -9,7 +9,6 @@ package's errors. Its string form is what the card prints under "may be".
 
 import inspect
 import math
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from rover_gym.env.spec_json import model_from_json, soil_from_json, terrain_fro
 from rover_gym.env.start import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.maps.map_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
-from rover_gym.models.lookup import open_model
+from rover_gym.models.lookup import as_model
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
 from rover_gym.sand.soils import Soil, named_soil
 from rover_gym.validation import Range, flag, known_keys, mapping, number, refuse, span, vector, whole
@@ -185,17 +184,13 @@ def check_gravity(field: str, value: object) -> tuple[float, ...]:
 
 def check_model(field: str, value: object) -> RoverModel:
     """Checks a model, or opens one by its name or file: it must have wheels whose joints move."""
-    if isinstance(value, (str, os.PathLike)):
-        value = open_model(value)
-    value = model_from_json(value)
-    if not isinstance(value, RoverModel):
-        refuse(ModelError, field, value, "must be a RoverModel, a name of the gallery or a file")
-    if not value.wheel_names:
+    model = as_model(field, model_from_json(value))
+    if not model.wheel_names:
         refuse(ModelError, f"{field}.wheels", [], "must have at least one wheel")
-    indices = value.wheel_joint_indices
+    indices = model.wheel_joint_indices
     if min(indices) < 0:
         refuse(ModelError, f"{field}.wheel_joint_indices", indices, "must be movable joints")
-    return value
+    return model
 
 
 def check_solver_options(field: str, value: object) -> Mapping[str, Any]:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
-from rover_gym.mechanics import RoverModel
+from rover_gym.models.lookup import ModelLike
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.evaluation import (
@@ -57,7 +57,7 @@ class Contender:
         return self.name not in NAMES and any(path.name == ARCS_FILE for path in self.files)
 
 
-def named_contender(policy: str, model: RoverModel | None = None) -> Contender:
+def named_contender(policy: str, model: ModelLike | None = None) -> Contender:
     """A policy by its name or folder, as `named_policy` takes it.
 
     Raises:

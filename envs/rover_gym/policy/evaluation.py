@@ -5,6 +5,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any
 
 import gymnasium as gym
@@ -15,7 +16,7 @@ from rover_gym.env.batch import RoverBatch
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import OptionError
-from rover_gym.policy.named_policy import Policy
+from rover_gym.policy.named_policy import Policy, named_policy
 from rover_gym.validation import number, refuse, whole
 
 ENDS = ("goal", "time", "high_centred", "roll_over", "left_field", "step_failed")
@@ -52,7 +53,7 @@ class Episode:
 
 def run_episode(
     env: gym.Env[Any, Any],
-    policy: Policy,
+    policy: Policy | str | PathLike[str],
     seed: int,
     *,
     options: Mapping[str, Any] | None = None,
@@ -62,7 +63,7 @@ def run_episode(
 
     Args:
         env: A rover environment with a time limit, wrapped or not.
-        policy: The policy that chooses the actions.
+        policy: The policy that chooses the actions, or its name or folder, as `named_policy` takes it.
         seed: Seed of the reset.
         options: Options of the reset.
         on_step: Called with the environment and `info` after the reset and after each step; not timed.
@@ -70,6 +71,7 @@ def run_episode(
     rover = env.unwrapped
     if not isinstance(rover, RoverEnv):
         raise TypeError(f"a rover environment is needed, not {rover!r}")
+    policy = named_policy(policy, rover.model).make(env)
     observation, info = env.reset(seed=seed, options=None if options is None else dict(options))
     on_step(rover, info)
     position = rover.simulation.q[:3]
@@ -139,7 +141,7 @@ class EvaluatedEpisode:
 
 
 def drive_all(
-    make_policy: Callable[[Any], Policy],
+    make_policy: Callable[[Any], Policy] | str | PathLike[str],
     seeds: Sequence[int],
     *,
     arguments: Mapping[str, Any],
@@ -153,8 +155,9 @@ def drive_all(
     An episode depends only on its seed and the policy, apart from the rounding of batched network evaluations.
 
     Args:
-        make_policy: Makes a policy from an environment, which gives layout and constants. If it has `hold_periods`, the
-            height scan is taken once in so many periods, and episodes begin where commands do.
+        make_policy: The name or folder of a policy, as `named_policy` takes it, whose arguments the environment then
+            has. Or a function that makes a policy from an environment, which gives layout and constants. If the policy
+            has `hold_periods`, the height scan is taken once in so many periods, and episodes begin where commands do.
         seeds: Seeds of the resets.
         arguments: Arguments of `RoverEnv`.
         max_episode_steps: Control periods until truncation; None for 60 s.
@@ -168,6 +171,9 @@ def drive_all(
     number("num_envs", num_envs, at_least=1.0)
     if max_episode_steps is not None:
         number("max_episode_steps", max_episode_steps, at_least=1.0)
+    if isinstance(make_policy, (str, PathLike)):
+        named = named_policy(make_policy, arguments.get("model"))
+        make_policy, arguments = named.make, {**arguments, **named.arguments}
     waiting = list(reversed(seeds))
     n = min(num_envs, len(waiting))
     if n == 0:
