@@ -31,7 +31,7 @@ class Registration:
 
 def _rover(arguments: Mapping[str, Any]) -> Registration:
     """The registration of `Rover-v0` with other arguments."""
-    makers = "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector"
+    makers = "rover_gym.sensors:make_rover", "rover_gym.vector:make_rover_vector"
     return Registration(*makers, MAX_EPISODE_STEPS, arguments)
 
 
@@ -42,7 +42,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverSand-v0": _rover({"terrain": "sand"}),
     "RoverWaypoints-v0": Registration(
         "rover_gym.sensors:make_rover",
-        "rover_gym.sensors:make_course_vector",
+        "rover_gym.vector:make_course_vector",
         MAX_COURSE_STEPS,
         {"waypoints": 5, "goal_distance": (4.0, 8.0)},
     ),
@@ -57,7 +57,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverTrap-v0": Registration(
         "rover_gym.policy:RoverTrapEnv", "rover_gym.policy:RoverTrapVectorEnv", MAX_TRAP_STEPS
     ),
-    "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover", "rover_gym.sensors:make_grains_vector"),
+    "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover", "rover_gym.vector:make_grains_vector"),
 }
 
 

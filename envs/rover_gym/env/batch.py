@@ -5,7 +5,7 @@ rovers and threads. Each control period is one call of the compiled core: the th
 its observation, reward and termination.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Unpack
@@ -307,7 +307,14 @@ class RoverBatch:
             self._earn(before, actions, stepped, np.ones(self.n, np.bool_) if active is None else np.asarray(active))
         return stepped
 
-    def step_on(self, actions: object, *, same_step: bool, has_scan: bool = True) -> tuple[Stepped, Finals]:
+    def step_on(
+        self,
+        actions: object,
+        *,
+        same_step: bool,
+        has_scan: bool = True,
+        at_end: Callable[[Collection[int]], None] = lambda _resting: None,
+    ) -> tuple[Stepped, Finals]:
         """Applies actions for one control period; rovers whose episode is over start the next.
 
         Args:
@@ -315,6 +322,7 @@ class RoverBatch:
             same_step: Whether an episode is followed by the next in the step that ends it. If not, the next one begins
                 in the following step, in which its rover does not move and earns nothing.
             has_scan: As of `step`.
+            at_end: Called at the end of the period, before the next episodes begin, with the rovers that have rested.
 
         Returns:
             What `step` returns, and with `same_step` the last observations and infos of the episodes that have ended.
@@ -333,6 +341,7 @@ class RoverBatch:
             drawn = self.draw(starting)
             active = np.isin(np.arange(self.n), starting, invert=True)
         stepped = self.step(actions, active, has_scan=has_scan)
+        at_end(starting)
         observation, rewards, terminated, truncated, over = stepped
         if drawn is not None:
             self.begin(drawn)

@@ -1,30 +1,25 @@
-"""The sensors of one rover or of a vector: when each is sampled, and the wrappers that add readings to observations."""
+"""The sensors of rovers: when each is sampled, and the wrapper that adds readings to observations."""
 
 import copy
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
-from gymnasium.vector import AutoresetMode, VectorWrapper
-from gymnasium.vector.utils import batch_space
 
-from rover_gym.env.batch import BatchSnapshot
+from rover_gym.env.batch import BatchSnapshot, RoverBatch
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
-from rover_gym.env.observation import Mask
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.task import MAX_COURSE_STEPS
 from rover_gym.mechanics import OptionError, RoverModel, StateError
 from rover_gym.sensors.named_sensor import sensor_of
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
-from rover_gym.vector.vector_env import RoverVectorEnv
 
 #: Key of the environment's own observation.
 STATE = "state"
@@ -35,7 +30,7 @@ STREAM = 0x5E45_0125
 #: Times closer than this are equal, s.
 SAME_TIME = 1e-9
 
-Readings = dict[str, npt.NDArray[np.float32]]
+Readings = dict[str, npt.NDArray[Any]]
 
 #: A sensor, or a mapping of its class to its fields.
 SensorLike: TypeAlias = Sensor | Mapping[str, Any]
@@ -95,10 +90,11 @@ class SensorSuite:
             sensor.check(model)
             self.sensors[sensor.name] = sensor
         self.model, self.dt = model, dt
-        self.spaces: dict[str, gym.spaces.Space[npt.NDArray[np.float32]]] = {}
+        self.spaces: dict[str, gym.spaces.Box] = {}
         for name, sensor in self.sensors.items():
-            low, high = (bound.astype(np.float32) for bound in sensor.bounds(model))
-            self.spaces[name] = gym.spaces.Box(low, high, dtype=np.float32)
+            kind: Any = sensor.reading_type
+            low, high = (bound.astype(kind) for bound in sensor.bounds(model))
+            self.spaces[name] = gym.spaces.Box(low, high, dtype=kind)
 
     @staticmethod
     def _check_rate(field: str, rate: float | None, dt: float) -> None:
@@ -141,7 +137,7 @@ class SensorSuite:
 
     def readings(self, state: SuiteState) -> Readings:
         """The present readings, by name."""
-        return {name: own.reading.astype(np.float32) for name, own in state.sensors.items()}
+        return {name: own.reading.astype(self.sensors[name].reading_type) for name, own in state.sensors.items()}
 
     def space(self, inner: gym.Space[Any]) -> gym.spaces.Dict:
         """The space of an environment's observation with the readings."""
@@ -178,13 +174,11 @@ class SensedRovers:
         suite: The sensors.
     """
 
-    def set_sensors(
-        self, inner: RoverEnv | RoverVectorEnv, rover: RoverEnv, n: int, sensors: Sequence[SensorLike]
-    ) -> None:
+    def set_sensors(self, inner: Any, rover: RoverEnv, n: int, sensors: Sequence[SensorLike]) -> None:
         """Sets the sensors.
 
         Args:
-            inner: The environment whose snapshots are kept.
+            inner: The environment or the vector whose snapshots are kept.
             rover: The environment of one rover, read once.
             n: Number of rovers.
             sensors: The sensors that each rover has, with different names.
@@ -192,7 +186,7 @@ class SensedRovers:
         Raises:
             OptionError: A sensor does not fit the rover.
         """
-        self._inner: Any = inner
+        self._inner = inner
         self.suite = SensorSuite(sensors, rover.model, rover.dt)
         self._states: list[SuiteState | None] = [None] * n
 
@@ -226,6 +220,26 @@ class SensedRovers:
         states = [self.suite.check_state(state) for state in kept]
         self._inner.restore(snapshot.env)
         self._states[:] = states
+
+    def begin_sensors(self, batch: RoverBatch, rovers: Sequence[RoverEnv], chosen: Sequence[int]) -> None:
+        """Draws the sensors' properties for the rovers whose episodes have begun, and takes their first samples."""
+        for i, row in zip(chosen, batch.generator_rows(chosen), strict=True):
+            self._states[i] = self.suite.begin(moment_of(rovers[i]), row)
+
+    def advance_sensors(self, rovers: Sequence[RoverEnv], resting: Collection[int] = ()) -> None:
+        """Takes the samples that are due of the rovers that have moved, which are all but those at rest."""
+        for i, rover in enumerate(rovers):
+            if i not in resting:
+                self.suite.advance(self._state(i), moment_of(rover))
+
+    def readings_of(self, i: int) -> Readings:
+        """The present readings of rover i, by sensor."""
+        return self.suite.readings(self._state(i))
+
+    def all_readings(self) -> Readings:
+        """The present readings of all rovers, stacked, by sensor."""
+        each = [self.readings_of(i) for i in range(len(self._states))]
+        return {name: np.stack([one[name] for one in each]) for name in self.suite.spaces}
 
 
 def moment_of(env: RoverEnv) -> Moment:
@@ -294,69 +308,6 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
         return {STATE: observation, **self.readings()}, float(reward), terminated, truncated, info
 
 
-class SensorVectorObservation(SensedRovers, VectorWrapper):
-    """Adds each rover's sensors to its observation, bit for bit as `SensorObservation` does for one rover.
-
-    Args:
-        env: A `RoverVectorEnv`; wrappers go around this one.
-        sensors: The sensors that each rover has, with different names.
-
-    Raises:
-        OptionError: `env` is another environment or uses `SameStep` autoreset, which does not allow final readings, or
-            a sensor does not fit the rover.
-    """
-
-    def __init__(self, env: RoverVectorEnv, sensors: Sequence[SensorLike]) -> None:
-        if not isinstance(env, RoverVectorEnv):
-            refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
-        if env.autoreset_mode == AutoresetMode.SAME_STEP:
-            refuse(OptionError, "autoreset_mode", env.autoreset_mode.value, "must be NextStep or Disabled with sensors")
-        VectorWrapper.__init__(self, env)
-        self._rovers = env
-        self.set_sensors(env, env.prototype, env.num_envs, sensors)
-        self.single_observation_space = self.suite.space(env.single_observation_space)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-
-    def sensor_state(self, i: int) -> SuiteState:
-        """The sensors of rover i's episode with their drawn properties.
-
-        Raises:
-            ResetNeeded: The rover has not been reset.
-        """
-        return self._state(i)
-
-    def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Starts episodes, as `RoverVectorEnv.reset`."""
-        observation, infos = self._rovers.reset(seed=seed, options=options)
-        mask = (options or {}).get("reset_mask")
-        self._begin(range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist())
-        return self._with_readings(observation), infos
-
-    def step(self, actions: npt.NDArray[np.float32]) -> tuple[dict[str, Any], Array, Mask, Mask, dict[str, Any]]:
-        """Applies actions, as `RoverVectorEnv.step`, then takes the samples that are due."""
-        states = [self._state(i) for i in range(self.num_envs)]
-        begun = set(self._rovers.batch.over)
-        observation, reward, terminated, truncated, infos = self._rovers.step(actions)
-        for i, state in enumerate(states):
-            if i not in begun:
-                self.suite.advance(state, moment_of(self._rovers.envs[i]))
-        self._begin(sorted(begun))
-        return self._with_readings(observation), reward, terminated, truncated, infos
-
-    def _with_readings(self, observations: Any) -> dict[str, Any]:
-        """The observations `(n, ...)` and the readings of all rovers."""
-        each = [self.suite.readings(self._state(i)) for i in range(len(self._states))]
-        return {STATE: observations, **{name: np.stack([one[name] for one in each]) for name in self.suite.spaces}}
-
-    def _begin(self, chosen: Iterable[int]) -> None:
-        chosen = list(chosen)
-        rows = self._rovers.batch.generator_rows(chosen)
-        for i, row in zip(chosen, rows, strict=True):
-            self._states[i] = self.suite.begin(moment_of(self._rovers.envs[i]), row)
-
-
 def make_rover(
     *, sensors: Sequence[SensorLike] | None = None, make: Callable[..., gym.Env[Any, Any]] = RoverEnv, **arguments: Any
 ) -> gym.Env[Any, Any]:
@@ -371,52 +322,9 @@ def make_rover(
     return env if sensors is None else SensorObservation(env, sensors)
 
 
-def make_rover_vector(
-    num_envs: int = 1,
-    *,
-    sensors: Sequence[SensorLike] | None = None,
-    make: Callable[..., RoverVectorEnv] = RoverVectorEnv,
-    **arguments: Any,
-) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Makes a `RoverVectorEnv`, wrapped in `SensorVectorObservation` if there are sensors.
-
-    Args:
-        num_envs: Number of rovers.
-        sensors: The sensors that each rover has; None for the environment as it is.
-        make: `RoverVectorEnv` or a subclass.
-        **arguments: Its arguments.
-    """
-    env = make(num_envs, **arguments)
-    return env if sensors is None else SensorVectorObservation(env, sensors)
-
-
-class RoverCourseVectorEnv(RoverVectorEnv):
-    """A vector of rovers that drive courses of waypoints, with the time limit of `RoverWaypoints-v0`."""
-
-    #: Steps until truncation unless others are given.
-    own_limit: ClassVar[int] = MAX_COURSE_STEPS
-
-
-def make_course_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Makes a `RoverCourseVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
-    return make_rover_vector(num_envs, make=RoverCourseVectorEnv, **arguments)
-
-
 def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
     """Makes a `RoverGrainsEnv`, wrapped in `SensorObservation` if there are sensors, which then see the grains."""
     return make_rover(make=RoverGrainsEnv, **arguments)
-
-
-class RoverGrainsVectorEnv(RoverVectorEnv):
-    """A vector of `RoverGrainsEnv` environments; see `RoverVectorEnv`. Their grains are stepped one after the other."""
-
-    #: The class of one rover.
-    env_class: ClassVar[type[RoverEnv]] = RoverGrainsEnv
-
-
-def make_grains_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Makes a `RoverGrainsVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
-    return make_rover_vector(num_envs, make=RoverGrainsVectorEnv, **arguments)
 
 
 #: What Gymnasium asks of an entry point before it calls it.
