@@ -208,3 +208,15 @@ def test_policies_of_the_package_are_compared_by_name(tmp_path: Path) -> None:
 def test_a_policy_that_is_named_twice_or_unknown_is_one_line(tmp_path: Path) -> None:
     for names, word in ((("pd", "pd"), "must be named once"), (("planner",), "POLICIES: must be 'pd'")):
         assert word in error_of("evaluate", *names, "--episodes", "1", "--output", tmp_path)
+
+
+def test_a_folder_never_holds_episodes_of_two_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second drive left the first one's other episodes beside its own, under a summary that did not name them."""
+    monkeypatch.chdir(tmp_path)
+    for seed in (3, 4, 5):
+        output_of("drive", "--time-limit", "0.1", "--seed", str(seed))
+    found = sorted(str(path) for path in Path().rglob("episode-*.h5"))
+    assert found == ["runs/drive-2/episode-4.h5", "runs/drive-3/episode-5.h5", "runs/drive/episode-3.h5"]
+    error = error_of("drive", "--time-limit", "0.1", "--output", "runs/drive")
+    assert "another folder" in error
+    assert [path.name for path in Path("runs/drive").glob("*.h5")] == ["episode-3.h5"]

@@ -84,7 +84,11 @@ Episodes = Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; the others count up from it.")]
 Output = Annotated[
     Path | None,
-    typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: runs/drive."),
+    typer.Option(
+        file_okay=False,
+        help="Folder for trajectories (HDF5) and summary.json, without those of another run. "
+        "Default: runs/drive, or the next of runs/drive-2, runs/drive-3, ... without a run.",
+    ),
 ]
 Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes.")]
 Sensors = Annotated[

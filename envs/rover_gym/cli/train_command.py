@@ -3,7 +3,7 @@
 import csv
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from typer.core import TyperCommand
 
 from rover_gym.cli.console import AsJson, Results, check_folder, plain_errors, plain_table
 from rover_gym.extras import require
+from rover_gym.mechanics import OptionError
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.named_policy import network_folder
@@ -85,10 +86,11 @@ def train(
 
     Needs the extra `train`.
 
-    Checkpoints, the learning curve (`curve.csv`), the network at the end (`arcs.npz`) and the one that did best in the
-    evaluations (`best`) are in the run's folder. Several seeds end with a table.
+    Checkpoints, the learning curve (`curve.csv`), TensorBoard's events (`tensorboard`), the network at the end
+    (`arcs.npz`) and the one that did best in the evaluations (`best`) are in the run's folder. A run is never
+    overwritten. Several seeds end with a table.
     """
-    for package in ("yaml", "stable_baselines3"):
+    for package in ("yaml", "stable_baselines3", "tensorboard"):
         require(package, "train")
     from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
     from rover_gym.learning.arc_recipe import train_arcs  # noqa: PLC0415
@@ -104,6 +106,8 @@ def train(
         settings = replace(settings, ppo=replace(settings.ppo, decisions=steps))
     network = None if begin is None else _network(begin)
     folders = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
+    if not resume:
+        _check_unused(folders.values())
     with Results(as_json=as_json) as results:
         for seed, folder in folders.items():
             train_arcs(
@@ -121,6 +125,20 @@ def train(
         results.add(seeds=[{"seed": seed, **row} for seed, row in zip(folders, rows, strict=True)])
         if len(folders) > 1:
             results.show(plain_table(_seed_table(list(folders), rows)))
+
+
+def _check_unused(folders: Iterable[Path]) -> None:
+    """Refuses folders that have a run, before the first training begins.
+
+    Raises:
+        OptionError: One has a run.
+    """
+    from rover_gym.learning.arc_recipe import RUN_FILES  # noqa: PLC0415 - needs the extra
+
+    for folder in folders:
+        if any((folder / name).exists() for name in RUN_FILES):
+            reason = "has a run, which is never overwritten: go on with it by --resume, or name another --output"
+            refuse(OptionError, "output", str(folder), reason)
 
 
 def _network(policy: str) -> ArcNetwork:
