@@ -28,7 +28,7 @@ help: ## list the targets (this list)
 demo: ## set up, drive Rover-v0 to a goal, plot the drive, redraw the report's sections 6.1 and 6.2, write a replay page, under runs/
 	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/debian-demo
 	$(BIN)/rover report --figures --output runs/report & report=$$!; \
-	$(BIN)/rover drive --output runs/drive && \
+	rm -rf runs/drive && $(BIN)/rover drive --output runs/drive && \
 	$(BIN)/rover plot runs/drive/episode-0.h5 --output runs/drive/plots && \
 	$(BIN)/rover replay runs/drive/episode-0.h5 --html runs/replay.html && wait $$report
 
@@ -148,6 +148,7 @@ torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/tables/tort
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
 
 film: $(STAMPS)/test $(MODULE) ## the moving picture at the head of the manual, from a page in a browser: docs/pictures/rover.webp (some minutes)
+	rm -rf runs/film
 	$(BIN)/rover drive --difficulty 1 --policy scan --seed 11 --output runs/film
 	$(BIN)/rover replay runs/film/episode-11.h5 --no-open
 	PYTHONPATH=tests $(BIN)/python -m browser.film runs/film/episode-11.html docs/pictures/rover.webp --begin 0.6

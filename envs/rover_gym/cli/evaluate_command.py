@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,12 +20,25 @@ from rover_gym.cli.console import (
     plain_table,
     progress_bar,
 )
-from rover_gym.cli.options import BUILT_IN, ModelName, complete_policy, complete_terrain, named_model, warn_of_slope
+from rover_gym.cli.options import (
+    BUILT_IN,
+    Arguments,
+    EnvironmentName,
+    ModelName,
+    complete_policy,
+    complete_terrain,
+    given_arguments,
+    is_model_file,
+    known_environment,
+    named_driver,
+    named_model,
+    warn_of_slope,
+)
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.policy_figure import draw_policies
-from rover_gym.mechanics import OptionError
+from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.policy.comparison import (
     Contender,
     comparison_report,
@@ -47,11 +60,14 @@ def evaluate(
         typer.Argument(help=f"Who drives: {NAMES_HELP[:-1]}. Default: pd.", autocompletion=complete_policy),
     ] = None,
     terrain: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="'plane', 'rocks', 'hills', 'sand', or the file of a map or a mesh.", autocompletion=complete_terrain
+            help="'plane', 'rocks', 'hills', 'sand', or the file of a map or a mesh. Default: rocks.",
+            autocompletion=complete_terrain,
         ),
-    ] = "rocks",
+    ] = None,
+    environment: EnvironmentName = None,
+    argument: Arguments = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
         list[float] | None, typer.Option(help="Difficulty of the ground, from 0 to 2; repeat it for several.")
@@ -78,11 +94,12 @@ def evaluate(
     reached the goal; energy is the work through the wheel motors over the way driven. The default seeds are never
     used in training. Ctrl-C ends the evaluation: the policies that are done are printed and kept.
     """
-    terrain = terrain_name(terrain)
+    arguments = given_arguments(argument)
+    if environment is None or terrain is not None:
+        arguments["terrain"] = terrain_name(terrain or "rocks")
     if slope is not None:
         warn_of_slope(number("slope", slope, at_least=0.0, at_most=MAX_SLOPE_DEG))
     levels = [number("difficulty", level, at_least=0.0, at_most=MAX_DIFFICULTY) for level in difficulty or ()]
-    arguments: dict[str, Any] = {"terrain": terrain}
     arguments |= {} if model == BUILT_IN else {"model": model}
     arguments |= {} if slope is None else {"slope_deg": slope}
     scenes: list[tuple[float | None, dict[str, Any]]] = [(None, arguments)]
@@ -92,7 +109,7 @@ def evaluate(
         scenes = [(level, {**arguments, "difficulty": level}) for level in levels]
     for package in ("imageio_ffmpeg", "vtkmodules") if films else ():
         require(package, "render")
-    contenders = _contenders(policies or ["pd"], model)
+    contenders = _contenders(policies or ["pd"], model, environment)
     check_folder("output", output)
     output.mkdir(parents=True, exist_ok=True)
     seeds = range(seed, seed + episodes)
@@ -168,7 +185,8 @@ class _Evaluation:
         for contender in self.contenders:
             for seed in self.seeds[:films]:
                 path = self.output / "films" / f"{_stem(contender.name, difficulty)}-seed{seed}.mp4"
-                film_episode(path, contender.make, {**arguments, **contender.arguments}, seed)
+                given = {**arguments, **contender.arguments}
+                film_episode(path, contender.make, given, seed, contender.environment)
                 yield path
 
 
@@ -192,14 +210,24 @@ def _write(
     return written
 
 
-def _contenders(policies: Sequence[str], model: str) -> list[Contender]:
+def _contender(policy: str, rover: RoverModel | None, environment: str | None) -> Contender:
+    """A policy by its name, its folder or its file."""
+    if is_model_file(policy):
+        chosen, path = named_driver(policy, rover), Path(policy)
+        name = path.parent.name if path.stem == "model" and path.parent.name else path.stem
+        return Contender(name, chosen.make, chosen.arguments, (path,), environment or "Rover-v0")
+    return replace(named_contender(policy, rover), environment=environment)
+
+
+def _contenders(policies: Sequence[str], model: str, environment: str | None = None) -> list[Contender]:
     """All who drive, in the order of the table: the package's policies, trained networks.
 
     Raises:
         OptionError: Two policies have the same name.
     """
     rover = named_model(model)
-    contenders = [named_contender(policy, rover) for policy in policies]
+    name = None if environment is None else known_environment(environment)
+    contenders = [_contender(policy, rover, name) for policy in policies]
     contenders.sort(key=lambda contender: contender.is_trained)
     names = [contender.name for contender in contenders]
     for i, name in enumerate(names):

@@ -1,5 +1,6 @@
 """`Rover-v0`: drive a rover to a goal. The class docstring is the environment's card."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self, Unpack
@@ -271,6 +272,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     _renderer: "FrameRenderer | None" = None
     _spec: RoverSpec | None = None
+
+    #: Called with the environment and `info` after each reset and each control period, also of those that wrappers take.
+    on_period: Callable[["RoverEnv", Mapping[str, Any]], None] | None = None
     _drawn_scene: tuple[list[Any], tuple[float, float]] | None = None
 
     @takes_arguments
@@ -437,6 +441,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             TerrainError: The rover would penetrate the ground or a sphere in each of 100 drawn scenes.
         """
         info = self.batch.reset(self.i, seed, self.batch.check_options(options))
+        if self.on_period is not None:
+            self.on_period(self, info)
         return self.progress.observation, info
 
     def step(
@@ -463,7 +469,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             check_actions(given, (batch.task.n_actions,))  # names the entry without the rover
             raise
         observation, reward, terminated, _, _ = stepped
-        return observation[i].copy(), float(reward[i]), bool(terminated[i]), False, batch.info(i)
+        info = batch.info(i)
+        if self.on_period is not None:
+            self.on_period(self, info)
+        return observation[i].copy(), float(reward[i]), bool(terminated[i]), False, info
 
     def complete_observation(self) -> npt.NDArray[np.float32]:
         """The last observation, with the heights that it lacks where `has_scan` was off; takes the scan if it must.

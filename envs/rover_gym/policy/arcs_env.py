@@ -114,6 +114,7 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
         self.metadata = rover.metadata
         self.rover = rover
         self.driver = ArcDriver(rover, 1)
+        self.repeat = self.driver.hold
         self.observation_space, self.action_space = observation_space(), arc_space()
         self._seen: Observations = np.zeros((1, rover.observation_layout.size), np.float32)
         self._info: dict[str, Any] = {}

@@ -134,7 +134,7 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
         self._rover = find_rover_env(env)
         self._held = HeldCommands(self._rover, 1, repeat=repeat, pool=pool, limits=limits)
         super().__init__(env)
-        self.features = self._held.features
+        self.features, self.repeat = self._held.features, self._held.repeat
         self.observation_space, self.action_space = self._held.observation_space, self._held.action_space
         self._info: dict[str, Any] = {}
 

@@ -24,12 +24,17 @@ from rover_gym.policy.evaluation import (
     IntervalEstimate,
     PolicySummary,
     drive_all,
+    drive_each,
     run_episode,
+    timed,
 )
 from rover_gym.policy.named_policy import NAMES, Policy, named_policy, network_folder
 from rover_gym.record.channels import outcome_words
 from rover_gym.rendering.caption import captioned
 from rover_gym.rendering.render_options import VideoWriter
+
+#: Longest episode of a comparison, s.
+EPISODE_SECONDS = MAX_EPISODE_STEPS * 0.05
 
 #: The package's own policies.
 POLICIES = Path(__file__).parents[1] / "data" / "policies"
@@ -44,12 +49,15 @@ class Contender:
         make: Makes it from an environment.
         arguments: Arguments of `RoverEnv` that it needs.
         files: Files that it is read from.
+        environment: The registered environment that it drives, one episode after the other; None for `Rover-v0`, many
+            at a time.
     """
 
     name: str
     make: Callable[[Any], Policy]
     arguments: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
+    environment: str | None = None
 
     @property
     def is_trained(self) -> bool:
@@ -104,6 +112,7 @@ def drive_or_reuse(
     """
     environment = {**arguments, **contender.arguments}
     key = {
+        "id": contender.environment,
         "environment": environment,
         "seeds": [seeds.start, len(seeds)],
         "files": _digest([*files, *contender.files]),
@@ -112,7 +121,12 @@ def drive_or_reuse(
     kept = _kept(path, plain_key)
     if kept is not None:
         return kept
-    drives = drive_all(contender.make, seeds, arguments=environment, threads=threads, progress=progress)
+    if contender.environment is None:
+        drives = drive_all(contender.make, seeds, arguments=environment, threads=threads, progress=progress)
+    else:
+        env = timed(gym.make(contender.environment, max_episode_steps=-1, **environment), EPISODE_SECONDS)
+        drives = drive_each(env, contender.make(env), seeds, progress=progress)
+        env.close()
     plain = {"key": plain_key, "drives": [asdict(drive) for drive in drives]}
     path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
     return drives
@@ -235,7 +249,13 @@ class EpisodeFilm:
         self._writer.close()
 
 
-def film_episode(path: Path, make_policy: Callable[[Any], Policy], arguments: Mapping[str, Any], seed: int) -> Episode:
+def film_episode(
+    path: Path,
+    make_policy: Callable[[Any], Policy],
+    arguments: Mapping[str, Any],
+    seed: int,
+    environment: str | None = None,
+) -> Episode:
     """Drives one episode of at most 60 s and films it.
 
     Args:
@@ -243,21 +263,24 @@ def film_episode(path: Path, make_policy: Callable[[Any], Policy], arguments: Ma
         make_policy: Makes the policy from an environment.
         arguments: Arguments of `RoverEnv`.
         seed: Seed of the reset.
+        environment: The registered environment; `Rover-v0` by default.
 
     Raises:
         MissingExtraError: The extra `render` is not installed.
         RoverGymError: An argument is out of range.
     """
     rendering: dict[str, Any] = {"render_mode": "rgb_array", "render_options": {}}
-    limit = round(MAX_EPISODE_STEPS * 0.05 * arguments.get("control_frequency", 20.0))
-    env = gym.make("Rover-v0", max_episode_steps=limit, **arguments, **rendering)
+    made = gym.make(environment or "Rover-v0", max_episode_steps=-1, **arguments, **rendering)
+    env = timed(made, EPISODE_SECONDS)
     try:
         with EpisodeFilm(path, env.metadata["render_fps"], path.stem) as film:
 
             def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
                 film.show(rover, seed, info["time"])
 
-            episode = run_episode(env, make_policy(env), seed, on_step=on_step)
+            rover: RoverEnv = env.unwrapped  # type: ignore[assignment] # `timed` has checked it
+            rover.on_period = on_step
+            episode = run_episode(env, make_policy(env), seed)
             film.end(episode)
             return episode
     finally:

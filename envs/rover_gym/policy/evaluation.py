@@ -214,6 +214,59 @@ def drive_all(
     return [done[seed] for seed in seeds]
 
 
+def drive_each(
+    env: gym.Env[Any, Any],
+    policy: Policy,
+    seeds: Sequence[int],
+    *,
+    progress: Callable[[int], None] = lambda _done: None,
+) -> list[EvaluatedEpisode]:
+    """Runs one episode per seed in an environment of this package, wrapped or not, one after the other.
+
+    Args:
+        env: The environment, with a time limit.
+        policy: The policy, which must fit the environment.
+        seeds: Seeds of the resets.
+        progress: Called with the number of episodes done.
+    """
+    done: list[EvaluatedEpisode] = []
+    rover: RoverEnv = env.unwrapped  # type: ignore[assignment] # run_episode refuses any other
+    for seed in seeds:
+        tilts: list[float] = []
+        rover.on_period = lambda _rover, info, tilts=tilts: tilts.append(float(info["tilt"]))  # type: ignore[misc]
+        try:
+            episode = run_episode(env, policy, seed)
+        finally:
+            rover.on_period = None
+        done.append(
+            EvaluatedEpisode(
+                seed=seed,
+                end=episode.end,
+                time=episode.time,
+                distance=episode.distance,
+                energy=episode.energy,
+                slip=episode.slip,
+                tilt=float(np.mean(tilts[1:])),
+                max_tilt=max(tilts[1:]),
+            )
+        )
+        progress(len(done))
+    return done
+
+
+def timed(env: gym.Env[Any, Any], seconds: float) -> gym.Env[Any, Any]:
+    """An environment of this package that is truncated after so many seconds; a step may hold its command for several.
+
+    Raises:
+        OptionError: The environment is another one.
+    """
+    rover = env.unwrapped
+    if not isinstance(rover, RoverEnv):
+        refuse(OptionError, "env", env, "must be an environment of rover_gym")
+    repeat = env.get_wrapper_attr("repeat") if env.has_wrapper_attr("repeat") else 1
+    return gym.wrappers.TimeLimit(env, max(1, round(seconds / (rover.dt * repeat))))
+
+
 @dataclass
 class _Sums:
     """Sums over the steps of the running episodes.

@@ -25,13 +25,13 @@ NAMES_HELP = (
     "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the search on the height scan, "
     "'foresight' for the same with a learned prediction, "
     "'anywhere' for the network that drives any rover without a planner, 'guided' for both together, "
-    "or the folder of a run of `rover train` or of a forecast."
+    "the folder of a run of `rover train` or of a forecast, or a file of stable-baselines3 (.zip)."
 )
 
 #: Why a policy is refused that is none.
 UNKNOWN = (
-    "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'guided' or the folder of a run of `rover train` or of a "
-    "forecast"
+    "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'guided', the folder of a run of `rover train` or of a "
+    "forecast, or on the command line a file of stable-baselines3 that ends in .zip"
 )
 
 #: Policies without a folder.
