@@ -290,7 +290,7 @@ class _Drives:
 
 def _table(results: Sequence[Episode], title: str) -> Table:
     table = Table(title=title, title_justify="left")
-    for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
+    for heading in ("seed", "success", "distance", "time", "energy", "slip", "real time"):
         table.add_column(heading, justify="right")
     for episode in results:
         table.add_row(
@@ -300,7 +300,7 @@ def _table(results: Sequence[Episode], title: str) -> Table:
             f"{episode.time:.2f} s",
             f"{episode.energy:.0f} J",
             f"{episode.slip:.2%}",
-            f"{episode.real_time_factor:.0f}",
+            f"{episode.real_time_factor:.0f} x",
         )
     if len(results) > 1:
         table.add_section()
@@ -314,7 +314,7 @@ def _table(results: Sequence[Episode], title: str) -> Table:
                     ("time", "{:.2f} s"),
                     ("energy", "{:.0f} J"),
                     ("slip", "{:.2%}"),
-                    ("real_time_factor", "{:.0f}"),
+                    ("real_time_factor", "{:.0f} x"),
                 )
             ),
         )

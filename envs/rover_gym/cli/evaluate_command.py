@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.progress import Progress, TaskID
+from rich.text import Text
 
 from rover_gym.cli.console import (
     INTERRUPTED,
@@ -35,11 +36,12 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
-from rover_gym.env.start import MAX_DIFFICULTY
+from rover_gym.env.start import DEFAULT_DIFFICULTY, MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.policy_figure import draw_policies
 from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.policy.comparison import (
+    ComparedScene,
     Contender,
     comparison_report,
     comparison_table,
@@ -47,6 +49,8 @@ from rover_gym.policy.comparison import (
     film_episode,
     in_markdown,
     named_contender,
+    other_ends,
+    short_tables,
 )
 from rover_gym.policy.evaluation import PolicySummary, summarise
 from rover_gym.policy.named_policy import NAMES, NAMES_HELP
@@ -121,12 +125,18 @@ def evaluate(
                 evaluation.drive(scene, level)
         except KeyboardInterrupt:
             interrupted = True
-        report = comparison_report(evaluation.rows, arguments, seeds)
+        place = _scene(arguments, environment, model, seeds, levels)
+        report = comparison_report(evaluation.rows, arguments, place)
         results.add(**report)
         if evaluation.rows:
             table = comparison_table(evaluation.rows)
-            results.show(plain_table(table))
-            for path in _write(evaluation.rows, table, report, output):
+            for level, short in short_tables(evaluation.rows):
+                here = place if level is None else replace(place, difficulties=(level,))
+                results.show(Text(here.words, overflow="fold"))
+                results.show(plain_table(short))
+            for line in other_ends(evaluation.rows):
+                results.show(Text(line))
+            for path in _write(evaluation.rows, table, report, output, place.words):
                 results.path("written", path)
         if interrupted:
             done, wanted = len(evaluation.drives), len(contenders) * len(scenes)
@@ -196,18 +206,34 @@ def _stem(name: str, difficulty: float | None) -> str:
 
 
 def _write(
-    rows: Sequence[PolicySummary], table: Sequence[Sequence[str]], report: Mapping[str, Any], output: Path
+    rows: Sequence[PolicySummary],
+    table: Sequence[Sequence[str]],
+    report: Mapping[str, Any],
+    output: Path,
+    scene: str,
 ) -> list[Path]:
     """Writes table, data and plot, and returns the files."""
-    (output / "evaluation.md").write_text(in_markdown(table) + "\n", encoding="utf-8")
+    (output / "evaluation.md").write_text(f"{scene}\n\n{in_markdown(table)}\n", encoding="utf-8")
     (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     written = [output / "evaluation.md", output / "evaluation.json"]
     try:
-        draw_policies(rows, output / "evaluation.png")
+        draw_policies(rows, output / "evaluation.png", scene)
         written.append(output / "evaluation.png")
     except MissingExtraError as error:
         typer.echo(f"no picture: {error}", err=True)
     return written
+
+
+def _scene(
+    arguments: Mapping[str, Any], environment: str | None, model: str, seeds: range, levels: Sequence[float]
+) -> ComparedScene:
+    """Where the policies drive, with the difficulty that is the default."""
+    ground = str(arguments.get("terrain", environment))
+    difficulties = tuple(levels)
+    if not levels and ground in ("rocks", "hills", "sand"):
+        difficulties = (DEFAULT_DIFFICULTY,)
+    ground = ground if environment in (None, ground) else f"{environment} on {ground}"
+    return ComparedScene(ground, "the built-in rover" if model == BUILT_IN else model, seeds, difficulties)
 
 
 def _contender(policy: str, rover: RoverModel | None, environment: str | None) -> Contender:

@@ -173,25 +173,93 @@ def comparison_table(rows: Sequence[PolicySummary]) -> list[tuple[str, ...]]:
     return [tuple(row[i] for i in kept) for row in table]
 
 
+def short_tables(rows: Sequence[PolicySummary]) -> list[tuple[float | None, list[tuple[str, ...]]]]:
+    """The figures of policies for a terminal of 80 columns: for each difficulty a table, the headings first."""
+    tables = []
+    for level in dict.fromkeys(row.difficulty for row in rows):
+        table: list[tuple[str, ...]] = [("policy", "success", "95%", "time, s", "J/m", "slip, %", "tilt, °")]
+        for row in rows:
+            if row.difficulty == level:
+                low, high = row.success.interval
+                cells = (
+                    _cell(row.time, ".1f"),
+                    _cell(row.energy_per_metre, ".0f"),
+                    _cell(row.slip, ".1f", 100.0),
+                    _cell(row.tilt, ".1f"),
+                )
+                table.append(
+                    (row.policy, f"{row.success.value:.1%}", f"{100.0 * low:.0f} to {100.0 * high:.0f}", *cells)
+                )
+        tables.append((level, table))
+    return tables
+
+
+def other_ends(rows: Sequence[PolicySummary]) -> list[str]:
+    """A line for each policy that missed goals: how its other episodes ended."""
+    lines = []
+    for row in rows:
+        found = ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end != "goal")
+        where = "" if row.difficulty is None else f" at difficulty {row.difficulty:g}"
+        lines += [f"{row.policy}{where}, other ends: {found}"] if found else []
+    return lines
+
+
+@dataclass(frozen=True)
+class ComparedScene:
+    """Where policies are compared.
+
+    Attributes:
+        ground: The ground, or the environment where none is given.
+        model: The rover.
+        seeds: Seeds of the episodes.
+        difficulties: The difficulties; none where the ground has no rocks.
+    """
+
+    ground: str
+    model: str
+    seeds: range
+    difficulties: tuple[float, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The scene in one line."""
+        levels = ", ".join(f"{level:g}" for level in self.difficulties)
+        difficulty = f", difficulty {levels}" if levels else ""
+        return f"{self.ground}{difficulty}, {self.model}, seeds {self.seeds.start} to {self.seeds.stop - 1}"
+
+    def report(self) -> dict[str, Any]:
+        """The scene for JSON."""
+        seeds = [self.seeds.start, self.seeds.stop - 1]
+        return {
+            "ground": self.ground,
+            "model": self.model,
+            "difficulties": list(self.difficulties),
+            "seeds": seeds,
+        }
+
+
 def in_markdown(table: Sequence[Sequence[str]]) -> str:
     """A table, whose first row are its headings, in Markdown."""
     lines = ["| " + " | ".join(row) + " |" for row in table]
     return "\n".join([lines[0], "|" + "---|" * len(table[0]), *lines[1:]])
 
 
-def _cell(estimate: IntervalEstimate, form: str) -> str:
+def _cell(estimate: IntervalEstimate, form: str, factor: float = 1.0) -> str:
     if math.isnan(estimate.value):
         return "-"
-    half = 0.5 * (estimate.interval[1] - estimate.interval[0])
-    return f"{estimate.value:{form}}" if math.isnan(half) else f"{estimate.value:{form}} ± {half:{form}}"
+    value, half = factor * estimate.value, 0.5 * factor * (estimate.interval[1] - estimate.interval[0])
+    return f"{value:{form}}" if math.isnan(half) else f"{value:{form}} ± {half:{form}}"
 
 
-def comparison_report(rows: Sequence[PolicySummary], arguments: Mapping[str, Any], seeds: range) -> dict[str, Any]:
+def comparison_report(
+    rows: Sequence[PolicySummary], arguments: Mapping[str, Any], scene: ComparedScene
+) -> dict[str, Any]:
     """The figures of policies for JSON, which lacks NaN."""
     return {
         "environment": dict(arguments),
-        "episodes": len(seeds),
-        "seed": seeds.start,
+        **scene.report(),
+        "episodes": len(scene.seeds),
+        "seed": scene.seeds.start,
         "rows": [_without_nan(asdict(row)) for row in rows],
     }
 
