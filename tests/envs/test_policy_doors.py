@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from rover_gym import ModelError, OptionError, PDPolicy, Plane, RoverEnv, RoverModel, TerrainError, Union
+from rover_gym import HeightField, ModelError, OptionError, PDPolicy, Plane, RoverEnv, RoverModel, TerrainError, Union
 from rover_gym.economy import Scene
 from rover_gym.planning import PlannerPolicy
 from rover_gym.planning.futures import Futures
@@ -116,3 +116,20 @@ def test_a_ground_is_an_object_a_name_or_a_file(tmp_path: Path) -> None:
     assert isinstance(made.task.ground, Union)
     assert not isinstance(Scene(mesh).terrain, str)  # type: ignore[arg-type]
     PlannerPolicy(env, terrain=mesh)
+
+
+def test_a_place_outside_a_map_was_refused_without_its_bounds() -> None:
+    """The message ended in "in the last of 100 scenes" and did not say how far the map goes."""
+    env = RoverEnv(terrain=HeightField(np.zeros((41, 21)), (0.5, 1.0)))
+    with refused(TerrainError, "position", "x = 90 m.*the map spans x = -5 to 5 m, z = -20 to 20 m"):
+        env.reset(seed=0, options={"position": (90.0, 0.0)})
+
+
+def test_a_window_without_a_display_showed_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SDL fell back to a driver without a screen, in silence."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("Rover-v0", "RoverRocks-v0", "RoverGrains-v0"):
+        with refused(OptionError, "render_mode", "display"):
+            gym.make(name, render_mode="human")

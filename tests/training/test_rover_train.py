@@ -76,7 +76,7 @@ def test_a_configuration_of_the_package_is_shown(name: str) -> None:
 def test_without_the_extra_the_error_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     error = error_of("train", "rocks", "--output", tmp_path / "run")
-    assert error == "error: stable_baselines3 is not installed: pip install 'rover-gym[train]'\n"
+    assert error == "error: stable-baselines3 is not installed: pip install 'rover-gym[train]'\n"
     assert not (tmp_path / "run").exists()
 
 

@@ -38,6 +38,7 @@ from rover_gym.env.generators import (
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.reward_terms import earn, total
 from rover_gym.env.task import Task, check_actions, make_task
+from rover_gym.ground import bounds_of, surfaces_of
 from rover_gym.mechanics import (
     CommandError,
     DrawnEpisodes,
@@ -50,6 +51,7 @@ from rover_gym.mechanics import (
     RoverGymError,
     Simulation,
     StateError,
+    TerrainError,
     seed_generators,
 )
 from rover_gym.rendering.render_options import RenderOptions
@@ -235,8 +237,23 @@ class RoverBatch:
         used = [self.seed_of(i) if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
         difficulties = [self._difficulties[i] for i in chosen]
         fixed = ResetOptions() if options is None else options
-        episodes = self.draw_rows(rows, difficulties, fixed)
+        try:
+            episodes = self.draw_rows(rows, difficulties, fixed)
+        except TerrainError as error:
+            raise self._with_bounds(error) from None
         return Drawn(episodes, chosen, used, {chosen[k] for k in anew})
+
+    def _with_bounds(self, error: TerrainError) -> TerrainError:
+        """The error of a scene that cannot be drawn, with the bounds of the map."""
+        surfaces = [] if self.task.ground is None else surfaces_of(self.task.ground)
+        corners = [corner for surface in surfaces for corner in bounds_of(surface)]
+        if not corners:
+            return error
+        (x0, z0), (x1, z1) = np.min(corners, axis=0), np.max(corners, axis=0)
+        bounds = f"the map spans x = {x0:.6g} to {x1:.6g} m, z = {z0:.6g} to {z1:.6g} m"
+        named = type(error)(f"{str(error).replace(' scenes', ' draws')}; {bounds}")
+        named.field, named.value = error.field, error.value
+        return named
 
     def draw_rows(
         self, rows: Rows, difficulties: Sequence[Range | None], fixed: ResetOptions | Sequence[ResetOptions]

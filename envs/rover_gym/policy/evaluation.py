@@ -233,7 +233,7 @@ def drive_each(
     rover: RoverEnv = env.unwrapped  # type: ignore[assignment] # run_episode refuses any other
     for seed in seeds:
         tilts: list[float] = []
-        rover.on_period = lambda _rover, info, tilts=tilts: tilts.append(float(info["tilt"]))  # type: ignore[misc]
+        rover.on_period = lambda _rover, info, tilts=tilts: tilts.append(float(info["tilt"]))
         try:
             episode = run_episode(env, policy, seed)
         finally:

@@ -17,6 +17,7 @@ from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, RoverModel, StateError
+from rover_gym.rendering.render_options import RENDER_MODES, check_display
 from rover_gym.sensors.named_sensor import sensor_of
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
@@ -316,10 +317,18 @@ def make_rover(
     Args:
         sensors: The sensors; None for the environment as it is.
         make: `RoverEnv` or a subclass.
-        **arguments: Its arguments.
+        **arguments: Its arguments; with `render_mode="human"` a window shows the frames.
+
+    Raises:
+        OptionError: A window is wanted, but there is no display.
     """
+    is_shown = arguments.get("render_mode") == "human"
+    if is_shown:
+        check_display("render_mode")
+        arguments["render_mode"] = "rgb_array"
     env = make(**arguments)
-    return env if sensors is None else SensorObservation(env, sensors)
+    env = env if sensors is None else SensorObservation(env, sensors)
+    return gym.wrappers.HumanRendering(env) if is_shown else env
 
 
 def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
@@ -328,4 +337,4 @@ def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
 
 
 #: What Gymnasium asks of an entry point before it calls it.
-make_rover.metadata = make_grains_rover.metadata = RoverEnv.metadata  # type: ignore[attr-defined]
+make_rover.metadata = make_grains_rover.metadata = {**RoverEnv.metadata, "render_modes": [*RENDER_MODES, "human"]}  # type: ignore[attr-defined]
