@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -109,6 +109,9 @@ wheel: $(STAMPS)/demo $(if $(TARGET),$(STAMPS)/cross) ## build the wheel, one fo
 
 extras: $(STAMPS)/test wheel ## install the wheel, without Rust, in an empty environment for every Python and for each extra, and try what it promises
 	ROVER_GYM_WHEEL=$$(ls $(abspath dist)/*.whl) $(BIN)/pytest --numprocesses 0 --capture no tests/installing
+
+sizes: $(STAMPS)/test wheel ## measure what an installation takes on disk, and write it into README and manual (SIZES="demo train" for these extras, too)
+	ROVER_GYM_WHEEL=$$(ls $(abspath dist)/*.whl) PYTHONPATH=tests $(BIN)/python -m installing.sizes $(SIZES)
 
 docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked --quiet
