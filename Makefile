@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,7 +28,7 @@ help: ## list the targets (this list)
 demo: ## set up, drive Rover-v0 to a goal, plot the drive, redraw the report's sections 6.1 and 6.2, write a replay page, under runs/
 	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/debian-demo
 	$(BIN)/rover report --figures --output runs/report & report=$$!; \
-	$(BIN)/rover drive --output runs/drive && \
+	rm -rf runs/drive && $(BIN)/rover drive --output runs/drive && \
 	$(BIN)/rover plot runs/drive/episode-0.h5 --output runs/drive/plots && \
 	$(BIN)/rover replay runs/drive/episode-0.h5 --html runs/replay.html && wait $$report
 
@@ -115,6 +115,9 @@ wheel: $(STAMPS)/demo $(if $(TARGET),$(STAMPS)/cross) ## build the wheel, one fo
 extras: $(STAMPS)/test wheel ## install the wheel, without Rust, in an empty environment for every Python and for each extra, and try what it promises
 	ROVER_GYM_WHEEL=$$(ls $(abspath dist)/*.whl) $(BIN)/pytest --numprocesses 0 --capture no tests/installing
 
+sizes: $(STAMPS)/test wheel ## measure what an installation takes on disk, and write it into README and manual (SIZES="demo train" for these extras, too)
+	ROVER_GYM_WHEEL=$$(ls $(abspath dist)/*.whl) PYTHONPATH=tests $(BIN)/python -m installing.sizes $(SIZES)
+
 docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked --quiet
 	$(BIN)/sphinx-build --jobs auto --quiet --fail-on-warning --keep-going docs docs/_build/html
@@ -155,6 +158,7 @@ torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/tables/tort
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
 
 film: $(STAMPS)/test $(MODULE) ## the moving picture at the head of the manual, from a page in a browser: docs/pictures/rover.webp (some minutes)
+	rm -rf runs/film
 	$(BIN)/rover drive --difficulty 1 --policy scan --seed 11 --output runs/film
 	$(BIN)/rover replay runs/film/episode-11.h5 --no-open
 	PYTHONPATH=tests $(BIN)/python -m browser.film runs/film/episode-11.html docs/pictures/rover.webp --begin 0.6

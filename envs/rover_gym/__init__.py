@@ -19,8 +19,8 @@ The package consists of the subpackages below. Each one may import those above i
     grains         granular ground of balls, in space
     sand           wheels on sand: soils, a test bed for one wheel, fits
     env            `Rover-v0`: its card, arguments and control period
-    vector         batches of rovers, for Gymnasium and for stable-baselines3
     sensors        encoders, inertial unit, cameras and scanners as observations
+    vector         batches of rovers, for Gymnasium and for stable-baselines3
     policy         the baseline, trained policies and their evaluation
     planning       driving by planning in the simulator
     economy        the cheapest model that a scene permits

@@ -3,13 +3,23 @@
 from importlib import import_module
 from typing import Any
 
+#: Projects whose packages are imported by other names.
+PROJECTS = {
+    "PIL": "Pillow",
+    "imageio_ffmpeg": "imageio-ffmpeg",
+    "stable_baselines3": "stable-baselines3",
+    "vtkmodules": "VTK",
+    "yaml": "PyYAML",
+}
+
 
 class MissingExtraError(ImportError):
     """A feature needs a package that the base installation does not include."""
 
     def __init__(self, package: str, extra: str) -> None:
         """Creates the error for a missing package and the extra that installs it."""
-        super().__init__(f"{package} is not installed: pip install 'rover-gym[{extra}]'", name=package)
+        project = PROJECTS.get(package, package)
+        super().__init__(f"{project} is not installed: pip install 'rover-gym[{extra}]'", name=package)
 
 
 def require(package: str, extra: str) -> Any:

@@ -52,6 +52,18 @@ def surfaces_of(terrain: Terrain) -> list[HeightField | TriangleMesh]:
     return [part for part in parts_of(terrain) if isinstance(part, (HeightField, TriangleMesh))]
 
 
+def bounds_of(surface: HeightField | TriangleMesh) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Least and greatest x and z of a height field or a mesh, m."""
+    if isinstance(surface, TriangleMesh):
+        places = np.asarray(surface.vertices)[:, [0, 2]]
+        low, high = places.min(axis=0), places.max(axis=0)
+    else:
+        rows, columns = surface.shape
+        low = np.asarray(surface.origin)
+        high = low + np.asarray(surface.spacing) * (columns - 1, rows - 1)
+    return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+
 def heights_of(terrain: Terrain, points: npt.ArrayLike) -> Array:
     """`(n,)` height of the visible ground at (x, z), m; nan where there is none."""
     places = np.asarray(points, dtype=np.float64).reshape(-1, 2)

@@ -6,9 +6,10 @@ from typing import Any
 
 import gymnasium as gym
 
-from rover_gym.env.task import MAX_EPISODE_STEPS
+from rover_gym.env.task import MAX_COURSE_STEPS, MAX_EPISODE_STEPS
 from rover_gym.policy.arcs_env import MAX_ARCS
 from rover_gym.policy.command_env import MAX_COMMANDS
+from rover_gym.policy.trap_env import MAX_TRAP_STEPS
 
 
 @dataclass(frozen=True)
@@ -28,10 +29,10 @@ class Registration:
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
 
-def _rover(arguments: Mapping[str, Any], max_episode_steps: int = MAX_EPISODE_STEPS) -> Registration:
+def _rover(arguments: Mapping[str, Any]) -> Registration:
     """The registration of `Rover-v0` with other arguments."""
-    makers = "rover_gym.sensors:make_rover", "rover_gym.sensors:make_rover_vector"
-    return Registration(*makers, max_episode_steps, arguments)
+    makers = "rover_gym.sensors:make_rover", "rover_gym.vector:make_rover_vector"
+    return Registration(*makers, MAX_EPISODE_STEPS, arguments)
 
 
 ENVIRONMENTS: Mapping[str, Registration] = {
@@ -39,7 +40,12 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverRocks-v0": _rover({"terrain": "rocks"}),
     "RoverHills-v0": _rover({"terrain": "hills"}),
     "RoverSand-v0": _rover({"terrain": "sand"}),
-    "RoverWaypoints-v0": _rover({"waypoints": 5, "goal_distance": (4.0, 8.0)}, 2 * MAX_EPISODE_STEPS),
+    "RoverWaypoints-v0": Registration(
+        "rover_gym.sensors:make_rover",
+        "rover_gym.vector:make_course_vector",
+        MAX_COURSE_STEPS,
+        {"waypoints": 5, "goal_distance": (4.0, 8.0)},
+    ),
     "RoverBattery-v0": _rover({"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0}),
     "RoverCommand-v0": Registration(
         "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
@@ -49,9 +55,9 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     ),
     "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", "rover_gym.policy:RoverGoalVectorEnv", MAX_COMMANDS),
     "RoverTrap-v0": Registration(
-        "rover_gym.policy:RoverTrapEnv", "rover_gym.policy:RoverTrapVectorEnv", MAX_EPISODE_STEPS // 2
+        "rover_gym.policy:RoverTrapEnv", "rover_gym.policy:RoverTrapVectorEnv", MAX_TRAP_STEPS
     ),
-    "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover", "rover_gym.sensors:make_grains_vector"),
+    "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover", "rover_gym.vector:make_grains_vector"),
 }
 
 

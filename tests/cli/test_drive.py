@@ -23,7 +23,7 @@ def place(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
 
 def test_an_episode_prints_its_summary() -> None:
     output = output_of("drive", "--seed", "1")
-    for word in ("success", "distance", "time", "energy", "slip", "real-time factor", "yes"):
+    for word in ("success", "distance", "time", "energy", "slip", "real time", "yes"):
         assert word in output
 
 
@@ -171,8 +171,10 @@ def test_the_recording_says_outcome_and_goal(tmp_path: Path) -> None:
 def test_the_table_has_a_row_a_difficulty(tmp_path: Path) -> None:
     given = ("--episodes", "1", "--difficulty", "0", "--difficulty", "0.25", "--output", tmp_path)
     output = output_of("evaluate", *given)
-    for word in ("difficulty", "success", "95% interval", "time", "energy", "other ends", "0.25"):
-        assert word in output
+    scene = "the built-in rover, seeds 1000000 to 1000000"
+    for words in (f"rocks, difficulty 0, {scene}", f"rocks, difficulty 0.25, {scene}", "success", "95%", "time", "J/m"):
+        assert words in output
+    assert max(map(len, output_of("evaluate", *given).splitlines()[:6])) <= 80
     assert "|" not in output  # a table, not Markdown
     assert "| pd | 0.25 | " in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
 
@@ -185,6 +187,8 @@ def test_json_says_the_same_twice(tmp_path: Path) -> None:
     report = reports[0]
     assert report == reports[1]
     assert report["seed"] == 3
+    assert (report["ground"], report["model"], report["difficulties"]) == ("rocks", "the built-in rover", [0.5])
+    assert report["seeds"] == [3, 4]
     assert report["environment"]["difficulty"] == 0.5
     (row,) = report["rows"]
     assert row["policy"] == "pd"
@@ -208,3 +212,15 @@ def test_policies_of_the_package_are_compared_by_name(tmp_path: Path) -> None:
 def test_a_policy_that_is_named_twice_or_unknown_is_one_line(tmp_path: Path) -> None:
     for names, word in ((("pd", "pd"), "must be named once"), (("planner",), "POLICIES: must be 'pd'")):
         assert word in error_of("evaluate", *names, "--episodes", "1", "--output", tmp_path)
+
+
+def test_a_folder_never_holds_episodes_of_two_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second drive left the first one's other episodes beside its own, under a summary that did not name them."""
+    monkeypatch.chdir(tmp_path)
+    for seed in (3, 4, 5):
+        output_of("drive", "--time-limit", "0.1", "--seed", str(seed))
+    found = sorted(str(path) for path in Path().rglob("episode-*.h5"))
+    assert found == ["runs/drive-2/episode-4.h5", "runs/drive-3/episode-5.h5", "runs/drive/episode-3.h5"]
+    error = error_of("drive", "--time-limit", "0.1", "--output", "runs/drive")
+    assert "another folder" in error
+    assert [path.name for path in Path("runs/drive").glob("*.h5")] == ["episode-3.h5"]

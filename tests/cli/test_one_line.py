@@ -293,6 +293,15 @@ def test_help_calls_rocks_rocks(path: tuple[str, ...]) -> None:
     assert "sphere field" not in text
 
 
+@pytest.mark.parametrize("path", [(), *((name,) for name in ("sand", "grains", "model")), *COMMANDS], ids=" ".join)
+def test_help_cut_words_at_80_columns(path: tuple[str, ...]) -> None:
+    """In its frames it ended words by an ellipsis: `--no-antialias…`, `stable-baseline…`."""
+    text = rover(*path, "--help", COLUMNS="80", TERMINAL_WIDTH="80").output
+    assert max(map(len, text.splitlines())) <= 80
+    assert "…" not in text
+    assert not [line for line in text.splitlines() if line.endswith("...") and "Usage" not in line]
+
+
 def test_a_command_that_prints_a_table_takes_json() -> None:
     """The others print paths of files or serve a page."""
     without = {

@@ -45,7 +45,7 @@ def measure(rounds: int = ROUNDS) -> dict[str, float]:
         "welded, unmet rocks": {"terrain": rocks, "steered": False},
     }
     rovers = {
-        name: RoverVectorEnv(N_ROVERS, threads=1, max_episode_steps=None, goal_distance=100.0, **arguments)
+        name: RoverVectorEnv(N_ROVERS, threads=1, max_episode_steps=-1, goal_distance=100.0, **arguments)
         for name, arguments in variants.items()
     }
     for env in rovers.values():

@@ -376,3 +376,25 @@ def test_the_time_limit_is_the_registered_one(name: str) -> None:
     envs: Any = gym.make_vec(name, 1)
     repeat = getattr(envs, "repeat", 1)
     assert envs.unwrapped.batch.max_episode_steps == limit * repeat
+
+
+def limit_of(env: Any) -> int | None:
+    """Steps until the `TimeLimit` around an environment ends an episode; None without one."""
+    while env is not env.unwrapped:
+        if isinstance(env, gym.wrappers.TimeLimit):
+            return env._max_episode_steps
+        env = env.env
+    return None
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_limit_of_none_or_minus_one_was_another_in_a_vector(name: str) -> None:
+    """None meant "no limit" in the native vector and the registered one elsewhere, and -1 was refused there."""
+    for given in (None, -1, 7):
+        alone = limit_of(gym.make(name, max_episode_steps=given))
+        assert alone == {None: ENVIRONMENTS[name].max_episode_steps, -1: None, 7: 7}[given]
+        plain: Any = gym.make_vec(name, 1, vectorization_mode="sync", max_episode_steps=given)
+        assert limit_of(plain.envs[0]) == alone
+        native: Any = gym.make_vec(name, 1, max_episode_steps=given)
+        repeat = getattr(native, "repeat", 1)
+        assert native.unwrapped.batch.max_episode_steps == (None if alone is None else repeat * alone)

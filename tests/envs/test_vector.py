@@ -55,7 +55,7 @@ def test_neither_threads_nor_neighbours_show(n: int, threads: int) -> None:
 
 
 def test_without_a_limit_nothing_is_truncated() -> None:
-    env = RoverVectorEnv(1, max_episode_steps=None)
+    env = RoverVectorEnv(1, max_episode_steps=-1)
     assert env.batch.max_episode_steps is None
     env.reset(seed=0)
     for action in actions(1, steps=2 * LIMIT):

@@ -26,6 +26,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from mcap_ros2.decoder import DecoderFactory as CdrFactory
 
 from rover_gym.exports import McapWriter, write_mcap
+from rover_gym.replay.sights import sensor_of
 
 GROUND = SphereField([[1.0, 0.1, -0.5], [2.0, 0.0, 0.7]], [0.2, 0.3], Plane((-0.1, 1.0, 0.05), 0.0))
 PICTURE = np.zeros((32, 48, 3), np.uint8)
@@ -305,3 +306,20 @@ def test_the_command_writes_beside_the_run(tmp_path: Path) -> None:
     assert len(read(tmp_path / "run.mcap")["/tf"]) == 3
     assert "--output: would replace the run itself" in error_of("export", "mcap", path, "--output", path)
     assert read_run(path).n_frames == 3
+
+
+def test_a_recorded_laser_and_depth_were_only_numbers_in_the_log(tmp_path: Path) -> None:
+    """Recorded with `rover drive --sensor`, they are point clouds on the ground."""
+    output_of("drive", "--time-limit", "0.1", "--sensor", "laser", "--sensor", "depth", "--output", tmp_path)
+    write_mcap(read_run(tmp_path / "episode-0.h5"), tmp_path / "log.mcap")
+    topics = read(tmp_path / "log.mcap")
+    run = read_run(tmp_path / "episode-0.h5")
+    for name in ("laser", "depth"):
+        clouds = [message for _, message in topics[f"/{name}/points"]]
+        assert len(clouds) == run.n_frames
+        points = np.frombuffer(clouds[0].data, np.float32).reshape(-1, 3)
+        seen = np.count_nonzero(run.trajectory.data[name][0] < sensor_of(name, run.model).max_range)
+        assert len(points) == seen > 10
+        # The trunk is level at the start, z up: all hits lie on the plane under it.
+        np.testing.assert_allclose(points[:, 2], -run.trajectory.data["q"][0, 1], atol=0.02)
+    assert name not in topics["/signals"][0][1]

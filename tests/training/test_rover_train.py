@@ -76,7 +76,7 @@ def test_a_configuration_of_the_package_is_shown(name: str) -> None:
 def test_without_the_extra_the_error_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     error = error_of("train", "rocks", "--output", tmp_path / "run")
-    assert error == "error: stable_baselines3 is not installed: pip install 'rover-gym[train]'\n"
+    assert error == "error: stable-baselines3 is not installed: pip install 'rover-gym[train]'\n"
     assert not (tmp_path / "run").exists()
 
 
@@ -105,3 +105,27 @@ def test_an_episode_is_filmed_to_its_end(tmp_path: Path) -> None:
     assert episode.success
     frames, _seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert frames == round(episode.time * 5.0) + 1 + ENDING
+
+
+def test_a_run_is_never_overwritten_and_its_figures_are_events(config: Path, tmp_path: Path) -> None:
+    """A second training into the same folder replaced the network of the first, and TensorBoard had nothing to show."""
+    folder = tmp_path / "run"
+    output_of("train", config, "--output", folder, "--workers", 1)
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    events = accumulator.EventAccumulator(str(folder / "tensorboard"))
+    events.Reload()
+    assert {"imitation/loss", "imitation/agreement", "evaluation/near"} <= set(events.Tags()["scalars"])
+    before = (folder / "arcs.npz").read_bytes()
+    error = error_of("train", config, "--output", folder, "--workers", 1, "--seed", 2)
+    assert "--resume" in error
+    assert (folder / "arcs.npz").read_bytes() == before
+
+
+def test_a_long_training_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between two evaluations, for minutes, a training printed nothing."""
+    monkeypatch.setattr("rover_gym.learning.arc_recipe.SILENCE", 0.0)
+    ppo = {"decisions": 32, "n_steps": 4, "batch_size": 16, "n_epochs": 1, "every": 1000}
+    changed = tmp_path / "ppo.yaml"
+    changed.write_text(yaml.safe_dump({**TINY, "imitation": {"rounds": 0}, "ppo": ppo}), encoding="utf-8")
+    said = output_of("train", changed, "--from", "anywhere", "--output", tmp_path / "run", "--workers", 1)
+    assert "16 of 32 decisions, 50%" in said

@@ -25,6 +25,7 @@ from rover_gym.cli.usage import PlainUsage
 from rover_gym.mechanics import __version__
 
 app = typer.Typer(
+    rich_markup_mode=None,
     cls=PlainUsage,
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
     context_settings={"help_option_names": ["-h", "--help"]},

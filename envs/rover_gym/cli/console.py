@@ -244,7 +244,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard out
 
 def plain_table(rows: Sequence[Sequence[str]]) -> Table:
     """A table whose first row are its headings; what begins with a digit in a column is set to the right."""
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for i, heading in enumerate(rows[0]):
         numbers = [row[i] for row in rows[1:] if row[i]]
         is_number = bool(numbers) and all(text[0] in "0123456789-" for text in numbers)

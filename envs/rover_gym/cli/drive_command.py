@@ -26,6 +26,8 @@ from rover_gym.cli.newest import recording_folder, say_how_to_watch
 from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
+    Arguments,
+    EnvironmentName,
     FilmAntialiasing,
     FilmCamera,
     FilmForces,
@@ -43,6 +45,8 @@ from rover_gym.cli.options import (
     environment_of,
     environment_title,
     film_options,
+    given_arguments,
+    known_environment,
     named_driver,
     named_ground,
     named_model,
@@ -50,14 +54,14 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.cli.tape import Tape, Watched
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.files import write_whole
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
-from rover_gym.policy.evaluation import Episode, run_episode
+from rover_gym.policy.evaluation import Episode, run_episode, timed
 from rover_gym.record.channels import outcome_words
 from rover_gym.replay.sights import SENSORS
+from rover_gym.replay.tape import Tape, Watched
 from rover_gym.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -85,7 +89,11 @@ Episodes = Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the first episode; the others count up from it.")]
 Output = Annotated[
     Path | None,
-    typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: runs/drive."),
+    typer.Option(
+        file_okay=False,
+        help="Folder for trajectories (HDF5) and summary.json, without those of another run. "
+        "Default: runs/drive, or the next of runs/drive-2, runs/drive-3, ... without a run.",
+    ),
 ]
 Record = Annotated[bool, typer.Option("--record/--no-record", help="Record the episodes.")]
 Sensors = Annotated[
@@ -115,6 +123,8 @@ def drive(
     map_coordinates: OnMap = False,
     goal: Goal = None,
     policy: Driver = "pd",
+    environment: EnvironmentName = None,
+    argument: Arguments = None,
     friction: Friction = 0.7,
     time_step: TimeStep = 0.005,
     time_limit: TimeLimit = 60.0,
@@ -139,28 +149,34 @@ def drive(
     for name in sensor or ():
         if name not in SENSORS:
             refuse(OptionError, "sensor", name, f"must be one of {', '.join(SENSORS)}")
+    own = given_arguments(argument)
+    is_free = environment is not None and terrain is None
     terrain = chosen_terrain(terrain, difficulty)
     folder = recording_folder(output, FOLDER, wanted=record)
     _check_paths(folder, film, range(seed, seed + episodes), {"ground": terrain, "model": model, "policy": policy})
     scene = {"terrain": terrain, "friction": friction, "time_step": time_step}
+    if is_free:
+        del scene["terrain"]
     scene |= _given({"difficulty": difficulty, "slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading})
     named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
     named |= {} if nodata is None else {"nodata": str(nodata)}
     rover, ground = named_model(model), named_ground(terrain, spacing, height_range, nodata)
     options = places_on(ground, {"position": start, "goal": goal}, map_coordinates=map_coordinates)
     chosen = named_driver(policy, rover)
-    as_given = {**scene, **named, **chosen.arguments}
-    arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments}
+    as_given = {**scene, **named, **chosen.arguments, **own}
+    arguments = {**scene, **_given({"model": rover, "terrain": ground}), **chosen.arguments, **own}
     if film is not None:
         look = film_options(size, camera, forces=forces, antialiasing=antialiasing)
         arguments |= {"render_mode": "rgb_array", "render_options": look}
-    env = gym.make(environment_of(terrain), max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
+    name = environment_of(terrain) if environment is None else known_environment(environment)
+    env = timed(gym.make(name, max_episode_steps=-1, **arguments), time_limit)
     warn_of_slope(slope, friction)
-    title = f"{environment_title(terrain)} with {driver_title(policy)}"
+    place = environment_title(terrain) if environment is None else name
+    title = f"{place} with {driver_title(policy)}"
     drives = _Drives(env, Watched(chosen.make(env)), title, as_given, options, list(dict.fromkeys(sensor or ())))
     drives.run(range(seed, seed + episodes), folder, film)
     summary = {
-        "environment": environment_of(terrain),
+        "environment": name,
         "policy": policy,
         "arguments": as_given | options,
         "episodes": [asdict(episode) for episode in drives.results],
@@ -228,6 +244,13 @@ class _Drives:
     paths: list[Path] = field(default_factory=list)
     interrupted: bool = False
 
+    @property
+    def rover(self) -> RoverEnv:
+        """The rover inside the environment."""
+        inner = self.env.unwrapped
+        assert isinstance(inner, RoverEnv)  # noqa: S101 - `timed` has checked it
+        return inner
+
     def run(self, seeds: Sequence[int], output: Path | None, film: Path | None) -> None:
         """Drives an episode per seed, records it if there is a folder, and closes the environment."""
         with progress_bar() as bar, ExitStack() as stack:
@@ -261,7 +284,9 @@ class _Drives:
                 if reel is not None:
                     reel.show(rover, seed, info["time"])
 
-            episode = run_episode(self.env, self.policy, seed, options=self.options, on_step=on_step)
+            self.rover.on_period = on_step
+            stack.callback(setattr, self.rover, "on_period", None)
+            episode = run_episode(self.env, self.policy, seed, options=self.options)
             if reel is not None:
                 reel.end(episode)
             if tape is not None:
@@ -272,7 +297,7 @@ class _Drives:
 
 def _table(results: Sequence[Episode], title: str) -> Table:
     table = Table(title=title, title_justify="left")
-    for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
+    for heading in ("seed", "success", "distance", "time", "energy", "slip", "real time"):
         table.add_column(heading, justify="right")
     for episode in results:
         table.add_row(
@@ -282,7 +307,7 @@ def _table(results: Sequence[Episode], title: str) -> Table:
             f"{episode.time:.2f} s",
             f"{episode.energy:.0f} J",
             f"{episode.slip:.2%}",
-            f"{episode.real_time_factor:.0f}",
+            f"{episode.real_time_factor:.0f} x",
         )
     if len(results) > 1:
         table.add_section()
@@ -296,7 +321,7 @@ def _table(results: Sequence[Episode], title: str) -> Table:
                     ("time", "{:.2f} s"),
                     ("energy", "{:.0f} J"),
                     ("slip", "{:.2%}"),
-                    ("real_time_factor", "{:.0f}"),
+                    ("real_time_factor", "{:.0f} x"),
                 )
             ),
         )

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.progress import Progress, TaskID
+from rich.text import Text
 
 from rover_gym.cli.console import (
     INTERRUPTED,
@@ -21,21 +22,28 @@ from rover_gym.cli.console import (
 )
 from rover_gym.cli.options import (
     BUILT_IN,
+    Arguments,
+    EnvironmentName,
     ModelName,
     RayAddress,
     complete_policy,
     complete_terrain,
+    given_arguments,
+    is_model_file,
+    known_environment,
+    named_driver,
     named_model,
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
-from rover_gym.env.start import MAX_DIFFICULTY
+from rover_gym.env.start import DEFAULT_DIFFICULTY, MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.figures.policy_figure import draw_policies
 from rover_gym.files import write_whole
-from rover_gym.mechanics import OptionError
+from rover_gym.mechanics import OptionError, RoverModel
 from rover_gym.policy.comparison import (
+    ComparedScene,
     Contender,
     comparison_report,
     comparison_table,
@@ -43,6 +51,8 @@ from rover_gym.policy.comparison import (
     film_episode,
     in_markdown,
     named_contender,
+    other_ends,
+    short_tables,
 )
 from rover_gym.policy.evaluation import EvaluatedEpisode, PolicySummary, drive_all, summarise
 from rover_gym.policy.named_policy import NAMES, NAMES_HELP
@@ -56,11 +66,14 @@ def evaluate(
         typer.Argument(help=f"Who drives: {NAMES_HELP[:-1]}. Default: pd.", autocompletion=complete_policy),
     ] = None,
     terrain: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="'plane', 'rocks', 'hills', 'sand', or the file of a map or a mesh.", autocompletion=complete_terrain
+            help="'plane', 'rocks', 'hills', 'sand', or the file of a map or a mesh. Default: rocks.",
+            autocompletion=complete_terrain,
         ),
-    ] = "rocks",
+    ] = None,
+    environment: EnvironmentName = None,
+    argument: Arguments = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
         list[float] | None, typer.Option(help="Difficulty of the ground, from 0 to 2; repeat it for several.")
@@ -88,11 +101,12 @@ def evaluate(
     reached the goal; energy is the work through the wheel motors over the way driven. The default seeds are never
     used in training. Ctrl-C ends the evaluation: the policies that are done are printed and kept.
     """
-    terrain = terrain_name(terrain)
+    arguments = given_arguments(argument)
+    if environment is None or terrain is not None:
+        arguments["terrain"] = terrain_name(terrain or "rocks")
     if slope is not None:
         warn_of_slope(number("slope", slope, at_least=0.0, at_most=MAX_SLOPE_DEG))
     levels = [number("difficulty", level, at_least=0.0, at_most=MAX_DIFFICULTY) for level in difficulty or ()]
-    arguments: dict[str, Any] = {"terrain": terrain}
     arguments |= {} if model == BUILT_IN else {"model": model}
     arguments |= {} if slope is None else {"slope_deg": slope}
     scenes: list[tuple[float | None, dict[str, Any]]] = [(None, arguments)]
@@ -103,7 +117,7 @@ def evaluate(
     for package in ("imageio_ffmpeg", "vtkmodules") if films else ():
         require(package, "render")
     drive = _driver(ray, threads)
-    contenders = _contenders(policies or ["pd"], model)
+    contenders = _contenders(policies or ["pd"], model, environment)
     seeds = range(seed, seed + episodes)
     evaluation = _Evaluation(contenders, seeds, output, drive)
     reads = {"the ground": terrain, "the model": model, "the policy": [one.files for one in contenders]}
@@ -116,12 +130,18 @@ def evaluate(
                 evaluation.drive(scene, level)
         except KeyboardInterrupt:
             interrupted = True
-        report = comparison_report(evaluation.rows, arguments, seeds)
+        place = _scene(arguments, environment, model, seeds, levels)
+        report = comparison_report(evaluation.rows, arguments, place)
         results.add(**report)
         if evaluation.rows:
             table = comparison_table(evaluation.rows)
-            results.show(plain_table(table))
-            for path in _write(evaluation.rows, table, report, output):
+            for level, short in short_tables(evaluation.rows):
+                here = place if level is None else replace(place, difficulties=(level,))
+                results.show(Text(here.words, overflow="fold"))
+                results.show(plain_table(short))
+            for line in other_ends(evaluation.rows):
+                results.show(Text(line))
+            for path in _write(evaluation.rows, table, report, output, place.words):
                 results.path("written", path)
         if interrupted:
             done, wanted = len(evaluation.drives), len(contenders) * len(scenes)
@@ -187,7 +207,8 @@ class _Evaluation:
         for contender in self.contenders:
             for seed in self.seeds[:films]:
                 path = self.output / "films" / f"{_stem(contender.name, difficulty)}-seed{seed}.mp4"
-                film_episode(path, contender.make, {**arguments, **contender.arguments}, seed)
+                given = {**arguments, **contender.arguments}
+                film_episode(path, contender.make, given, seed, contender.environment)
                 yield path
 
 
@@ -208,28 +229,54 @@ def _stem(name: str, difficulty: float | None) -> str:
 
 
 def _write(
-    rows: Sequence[PolicySummary], table: Sequence[Sequence[str]], report: Mapping[str, Any], output: Path
+    rows: Sequence[PolicySummary],
+    table: Sequence[Sequence[str]],
+    report: Mapping[str, Any],
+    output: Path,
+    scene: str,
 ) -> list[Path]:
     """Writes table, data and plot, and returns the files."""
-    write_whole(output / "evaluation.md", in_markdown(table) + "\n")
+    write_whole(output / "evaluation.md", f"{scene}\n\n{in_markdown(table)}\n")
     write_whole(output / "evaluation.json", json.dumps(report, indent=2) + "\n")
     written = [output / "evaluation.md", output / "evaluation.json"]
     try:
-        draw_policies(rows, output / "evaluation.png")
+        draw_policies(rows, output / "evaluation.png", scene)
         written.append(output / "evaluation.png")
     except MissingExtraError as error:
         typer.echo(f"no picture: {error}", err=True)
     return written
 
 
-def _contenders(policies: Sequence[str], model: str) -> list[Contender]:
+def _scene(
+    arguments: Mapping[str, Any], environment: str | None, model: str, seeds: range, levels: Sequence[float]
+) -> ComparedScene:
+    """Where the policies drive, with the difficulty that is the default."""
+    ground = str(arguments.get("terrain", environment))
+    difficulties = tuple(levels)
+    if not levels and ground in ("rocks", "hills", "sand"):
+        difficulties = (DEFAULT_DIFFICULTY,)
+    ground = ground if environment in (None, ground) else f"{environment} on {ground}"
+    return ComparedScene(ground, "the built-in rover" if model == BUILT_IN else model, seeds, difficulties)
+
+
+def _contender(policy: str, rover: RoverModel | None, environment: str | None) -> Contender:
+    """A policy by its name, its folder or its file."""
+    if is_model_file(policy):
+        chosen, path = named_driver(policy, rover), Path(policy)
+        name = path.parent.name if path.stem == "model" and path.parent.name else path.stem
+        return Contender(name, chosen.make, chosen.arguments, (path,), environment or "Rover-v0")
+    return replace(named_contender(policy, rover), environment=environment)
+
+
+def _contenders(policies: Sequence[str], model: str, environment: str | None = None) -> list[Contender]:
     """All who drive, in the order of the table: the package's policies, trained networks.
 
     Raises:
         OptionError: Two policies have the same name.
     """
     rover = named_model(model)
-    contenders = [named_contender(policy, rover) for policy in policies]
+    name = None if environment is None else known_environment(environment)
+    contenders = [_contender(policy, rover, name) for policy in policies]
     contenders.sort(key=lambda contender: contender.is_trained)
     names = [contender.name for contender in contenders]
     for i, name in enumerate(names):

@@ -29,6 +29,7 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
+from rover_gym.cli.usage import WholeHelp
 from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_writer import FPS, write_mcap
 from rover_gym.exports.minari_data import write_dataset
@@ -42,7 +43,9 @@ from rover_gym.record.rover_run import read_run
 from rover_gym.registration import ENVIRONMENTS
 from rover_gym.validation import refuse
 
-export = typer.Typer(help="Runs, policies and rovers in other formats.", no_args_is_help=True)
+export = typer.Typer(
+    cls=WholeHelp, rich_markup_mode=None, help="Runs, policies and rovers in other formats.", no_args_is_help=True
+)
 
 
 @export.command()

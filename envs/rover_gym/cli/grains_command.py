@@ -9,6 +9,7 @@ import typer
 from rover_gym.cli.console import Results, Row, plain_errors, row, status
 from rover_gym.cli.grains_options import MARS, Balls, BallScene, Radius, radii, recorded, say
 from rover_gym.cli.options import ModelName, named_model, takes
+from rover_gym.cli.usage import WholeHelp
 from rover_gym.mechanics import Motor, OptionError, RoverModel
 from rover_gym.validation import number, refuse
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 
 grains = typer.Typer(
+    cls=WholeHelp,
+    rich_markup_mode=None,
     help="Balls in space: beds, vessels, tools and rovers.",
     no_args_is_help=True,
 )

@@ -18,13 +18,22 @@ def recording_folder(output: Path | None, usual: Path, *, wanted: bool) -> Path 
 
     Without a folder that the user named, one that cannot be written is no error: it is said.
 
+    A folder has the episodes of one run: one that the user named must not have any, and the usual one is numbered.
+
     Args:
         output: The folder that the user named.
         usual: The folder otherwise.
         wanted: Whether the user wants a recording.
+
+    Raises:
+        OptionError: The folder that the user named has a recorded run.
     """
     if not wanted:
         return None
+    if output is None:
+        usual = _unused(usual)
+    elif _has_run(output):
+        refuse(OptionError, "output", str(output), "has the episodes of a run: name another folder, or remove it")
     try:
         check_paths(output=Into(output or usual))
     except (OptionError, OSError) as error:
@@ -33,6 +42,17 @@ def recording_folder(output: Path | None, usual: Path, *, wanted: bool) -> Path 
         typer.echo(f"not recorded: {error}", err=True)
         return None
     return output or usual
+
+
+def _has_run(folder: Path) -> bool:
+    """Whether a folder has what a run leaves: recorded episodes or their summary."""
+    return (folder / "summary.json").exists() or any(folder.glob("episode-*.h5"))
+
+
+def _unused(usual: Path) -> Path:
+    """The first of a folder and those with its name and a number, from 2, that has no recorded run."""
+    names = (usual, *(usual.with_name(f"{usual.name}-{k}") for k in range(2, 10_000)))
+    return next((folder for folder in names if not _has_run(folder)), usual)
 
 
 def newest_run(place: Path | None) -> Path:

@@ -2,9 +2,10 @@
 
 import functools
 import inspect
+import json
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
@@ -13,12 +14,14 @@ import typer
 
 from rover_gym.env.arguments import ARGUMENTS, TERRAINS, terrain_name
 from rover_gym.env.episode_scene import map_place
+from rover_gym.extras import require
 from rover_gym.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
 from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
 from rover_gym.models.lookup import KINDS
 from rover_gym.planning.planner_policy import PlannerPolicy
 from rover_gym.policy.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
+from rover_gym.registration import ENVIRONMENTS as REGISTERED
 from rover_gym.rendering.render_options import CAMERAS, check_render_options
 from rover_gym.validation import refuse
 
@@ -70,8 +73,8 @@ def complete_model(incomplete: str) -> list[str]:
 
 
 def complete_policy(incomplete: str) -> list[str]:
-    """Names of policies, and folders."""
-    return _named(incomplete, DRIVERS) + _files(incomplete, ())
+    """Names of policies, folders, and models' files."""
+    return _named(incomplete, DRIVERS) + _files(incomplete, (".zip",))
 
 
 def complete_recording(incomplete: str) -> list[str]:
@@ -219,21 +222,83 @@ def places_on(
     return {name: map_place(ground, name, place) for name, place in given.items()} if map_coordinates else given
 
 
+EnvironmentName = Annotated[
+    str | None,
+    typer.Option(
+        "--environment",
+        metavar="ID",
+        help="Environment that the policy drives, such as RoverCommand-v0. Default: that of the ground.",
+        autocompletion=lambda: list(REGISTERED),
+    ),
+]
+
+Arguments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--argument",
+        metavar="NAME=VALUE",
+        help="Argument of the environment, its value in JSON; repeat it for several.",
+    ),
+]
+
+
+def known_environment(name: str) -> str:
+    """An environment of this package by its name.
+
+    Raises:
+        OptionError: There is none of this name.
+    """
+    if name not in REGISTERED:
+        refuse(OptionError, "environment", name, f"must be one of {', '.join(REGISTERED)}")
+    return name
+
+
+def given_arguments(given: Sequence[str] | None) -> dict[str, Any]:
+    """The arguments of options NAME=VALUE; a value that is no JSON is a text.
+
+    Raises:
+        OptionError: One has no name or no value.
+    """
+    arguments: dict[str, Any] = {}
+    for one in given or ():
+        name, equals, text = one.partition("=")
+        if not (equals and name.isidentifier()):
+            refuse(OptionError, "argument", one, "must be NAME=VALUE, for example height_scan=true")
+        try:
+            arguments[name] = json.loads(text)
+        except ValueError:
+            arguments[name] = text
+    return arguments
+
+
 DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on policies."
 
 
 def named_driver(name: str, model: RoverModel | None = None) -> NamedPolicy:
-    """The policy of a name, as `named_policy` takes it, or "planner".
+    """The policy of a name, as `named_policy` takes it, "planner", or a model's file of stable-baselines3.
 
     Raises:
         PolicyError: There is no such policy.
         OSError: A file may not be read.
     """
+    if is_model_file(name):
+        for package in ("stable_baselines3", "yaml"):
+            require(package, "train")
+        from rover_gym.learning.policy_file import policy_of_file  # noqa: PLC0415 - needs the extra
+
+        return policy_of_file(name)
     return NamedPolicy({}, PlannerPolicy) if name == "planner" else named_policy(name, model)
+
+
+def is_model_file(name: str) -> bool:
+    """Whether a policy's name is a file of stable-baselines3."""
+    return name.endswith(".zip") and Path(name).is_file()
 
 
 def driver_title(name: str) -> str:
     """What a driver is, as a heading says it."""
+    if is_model_file(name):
+        return Path(name).name
     return "the planner with futures" if name == "planner" else policy_title(name)
 
 

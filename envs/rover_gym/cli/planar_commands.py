@@ -13,6 +13,7 @@ from rover_gym.cli.console import AsJson, Results, plain_errors, row
 from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.cli.soil_command import soil
+from rover_gym.cli.usage import WholeHelp
 from rover_gym.mechanics import (
     BallSimulation,
     Line,
@@ -27,7 +28,12 @@ from rover_gym.mechanics import (
 from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.validation import number, refuse
 
-planar = typer.Typer(help="Planar systems: a ball, a two-wheel rover, soil of disks.", no_args_is_help=True)
+planar = typer.Typer(
+    cls=WholeHelp,
+    rich_markup_mode=None,
+    help="Planar systems: a ball, a two-wheel rover, soil of disks.",
+    no_args_is_help=True,
+)
 
 
 STEEPEST = 89.0  # degrees: an upright line is no ground

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from rover_gym.cli.console import AsJson, Results, plain_errors
 from rover_gym.cli.paths import check_paths
+from rover_gym.cli.usage import WholeHelp
 from rover_gym.mechanics import OptionError
 from rover_gym.models import open_model
 from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
@@ -21,7 +22,9 @@ from rover_gym.sand.convert import convert_runs
 from rover_gym.sand.trials import read_trial
 from rover_gym.validation import number, refuse
 
-sand = typer.Typer(help="Wheels and rovers on sand, and soils by name.", no_args_is_help=True)
+sand = typer.Typer(
+    cls=WholeHelp, rich_markup_mode=None, help="Wheels and rovers on sand, and soils by name.", no_args_is_help=True
+)
 
 EARTH = 9.81  # m/s^2
 

@@ -3,7 +3,7 @@
 import csv
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table
 from rover_gym.cli.options import RayAddress
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.extras import require
+from rover_gym.mechanics import OptionError
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.named_policy import network_folder
@@ -91,10 +92,11 @@ def train(
 
     Needs the extra `train`.
 
-    Checkpoints, the learning curve (`curve.csv`), the network at the end (`arcs.npz`) and the one that did best in the
-    evaluations (`best`) are in the run's folder. Several seeds end with a table.
+    Checkpoints, the learning curve (`curve.csv`), TensorBoard's events (`tensorboard`), the network at the end
+    (`arcs.npz`) and the one that did best in the evaluations (`best`) are in the run's folder. A run is never
+    overwritten. Several seeds end with a table.
     """
-    for package in ("yaml", "stable_baselines3"):
+    for package in ("yaml", "stable_baselines3", "tensorboard"):
         require(package, "train")
     if ray is not None:
         require("ray", "rllib")
@@ -112,8 +114,10 @@ def train(
         settings = replace(settings, ppo=replace(settings.ppo, decisions=steps))
     network = None if begin is None else _network(begin)
     folders = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
-    for folder in () if resume else folders.values():
-        check_paths({"the configuration": path, "the network": begin}, output=Into(folder, WRITTEN))
+    if not resume:
+        _check_unused(folders.values())
+        for folder in folders.values():
+            check_paths({"the configuration": path, "the network": begin}, output=Into(folder, WRITTEN))
     with Results(as_json=as_json) as results:
         for seed, folder in folders.items():
             train_arcs(
@@ -132,6 +136,20 @@ def train(
         results.add(seeds=[{"seed": seed, **row} for seed, row in zip(folders, rows, strict=True)])
         if len(folders) > 1:
             results.show(plain_table(_seed_table(list(folders), rows)))
+
+
+def _check_unused(folders: Iterable[Path]) -> None:
+    """Refuses folders that have a run, before the first training begins.
+
+    Raises:
+        OptionError: One has a run.
+    """
+    from rover_gym.learning.arc_recipe import RUN_FILES  # noqa: PLC0415 - needs the extra
+
+    for folder in folders:
+        if any((folder / name).exists() for name in RUN_FILES):
+            reason = "has a run, which is never overwritten: go on with it by --resume, or name another --output"
+            refuse(OptionError, "output", str(folder), reason)
 
 
 def _network(policy: str) -> ArcNetwork:

@@ -10,7 +10,23 @@ from typer.core import TyperGroup
 UsageError: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 
 
-class PlainUsage(TyperGroup):
+class WholeHelp(TyperGroup):
+    """A group whose help gives the first paragraph of each command, wrapped instead of cut."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Writes the list of commands."""
+        commands = ((name, self.get_command(ctx, name)) for name in self.list_commands(ctx))
+        rows = [
+            (name, " ".join((command.help or "").split("\n\n")[0].split()))
+            for name, command in commands
+            if command is not None and not command.hidden
+        ]
+        if rows:
+            with formatter.section("Commands"):
+                formatter.write_dl(rows)
+
+
+class PlainUsage(WholeHelp):
     """The group of all commands, which ends with one line on standard error where its usage is wrong."""
 
     def main(self, *args: Any, **options: Any) -> Any:

@@ -7,11 +7,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.maps.ground_lookup import as_terrain
 from rover_gym.mechanics import (
     CommandError,
     Line,
     MirroredRoverSimulation,
-    ModelError,
     OptionError,
     Plane,
     RoverModel,
@@ -19,8 +19,8 @@ from rover_gym.mechanics import (
     StepError,
     StepReport,
     Terrain,
-    TerrainError,
 )
+from rover_gym.models.lookup import as_model
 from rover_gym.validation import flag, known_keys, refuse, vector
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -47,8 +47,8 @@ class Scene:
     """A rover, its terrain, and the commands that it may receive.
 
     Attributes:
-        terrain: The ground.
-        model: The rover.
+        terrain: The ground, or the file of a map or a mesh.
+        model: The rover, its name in the gallery or its file.
         start: `(nq,)` public coordinates; None starts at rest on the terrain at x = z = 0: on a map or a mesh with all
             wheels, elsewhere on the plane with joints at zero.
         heading: Heading of the default start, rad.
@@ -71,15 +71,15 @@ class Scene:
     reach: float | None = None
     options: dict[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "terrain", as_terrain("terrain", self.terrain))
+        object.__setattr__(self, "model", as_model("model", self.model))
+
 
 def check_scene(scene: Scene) -> None:
     """Checks the types of a scene's parts and the names of its options."""
     if not isinstance(scene, Scene):
         refuse(OptionError, "scene", scene, "must be a Scene")
-    if not isinstance(scene.terrain, Terrain):
-        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; combine several with Union")
-    if not isinstance(scene.model, RoverModel):
-        refuse(ModelError, "model", scene.model, "must be a RoverModel")
     for name in ("steered", "equal_torques", "held", "tumbles"):
         flag(name, getattr(scene, name))
     if not isinstance(scene.options, dict):

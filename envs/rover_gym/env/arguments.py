@@ -9,7 +9,6 @@ package's errors. Its string form is what the card prints under "may be".
 
 import inspect
 import math
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,10 +17,11 @@ from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
 from rover_gym.env.observation import info_table, observation_table
 from rover_gym.env.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_reward_terms
+from rover_gym.env.spec_json import model_from_json, soil_from_json, terrain_from_json
 from rover_gym.env.start import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.maps.map_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
-from rover_gym.models.lookup import open_model
+from rover_gym.models.lookup import as_model
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
 from rover_gym.sand.soils import Soil, named_soil
 from rover_gym.validation import Range, flag, known_keys, mapping, number, refuse, span, vector, whole
@@ -126,15 +126,14 @@ def terrain_name(name: str) -> str:
 
 
 def check_terrain(field: str, value: object) -> str | Terrain:
-    """Checks the name of a terrain, or a terrain; a file is opened, and a list of terrains is their union."""
+    """Checks the name of a terrain, or a terrain; a file is opened, and a list of both is their union."""
     if isinstance(value, str):
         value = terrain_name(value)
     if isinstance(value, str) and value in TERRAINS:
         return value
     if isinstance(value, (list, tuple)):
-        return Union(value)
-    if is_terrain_file(value):
-        return open_terrain(value)  # type: ignore[arg-type]
+        return Union([_ground(f"{field}[{i}]", one) for i, one in enumerate(value)])
+    value = _ground(field, value)
     if not isinstance(value, Terrain):
         refuse(
             TerrainError,
@@ -146,13 +145,18 @@ def check_terrain(field: str, value: object) -> str | Terrain:
     return terrain
 
 
+def _ground(field: str, value: object) -> Any:
+    """The terrain of a file or of a mapping as `as_json` writes it; any other value unchanged."""
+    return open_terrain(value) if is_terrain_file(value) else terrain_from_json(field, value)  # type: ignore[arg-type]
+
+
 def check_soils(field: str, value: object) -> tuple[Soil, ...]:
     """Checks a soil, its name, or a list of both, to draw from."""
     given = value if isinstance(value, (list, tuple)) else (value,)
     if not given:
         refuse(OptionError, field, value, "must have at least one soil")
     soils = []
-    for one in given:
+    for one in (soil_from_json(field, each) for each in given):
         if isinstance(one, str):
             soils.append(named_soil(one))
         elif isinstance(one, Soil):
@@ -180,16 +184,13 @@ def check_gravity(field: str, value: object) -> tuple[float, ...]:
 
 def check_model(field: str, value: object) -> RoverModel:
     """Checks a model, or opens one by its name or file: it must have wheels whose joints move."""
-    if isinstance(value, (str, os.PathLike)):
-        value = open_model(value)
-    if not isinstance(value, RoverModel):
-        refuse(ModelError, field, value, "must be a RoverModel, a name of the gallery or a file")
-    if not value.wheel_names:
+    model = as_model(field, model_from_json(value))
+    if not model.wheel_names:
         refuse(ModelError, f"{field}.wheels", [], "must have at least one wheel")
-    indices = value.wheel_joint_indices
+    indices = model.wheel_joint_indices
     if min(indices) < 0:
         refuse(ModelError, f"{field}.wheel_joint_indices", indices, "must be movable joints")
-    return value
+    return model
 
 
 def check_solver_options(field: str, value: object) -> Mapping[str, Any]:

@@ -5,7 +5,7 @@ rovers and threads. Each control period is one call of the compiled core: the th
 its observation, reward and termination.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Unpack
@@ -38,6 +38,7 @@ from rover_gym.env.generators import (
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.reward_terms import earn, total
 from rover_gym.env.task import Task, check_actions, make_task
+from rover_gym.ground import bounds_of, surfaces_of
 from rover_gym.mechanics import (
     CommandError,
     DrawnEpisodes,
@@ -50,6 +51,7 @@ from rover_gym.mechanics import (
     RoverGymError,
     Simulation,
     StateError,
+    TerrainError,
     seed_generators,
 )
 from rover_gym.rendering.render_options import RenderOptions
@@ -235,8 +237,23 @@ class RoverBatch:
         used = [self.seed_of(i) if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
         difficulties = [self._difficulties[i] for i in chosen]
         fixed = ResetOptions() if options is None else options
-        episodes = self.draw_rows(rows, difficulties, fixed)
+        try:
+            episodes = self.draw_rows(rows, difficulties, fixed)
+        except TerrainError as error:
+            raise self._with_bounds(error) from None
         return Drawn(episodes, chosen, used, {chosen[k] for k in anew})
+
+    def _with_bounds(self, error: TerrainError) -> TerrainError:
+        """The error of a scene that cannot be drawn, with the bounds of the map."""
+        surfaces = [] if self.task.ground is None else surfaces_of(self.task.ground)
+        corners = [corner for surface in surfaces for corner in bounds_of(surface)]
+        if not corners:
+            return error
+        (x0, z0), (x1, z1) = np.min(corners, axis=0), np.max(corners, axis=0)
+        bounds = f"the map spans x = {x0:.6g} to {x1:.6g} m, z = {z0:.6g} to {z1:.6g} m"
+        named = type(error)(f"{str(error).replace(' scenes', ' draws')}; {bounds}")
+        named.field, named.value = error.field, error.value
+        return named
 
     def draw_rows(
         self, rows: Rows, difficulties: Sequence[Range | None], fixed: ResetOptions | Sequence[ResetOptions]
@@ -307,7 +324,14 @@ class RoverBatch:
             self._earn(before, actions, stepped, np.ones(self.n, np.bool_) if active is None else np.asarray(active))
         return stepped
 
-    def step_on(self, actions: object, *, same_step: bool, has_scan: bool = True) -> tuple[Stepped, Finals]:
+    def step_on(
+        self,
+        actions: object,
+        *,
+        same_step: bool,
+        has_scan: bool = True,
+        at_end: Callable[[Collection[int]], None] = lambda _resting: None,
+    ) -> tuple[Stepped, Finals]:
         """Applies actions for one control period; rovers whose episode is over start the next.
 
         Args:
@@ -315,6 +339,7 @@ class RoverBatch:
             same_step: Whether an episode is followed by the next in the step that ends it. If not, the next one begins
                 in the following step, in which its rover does not move and earns nothing.
             has_scan: As of `step`.
+            at_end: Called at the end of the period, before the next episodes begin, with the rovers that have rested.
 
         Returns:
             What `step` returns, and with `same_step` the last observations and infos of the episodes that have ended.
@@ -333,6 +358,7 @@ class RoverBatch:
             drawn = self.draw(starting)
             active = np.isin(np.arange(self.n), starting, invert=True)
         stepped = self.step(actions, active, has_scan=has_scan)
+        at_end(starting)
         observation, rewards, terminated, truncated, over = stepped
         if drawn is not None:
             self.begin(drawn)

@@ -1,5 +1,6 @@
 """`Rover-v0`: drive a rover to a goal. The class docstring is the environment's card."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self, Unpack
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self, Unpack
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments, with_tables
 from rover_gym.env.batch import RoverBatch
@@ -15,6 +17,7 @@ from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.play_keys import keys_to_action, pushed
 from rover_gym.env.sand_ground import soil_of
+from rover_gym.env.spec_json import RoverSpec, rover_spec
 from rover_gym.env.start import Domain, Rocks, Start
 from rover_gym.env.task import Task, check_actions
 from rover_gym.mechanics import CommandError, EpisodeRun, RoverGrainSimulation, RoverModel, Simulation
@@ -268,6 +271,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     _renderer: "FrameRenderer | None" = None
+    _spec: RoverSpec | None = None
+
+    #: Called with the environment and `info` after each reset and each control period, also of those that wrappers take.
+    on_period: Callable[["RoverEnv", Mapping[str, Any]], None] | None = None
     _drawn_scene: tuple[list[Any], tuple[float, float]] | None = None
 
     @takes_arguments
@@ -299,6 +306,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     def task(self) -> Task:
         """The checked arguments."""
         return self.batch.task
+
+    @property
+    def spec(self) -> RoverSpec | None:
+        """The specification that `gymnasium.make` has made the environment from; its `to_json` writes objects, too."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, value: EnvSpec | None) -> None:
+        self._spec = rover_spec(value)
 
     @property
     def render_mode(self) -> str | None:  # type: ignore[override] # read-only here
@@ -425,6 +441,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             TerrainError: The rover would penetrate the ground or a sphere in each of 100 drawn scenes.
         """
         info = self.batch.reset(self.i, seed, self.batch.check_options(options))
+        if self.on_period is not None:
+            self.on_period(self, info)
         return self.progress.observation, info
 
     def step(
@@ -451,7 +469,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             check_actions(given, (batch.task.n_actions,))  # names the entry without the rover
             raise
         observation, reward, terminated, _, _ = stepped
-        return observation[i].copy(), float(reward[i]), bool(terminated[i]), False, batch.info(i)
+        info = batch.info(i)
+        if self.on_period is not None:
+            self.on_period(self, info)
+        return observation[i].copy(), float(reward[i]), bool(terminated[i]), False, info
 
     def complete_observation(self) -> npt.NDArray[np.float32]:
         """The last observation, with the heights that it lacks where `has_scan` was off; takes the scan if it must.

@@ -37,6 +37,9 @@ from rover_gym.validation import Range, array, number, refuse, span
 #: Steps until truncation: 60 s at the default control frequency of 20 Hz.
 MAX_EPISODE_STEPS = 1200
 
+#: Steps until a course of waypoints is truncated.
+MAX_COURSE_STEPS = 2 * MAX_EPISODE_STEPS
+
 #: Most physics steps per control period.
 MAX_SUBSTEPS = 10_000
 

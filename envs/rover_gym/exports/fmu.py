@@ -341,23 +341,29 @@ MACHINES = {"AMD64": "x86_64", "arm64": "aarch64", "ARM64": "aarch64"}
 #: Of every file in a unit, so that equal scenes make equal units.
 STAMP = (1980, 1, 1, 0, 0, 0)
 
-HOW_TO_BUILD = (
-    "is not built: in a checkout with a Rust toolchain, `make` builds it with the core, and by hand it is"
-    f" `cargo build --release --locked -p rover-fmu`, copied to {LIBRARIES.parent.name}/{LIBRARIES.name}"
-)
+
+def _how_to_build(path: Path) -> str:
+    """How the library is added to an installation, as a command."""
+    system = platform.system()
+    built = f"target/release/{'' if system == 'Windows' else 'lib'}{IDENTIFIER}{path.suffix}"
+    copying = f"mkdir -p {path.parent} && cp {built} {path}"
+    return (
+        "is not there: `pip install .` does not build it. In the checkout, with a Rust toolchain: "
+        f"cargo build --release --locked -p rover-fmu && {copying}"
+    )
 
 
 def fmu_library() -> Path:
     """The library of this package's units.
 
     Raises:
-        OptionError: The library has not been built, or does not exist for this system; the message explains how to
-            build it.
+        OptionError: The library has not been built, or does not exist for this system; the message gives the command
+            that adds it.
     """
     ending, _ = ENDINGS.get(platform.system(), ENDINGS["Linux"])
     path = LIBRARIES / f"{IDENTIFIER}{ending}"
     if not path.is_file():
-        refuse(OptionError, "library", str(path), HOW_TO_BUILD)
+        refuse(OptionError, "library", str(path), _how_to_build(path))
     return path
 
 

@@ -22,6 +22,7 @@ from rover_gym.record.rover_run import RoverRun, film_rows
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
 from rover_gym.replay import scenery
+from rover_gym.replay.sights import SENSORS, hits, sensor_of
 from rover_gym.validation import TERRAINS, array, checked, number, refuse, vector
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class McapWriter:
     | `/scene` | `foxglove.SceneUpdate` | the rover's shapes, ground, rocks and goal; once |
     | `/wheels` | JSON | by wheel: gap, forces, torques, set-point |
     | `/signals` | JSON | every other channel of the rows |
+    | `/laser/points`, `/depth/points` | `foxglove.PointCloud` | of a run with these sensors, by `write_mcap` |
     | `/points`, `/camera` | `foxglove.PointCloud`, `foxglove.CompressedImage` | see `points` and `image` |
 
     Args:
@@ -214,8 +216,8 @@ class McapWriter:
         Args:
             time: s.
             points: (n, 3), m; rows that are not finite, from rays without a hit, are left out.
-            frame: The frame of the points: `world` or a solid's, y up. Those of a solid are logged in the axes of REP
-                103.
+            frame: The frame of the points: `world`, or a solid's or its name, y up. Those of a solid are logged in the
+                axes of REP 103.
             topic: The topic.
 
         Raises:
@@ -226,6 +228,7 @@ class McapWriter:
             refuse(RecordingError, "points", given.shape, "must have the shape (n, 3)")
         stamp = self._stamp(time)
         seen = given[np.isfinite(given).all(axis=1)]
+        frame = self._frames.get(frame, frame)
         if frame in self._frames.values():
             seen = seen @ messages.SOLID_FROM_LOGGED
         self._file.write(topic, stamp, messages.point_cloud(stamp, frame, seen))
@@ -406,7 +409,7 @@ def write_mcap(
     fps: float = FPS,
     progress: Callable[[int], None] = lambda _rows: None,
 ) -> Path:
-    """Writes a recorded run as MCAP, every sample of it.
+    """Writes a recorded run as MCAP, every sample of it. Its laser and depth are point clouds.
 
     Args:
         run: The run.
@@ -436,8 +439,15 @@ def write_mcap(
         way, attributes = data["q"][:, [0, 2]], run.trajectory.attributes
         make = partial(McapWriter, path, run.model, run.terrain, goal=run.goal, attributes=attributes, way=way)
         writer = stack.enter_context(_whole_log(make))
+        scans = {name: (sensor_of(name, run.model), data[name]) for name in SENSORS if name in data}
+        rows = {name: values for name, values in data.items() if name not in scans}
         for i in range(run.n_frames):
-            writer.append({name: values[i] for name, values in data.items()})
+            writer.append({name: values[i] for name, values in rows.items()})
+            for name, (sensor, readings) in scans.items():
+                solid = sensor.mount.solid_of(run.model)
+                writer.points(
+                    float(run.time[i]), hits(sensor, run.model, readings[i]), frame=solid, topic=f"/{name}/points"
+                )
             if renderer is not None and i in pictured:
                 simulation.set_state(data["q"][i])
                 writer.image(float(run.time[i]), renderer.render(simulation))

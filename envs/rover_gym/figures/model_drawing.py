@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rover_gym.extras import require
 from rover_gym.figures.style import DARK, QUANTITY_COLOURS, check_format, plain, save_figures
 from rover_gym.mechanics import RoverModel
+from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.rendering.appearance import part_mesh, rover_parts
 
 if TYPE_CHECKING:
@@ -26,11 +27,11 @@ VIEWS = (
 )
 
 
-def write_model_picture(model: RoverModel, path: str | Path) -> Path:
+def write_model_picture(model: ModelLike, path: str | Path) -> Path:
     """Draws a model with all joints at zero.
 
     Args:
-        model: The model.
+        model: The model, its name in the gallery or its file.
         path: Picture file; its ending is the format, .png, .svg or .pdf.
 
     Returns:
@@ -40,7 +41,7 @@ def write_model_picture(model: RoverModel, path: str | Path) -> Path:
         OptionError: The ending is none of these.
         MissingExtraError: matplotlib is not installed.
     """
-    path = Path(path)
+    model, path = as_model("model", model), Path(path)
     check_format(path.suffix.removeprefix("."))
     (written,) = save_figures(
         {path.stem: drawing_of(model)}, path.parent, height=7.0, file_format=path.suffix.removeprefix(".")

@@ -9,12 +9,13 @@ from rover_gym.policy.evaluation import IntervalEstimate, PolicySummary
 from rover_gym.policy.named_policy import NAMES
 
 
-def draw_policies(rows: Sequence[PolicySummary], path: Path) -> None:
+def draw_policies(rows: Sequence[PolicySummary], path: Path, title: str = "") -> None:
     """Draws every figure of every policy with its interval.
 
     Args:
         rows: The policies' figures.
         path: The file to write, PNG.
+        title: Where they drove.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -40,5 +41,6 @@ def draw_policies(rows: Sequence[PolicySummary], path: Path) -> None:
         axis.grid(axis="x", alpha=0.3)
     names = [row.policy if row.difficulty is None else f"{row.policy}, {row.difficulty:g}" for row in rows]
     axes[0].set_yticks(places, names)
+    figure.suptitle(title)
     with written_whole(path) as draft:
         figure.savefig(draft, dpi=110)

@@ -20,6 +20,7 @@ from rover_gym.identification.estimates import (
 from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, Window, WindowFit, cut
 from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
 from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.record.channels import RoverSampler
 from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.validation import number, refuse, whole
@@ -34,7 +35,7 @@ def identify(
     recording: RoverRun | str | Path,
     parameters: Sequence[str | Parameter],
     *,
-    model: RoverModel | None = None,
+    model: ModelLike | None = None,
     settings: Mapping[str, Any] | None = None,
     window: float = 0.5,
     max_windows: int = 20,
@@ -57,7 +58,7 @@ def identify(
             "restitution", "gravity_scale", "mass_scale" (of all masses and inertias), "payload" (on the first solid,
             kg), "actuator_gain" (on the wheel torques), "steering_stiffness", "steering_damping", "stall_torque" and
             "no_load_speed".
-        model: The assumed model of the rover; the recorded one by default.
+        model: The assumed model of the rover, its name in the gallery or its file; the recorded one by default.
         settings: Keyword arguments of `Simulation` that replace the recorded ones, such as `{"friction": 0.7}`. The
             search starts from the values of model and settings, and from factors of 1.
         window: Length of a window, s.
@@ -130,19 +131,18 @@ def _inserted(values: Array, places: Sequence[int], entries: Array) -> Array:
     return inserted
 
 
-def _setup(run: RoverRun, model: RoverModel | None, settings: Mapping[str, Any] | None) -> Setup:
+def _setup(run: RoverRun, assumed: object, settings: Mapping[str, Any] | None) -> Setup:
     recorded = run.trajectory.attributes.get("solver")
     if not isinstance(recorded, dict):
         refuse(OptionError, "recording", "solver", "is needed, but is not an attribute of this run")
-    if model is not None and not isinstance(model, RoverModel):
-        refuse(OptionError, "model", model, "must be a RoverModel")
-    if model is not None and model.dof_names != run.model.dof_names:
+    model = run.model if assumed is None else as_model("model", assumed)
+    if model.dof_names != run.model.dof_names:
         refuse(OptionError, "model", model.name, f"must have the joints of the recorded {run.model.name!r}")
     known = {**recorded, **(settings or {})}
     for name in settings or {}:
         if name not in recorded:
             refuse(OptionError, f"settings.{name}", name, f"unknown; known are {', '.join(recorded)}")
-    return Setup(run.model if model is None else model, run.terrain, known)
+    return Setup(model, run.terrain, known)
 
 
 def _first_deviations(noise: object, model: RoverModel) -> Array:

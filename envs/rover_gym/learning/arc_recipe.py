@@ -4,14 +4,14 @@
    planners would have done in its place (dataset aggregation, Ross et al. 2011).
 2. PPO goes on from there. A penalty on the divergence from the imitating network fades.
 
-The run's folder receives `config.yaml`, `run.json`, `curve.csv`, checkpoints, `arcs.npz`, and in `best` the network
-that did best in the evaluations.
+The run's folder receives `config.yaml`, `run.json`, `curve.csv`, TensorBoard's events, checkpoints, `arcs.npz`, and in
+`best` the network that did best in the evaluations.
 """
 
 import csv
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+from torch.utils.tensorboard import SummaryWriter
 
 from rover_gym.learning.arc_config import ArcConfig, ArcPPOConfig, read_arc_config
 from rover_gym.learning.arc_learner import (
@@ -42,6 +44,12 @@ from rover_gym.validation import refuse
 
 Say = Callable[[str], None]
 
+#: What a run leaves in its folder: a training does not begin where one of them is.
+RUN_FILES = ("state.json", "curve.csv", ARCS_FILE)
+
+#: Seconds between two lines of progress.
+SILENCE = 10.0
+
 
 class ArcTraining:
     """A training that goes on from its folder's last checkpoint.
@@ -60,7 +68,8 @@ class ArcTraining:
         say: Takes each line of figures.
 
     Raises:
-        OptionError: The checkpoint is of other scenes or another network, or there is none.
+        OptionError: The checkpoint is of other scenes or another network, or there is none; or without `resume` the
+            folder has a run.
     """
 
     def __init__(
@@ -81,6 +90,8 @@ class ArcTraining:
         self.config, self.folder, self.seed, self.say, self.until = config, folder, seed, say, until
         self.begin, self.resume = begin, resume
         state_file = folder / "state.json"
+        if not resume and (held := next((folder / name for name in RUN_FILES if (folder / name).exists()), None)):
+            refuse(OptionError, "folder", str(folder), f"has a run ({held.name}): resume it, or choose another folder")
         self.state: dict[str, Any] = {"rounds": 0, "decisions": 0, "cpu_seconds": 0.0, "best": -1.0}
         if resume:
             if not state_file.is_file():
@@ -94,6 +105,8 @@ class ArcTraining:
         if threads is not None:
             torch.set_num_threads(threads)
         self.device = chosen_device(device)
+        #: TensorBoard's events, in the run's folder.
+        self._events = SummaryWriter(str(folder / "tensorboard"))
         self.rovers = Rovers(config, workers) if cluster is None else ClusterRovers(config, workers, cluster)
         self._begun, self._before = time.process_time(), self.state["cpu_seconds"]
 
@@ -106,6 +119,7 @@ class ArcTraining:
             self._end(model)
         finally:
             self.rovers.close()
+            self._events.close()
         return self.folder
 
     def cpu_seconds(self) -> float:
@@ -140,6 +154,8 @@ class ArcTraining:
             np.savez(folder / f"labels-{k}.npz", **labels)  # type: ignore[arg-type]
             rounds.append(labels)
             loss, hits = imitate(model.policy, rounds, settings, 100 * self.seed + k)
+            figures = {"loss": loss, "agreement": hits, "success": success}
+            self._log({f"imitation/{name}": value for name, value in figures.items()}, k + 1)
             torch.save(model.policy.state_dict(), kept)
             self.state |= {"rounds": k + 1, "cpu_seconds": self.cpu_seconds()}
             self._keep()
@@ -171,6 +187,7 @@ class ArcTraining:
             model.num_timesteps = self.state["decisions"]
         left = settings.decisions - model.num_timesteps
         if left > 0:
+            model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
             model.learn(left, callback=_Progress(self), reset_num_timesteps=False)
             self._checkpoint(model)
             self._evaluate(model, "ppo", model.num_timesteps)
@@ -214,6 +231,14 @@ class ArcTraining:
             for name, one in found.items()
         )
         self.say(f"{stage}, {decisions} decisions: {figures}{' (best)' if is_best else ''}")
+        rates = {f"evaluation/{name}": summary.success.value for name, summary in found.items()}
+        self._log({"evaluation/success": success, **rates}, decisions)
+
+    def _log(self, figures: Mapping[str, float], step: int) -> None:
+        """Writes figures as TensorBoard events."""
+        for name, value in figures.items():
+            self._events.add_scalar(name, value, step)
+        self._events.flush()
 
     def _keep(self) -> None:
         """Writes the state, last of all files of a checkpoint."""
@@ -239,7 +264,7 @@ class _Progress(BaseCallback):
         super().__init__()
         self._training = training
         self._next = 0
-        self._clock = time.monotonic()
+        self._clock = self._said = time.monotonic()
 
     def _on_training_start(self) -> None:
         settings = self._training.config.ppo
@@ -271,6 +296,10 @@ class _Progress(BaseCallback):
                 f"  leash {model.ent_coef:.3f}, divergence {logged.get('train/entropy_loss', np.nan):.3f}, "
                 f"success while exploring {np.mean(ends or [0]):.0%}"
             )
+            self._said = time.monotonic()
+        elif time.monotonic() - self._said >= SILENCE:
+            self._said = time.monotonic()
+            training.say(f"  {self.num_timesteps} of {settings.decisions} decisions, {passed:.0%}")
 
     def _on_step(self) -> bool:
         until = self._training.until

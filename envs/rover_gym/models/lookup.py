@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.import_report import ImportReport
 from rover_gym.models.reading import read_mjcf, read_urdf
 from rover_gym.models.robot_tree import checked_path, is_urdf
 from rover_gym.validation import refuse
+
+#: A model, a name of the gallery or a file, as `as_model` takes it.
+ModelLike: TypeAlias = RoverModel | str | os.PathLike[str]
 
 #: Kinds of files by their endings.
 KINDS = {".toml": "TOML", ".urdf": "URDF", ".xml": "MJCF", ".mjcf": "MJCF"}
@@ -44,6 +47,24 @@ def open_model(name: object) -> RoverModel:
         known = f"a name ({', '.join(RoverModel.names())}) or a file that ends in {', '.join(KINDS)}"
         refuse(ModelError, "model", str(path), f"must be {known}")
     return RoverModel.named(str(path))
+
+
+def as_model(field: str, value: object) -> RoverModel:
+    """The model that an argument means.
+
+    Args:
+        field: Name of the argument.
+        value: A model, a name of the gallery, or a file, as `open_model` takes it.
+
+    Raises:
+        ModelError: It is none of these, or the file does not contain a model.
+        OSError: The file cannot be read.
+    """
+    if isinstance(value, RoverModel):
+        return value
+    if not isinstance(value, (str, os.PathLike)):
+        refuse(ModelError, field, value, "must be a RoverModel, a name of the gallery or a file")
+    return open_model(value)
 
 
 def read_robot(path: object, **options: Any) -> tuple[RoverModel, ImportReport]:

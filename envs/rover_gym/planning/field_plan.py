@@ -15,7 +15,9 @@ import numpy.typing as npt
 
 from rover_gym.extras import require
 from rover_gym.ground import heights_of
-from rover_gym.mechanics import OptionError, RoverModel, Terrain
+from rover_gym.maps.ground_lookup import TerrainLike, as_terrain
+from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.models.statics import Statics, check_statics
 from rover_gym.policy.arc_search import ways_by_price
 from rover_gym.validation import number, refuse, vector
@@ -51,8 +53,8 @@ class FieldPlan:
     @classmethod
     def over(
         cls,
-        terrain: Terrain,
-        model: RoverModel,
+        terrain: TerrainLike,
+        model: ModelLike,
         start: npt.ArrayLike,
         goal: npt.ArrayLike,
         *,
@@ -62,8 +64,8 @@ class FieldPlan:
         """Plans from every cell of the rectangle about start and goal.
 
         Args:
-            terrain: The ground. Cells without ground are not crossed.
-            model: The rover, from which come the size and the clearance of its trunk.
+            terrain: The ground, or its file. Cells without ground are not crossed.
+            model: The rover, its name in the gallery or its file: size and clearance of its trunk.
             start: (x, z), m.
             goal: (x, z), m.
             resolution: Side of a cell, m.
@@ -73,6 +75,7 @@ class FieldPlan:
             MissingExtraError: SciPy is not installed.
             OptionError: An argument is out of its range, or the grid has more than a million cells.
         """
+        terrain, model = as_terrain("terrain", terrain), as_model("model", model)
         ndimage = require("scipy.ndimage", "planning")
         begin, end = np.array(vector("start", start, 2)), np.array(vector("goal", goal, 2))
         resolution = number("resolution", resolution, at_least=1e-3)

@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.mechanics import EpisodeBatch, EpisodeRules, EpisodeRun, RoverModel, Simulation, Terrain
+from rover_gym.mechanics import EpisodeBatch, EpisodeRules, EpisodeRun, Simulation, Terrain
+from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.validation import number, whole
 
 Array = npt.NDArray[np.float64]
@@ -53,7 +54,8 @@ class Futures:
         n: Number of copies.
         time_step: Largest physics step of the futures, s; the control period is divided into equal ones.
         threads: Threads that step them; None for one per core.
-        model: The rover of the futures; the episode's by default. Use another one to study model errors.
+        model: The rover of the futures, its name in the gallery or its file; the episode's by default. Use
+            another one to study model errors.
         friction: Friction of wheels and ground in the futures; the episode's by default.
 
     Raises:
@@ -67,16 +69,17 @@ class Futures:
         *,
         time_step: float = 0.025,
         threads: int | None = None,
-        model: RoverModel | None = None,
+        model: ModelLike | None = None,
         friction: float | None = None,
     ) -> None:
         self._env, self.n = env, whole("n", n, at_least=1, at_most=100_000)
         task = env.task
         substeps = max(1, int(np.ceil(env.dt / number("time_step", time_step, above=0.0) - 1e-9)))
         self._friction = None if friction is None else number("friction", friction, at_least=0.0)
-        self._has_own_model = model is not None
+        own = None if model is None else as_model("model", model)
+        self._has_own_model = own is not None
         options = dict(task.simulation_options, time_step=env.dt / substeps, **SOLVER)
-        self._task = replace(task, model=task.model if model is None else model, simulation_options=options)
+        self._task = replace(task, model=task.model if own is None else own, simulation_options=options)
         (rover,), settings = task.rules.__getnewargs_ex__()
         self._rules = EpisodeRules(rover, **(settings | {"substeps": substeps, "noise": 0.0}))
         self._batch = EpisodeBatch(self._rules, self._simulation(env.simulation.terrain), self.n, threads=threads)

@@ -16,13 +16,15 @@ import numpy.typing as npt
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Point, Start
 from rover_gym.extras import require
-from rover_gym.mechanics import HeightField, OptionError, RoverModel, StateError, Terrain
+from rover_gym.maps.ground_lookup import TerrainLike, as_terrain
+from rover_gym.mechanics import HeightField, OptionError, StateError
+from rover_gym.models.lookup import ModelLike
 from rover_gym.planning.field_plan import FieldPlan
 from rover_gym.planning.futures import Ends, Futures
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import check_observed
 from rover_gym.policy.ground_map import MOST_CELLS, GroundMap, MapOptions
-from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.policy.pd_policy import driven_rover
 from rover_gym.policy.scan_policy import PLAN_POINTS, scan_grid
 from rover_gym.validation import array, number, refuse, vector, whole
 
@@ -184,7 +186,7 @@ class PlannerPolicy:
         threads: Threads that step the futures; None for one per core.
         model: The rover of the futures, see `Futures`.
         friction: Of the futures, see `Futures`.
-        terrain: The ground of the futures and of the field's plan; the episode's by default.
+        terrain: The ground of the futures and of the field's plan, or its file; the episode's by default.
         sees: "field" for the whole ground, or "scan" for the ground covered by the height scans so far. Unseen ground
             gets the height of the nearest seen place.
 
@@ -201,9 +203,9 @@ class PlannerPolicy:
         limits: CommandLimits | None = None,
         seed: int = 0,
         threads: int | None = None,
-        model: RoverModel | None = None,
+        model: ModelLike | None = None,
         friction: float | None = None,
-        terrain: Terrain | None = None,
+        terrain: TerrainLike | None = None,
         sees: Literal["field", "scan"] = "field",
     ) -> None:
         if sees not in ("field", "scan"):
@@ -211,7 +213,9 @@ class PlannerPolicy:
         if sees == "scan" and terrain is not None:
             refuse(OptionError, "terrain", terrain, "must not be given with sees='scan'")
         self.options = PlannerOptions() if options is None else options
-        self._env: RoverEnv = find_rover_env(env)
+        self._env: RoverEnv = driven_rover(env, type(self).__name__)
+        if self._env.batch.n > 1:
+            refuse(OptionError, "env", env, "must be a single environment: PlannerPolicy reads its simulation")
         commands = CommandController(self._env, limits)
         self._controller: CommandController | RawActions = commands
         self._spread = np.array(self.options.spread)
@@ -228,7 +232,7 @@ class PlannerPolicy:
             model=model,
             friction=friction,
         )
-        self._terrain = terrain
+        self._terrain = None if terrain is None else as_terrain("terrain", terrain)
         self._seen: ScannedGround | None = None
         if sees == "scan":
             scan_grid(self._env)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.mechanics import CommandError, sin_cos
+from rover_gym.mechanics import CommandError, OptionError, sin_cos
 from rover_gym.policy.command import N_COMMANDS, CommandController
 from rover_gym.policy.features import ground_slope
 from rover_gym.policy.rover_view import LARGEST, N_FEATURES, RoverView
@@ -89,6 +89,10 @@ class ArcDriver:
     """
 
     def __init__(self, rover: RoverEnv, n: int, planner: ScanPolicy | None = None) -> None:
+        scan = scan_grid(rover)
+        if (scan.rows, scan.columns) != SCAN[:2]:
+            given = (scan.rows, scan.columns, scan.spacing)
+            refuse(OptionError, "height_scan", given, f"must be that of ScanPolicy.arguments(model), {SCAN[:2]} points")
         self.planner = ScanPolicy(rover) if planner is None else planner
         plan = self.planner
         self.hold = plan.hold_periods

@@ -11,7 +11,7 @@ from rover_gym.policy.arc_driver import ArcDriver
 from rover_gym.policy.arc_network import ArcNetwork
 from rover_gym.policy.features import check_observed
 from rover_gym.policy.network_files import PolicyError, is_there
-from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.policy.pd_policy import driven_rover
 from rover_gym.policy.scan_policy import ScanMemory, ScanPolicy
 from rover_gym.validation import array, refuse
 
@@ -34,7 +34,7 @@ class ArcNetworkPolicy:
     """
 
     def __init__(self, env: Any, network: ArcNetwork, *, planner: ScanPolicy | None = None, seed: int = 0) -> None:
-        rover = find_rover_env(env)
+        rover = driven_rover(env, type(self).__name__)
         self._size = rover.observation_layout.size
         self._driver = ArcDriver(rover, 1, planner)
         self._network = network

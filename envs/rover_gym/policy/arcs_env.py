@@ -25,8 +25,8 @@ from rover_gym.policy.arc_driver import (
     observation_space,
 )
 from rover_gym.policy.scan_policy import ScanGains, ScanPolicy, hold_periods
-from rover_gym.validation import refuse, whole
-from rover_gym.vector.vector_env import RoverVectorEnv
+from rover_gym.validation import refuse
+from rover_gym.vector.vector_env import RoverVectorEnv, episode_limit
 
 #: Arcs until truncation, 0.2 s each: as long as `Rover-v0`.
 MAX_ARCS = MAX_EPISODE_STEPS // 4
@@ -114,6 +114,7 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
         self.metadata = rover.metadata
         self.rover = rover
         self.driver = ArcDriver(rover, 1)
+        self.repeat = self.driver.hold
         self.observation_space, self.action_space = observation_space(), arc_space()
         self._seen: Observations = np.zeros((1, rover.observation_layout.size), np.float32)
         self._info: dict[str, Any] = {}
@@ -190,7 +191,7 @@ class RoverArcsVectorEnv(VectorWrapper):
     Args:
         num_envs: Number of rovers.
         threads: Threads that step the rovers; None for one per core.
-        max_episode_steps: Arcs until truncation; None for no limit.
+        max_episode_steps: Arcs until truncation; None for 300, -1 for no limit.
         autoreset_mode: `"NextStep"` or `"SameStep"`, as Gymnasium defines them.
         **arguments: Arguments of `RoverArcsEnv`.
 
@@ -204,14 +205,12 @@ class RoverArcsVectorEnv(VectorWrapper):
         num_envs: int = 1,
         *,
         threads: int | None = None,
-        max_episode_steps: int | None = MAX_ARCS,
+        max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **arguments: Unpack[ArcArguments],
     ) -> None:
-        given, periods = arc_arguments(arguments), None
-        if max_episode_steps is not None:
-            dt = RoverEnv(**given).dt
-            periods = hold_periods(ScanGains().period, dt) * whole("max_episode_steps", max_episode_steps, at_least=1)
+        given, limit = arc_arguments(arguments), episode_limit(max_episode_steps, MAX_ARCS)
+        periods = -1 if limit is None else hold_periods(ScanGains().period, RoverEnv(**given).dt) * limit
         self.rovers = RoverVectorEnv(
             num_envs, threads=threads, max_episode_steps=periods, autoreset_mode=autoreset_mode, **given
         )

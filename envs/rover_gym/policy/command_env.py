@@ -24,7 +24,7 @@ from rover_gym.policy.features import Features
 from rover_gym.policy.pd_policy import find_rover_env
 from rover_gym.validation import array, known_keys, refuse, whole
 from rover_gym.vector.pushed_vector import RandomPushesVector
-from rover_gym.vector.vector_env import RoverVectorEnv
+from rover_gym.vector.vector_env import RoverVectorEnv, episode_limit
 
 #: Most steps that a command may be held; a few minutes.
 MAX_REPEAT = 10_000
@@ -134,7 +134,7 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
         self._rover = find_rover_env(env)
         self._held = HeldCommands(self._rover, 1, repeat=repeat, pool=pool, limits=limits)
         super().__init__(env)
-        self.features = self._held.features
+        self.features, self.repeat = self._held.features, self._held.repeat
         self.observation_space, self.action_space = self._held.observation_space, self._held.action_space
         self._info: dict[str, Any] = {}
 
@@ -432,7 +432,7 @@ class RoverCommandVectorEnv(CommandVectorEnv):
     Args:
         num_envs: Number of rovers.
         threads: Threads that step the rovers; None for one per core.
-        max_episode_steps: Commands until truncation; None for no limit.
+        max_episode_steps: Commands until truncation; None for 200, -1 for no limit.
         autoreset_mode: `"NextStep"` or `"SameStep"`, as Gymnasium defines them.
         **arguments: Arguments of `RoverCommandEnv`.
 
@@ -446,14 +446,13 @@ class RoverCommandVectorEnv(CommandVectorEnv):
         num_envs: int = 1,
         *,
         threads: int | None = None,
-        max_episode_steps: int | None = MAX_COMMANDS,
+        max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **arguments: Unpack[CommandArguments],
     ) -> None:
         own, rovers = _split(arguments)
-        periods = None
-        if max_episode_steps is not None:
-            periods = check_repeat(own["repeat"]) * whole("max_episode_steps", max_episode_steps, at_least=1)
+        limit = episode_limit(max_episode_steps, MAX_COMMANDS)
+        periods = -1 if limit is None else check_repeat(own["repeat"]) * limit
         vector = RoverVectorEnv(
             num_envs, threads=threads, max_episode_steps=periods, autoreset_mode=autoreset_mode, **rovers
         )

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.files import write_whole
-from rover_gym.mechanics import RoverModel
+from rover_gym.models.lookup import ModelLike
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.evaluation import (
@@ -25,12 +25,17 @@ from rover_gym.policy.evaluation import (
     IntervalEstimate,
     PolicySummary,
     drive_all,
+    drive_each,
     run_episode,
+    timed,
 )
 from rover_gym.policy.named_policy import NAMES, Policy, named_policy, network_folder
 from rover_gym.record.channels import outcome_words
 from rover_gym.rendering.caption import captioned
 from rover_gym.rendering.render_options import VideoWriter
+
+#: Longest episode of a comparison, s.
+EPISODE_SECONDS = MAX_EPISODE_STEPS * 0.05
 
 #: The package's own policies.
 POLICIES = Path(__file__).parents[1] / "data" / "policies"
@@ -45,12 +50,15 @@ class Contender:
         make: Makes it from an environment.
         arguments: Arguments of `RoverEnv` that it needs.
         files: Files that it is read from.
+        environment: The registered environment that it drives, one episode after the other; None for `Rover-v0`, many
+            at a time.
     """
 
     name: str
     make: Callable[[Any], Policy]
     arguments: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
+    environment: str | None = None
 
     @property
     def is_trained(self) -> bool:
@@ -58,7 +66,7 @@ class Contender:
         return self.name not in NAMES and any(path.name == ARCS_FILE for path in self.files)
 
 
-def named_contender(policy: str, model: RoverModel | None = None) -> Contender:
+def named_contender(policy: str, model: ModelLike | None = None) -> Contender:
     """A policy by its name or folder, as `named_policy` takes it.
 
     Raises:
@@ -105,6 +113,7 @@ def drive_or_reuse(
     """
     environment = {**arguments, **contender.arguments}
     key = {
+        "id": contender.environment,
         "environment": environment,
         "seeds": [seeds.start, len(seeds)],
         "files": _digest([*files, *contender.files]),
@@ -113,7 +122,12 @@ def drive_or_reuse(
     kept = _kept(path, plain_key)
     if kept is not None:
         return kept
-    drives = drive(contender.make, seeds, arguments=environment, progress=progress)
+    if contender.environment is None:
+        drives = drive(contender.make, seeds, arguments=environment, progress=progress)
+    else:
+        env = timed(gym.make(contender.environment, max_episode_steps=-1, **environment), EPISODE_SECONDS)
+        drives = drive_each(env, contender.make(env), seeds, progress=progress)
+        env.close()
     plain = {"key": plain_key, "drives": [asdict(drive) for drive in drives]}
     write_whole(path, json.dumps(plain) + "\n")
     return drives
@@ -160,25 +174,93 @@ def comparison_table(rows: Sequence[PolicySummary]) -> list[tuple[str, ...]]:
     return [tuple(row[i] for i in kept) for row in table]
 
 
+def short_tables(rows: Sequence[PolicySummary]) -> list[tuple[float | None, list[tuple[str, ...]]]]:
+    """The figures of policies for a terminal of 80 columns: for each difficulty a table, the headings first."""
+    tables = []
+    for level in dict.fromkeys(row.difficulty for row in rows):
+        table: list[tuple[str, ...]] = [("policy", "success", "95%", "time, s", "J/m", "slip, %", "tilt, °")]
+        for row in rows:
+            if row.difficulty == level:
+                low, high = row.success.interval
+                cells = (
+                    _cell(row.time, ".1f"),
+                    _cell(row.energy_per_metre, ".0f"),
+                    _cell(row.slip, ".1f", 100.0),
+                    _cell(row.tilt, ".1f"),
+                )
+                table.append(
+                    (row.policy, f"{row.success.value:.1%}", f"{100.0 * low:.0f} to {100.0 * high:.0f}", *cells)
+                )
+        tables.append((level, table))
+    return tables
+
+
+def other_ends(rows: Sequence[PolicySummary]) -> list[str]:
+    """A line for each policy that missed goals: how its other episodes ended."""
+    lines = []
+    for row in rows:
+        found = ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end != "goal")
+        where = "" if row.difficulty is None else f" at difficulty {row.difficulty:g}"
+        lines += [f"{row.policy}{where}, other ends: {found}"] if found else []
+    return lines
+
+
+@dataclass(frozen=True)
+class ComparedScene:
+    """Where policies are compared.
+
+    Attributes:
+        ground: The ground, or the environment where none is given.
+        model: The rover.
+        seeds: Seeds of the episodes.
+        difficulties: The difficulties; none where the ground has no rocks.
+    """
+
+    ground: str
+    model: str
+    seeds: range
+    difficulties: tuple[float, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The scene in one line."""
+        levels = ", ".join(f"{level:g}" for level in self.difficulties)
+        difficulty = f", difficulty {levels}" if levels else ""
+        return f"{self.ground}{difficulty}, {self.model}, seeds {self.seeds.start} to {self.seeds.stop - 1}"
+
+    def report(self) -> dict[str, Any]:
+        """The scene for JSON."""
+        seeds = [self.seeds.start, self.seeds.stop - 1]
+        return {
+            "ground": self.ground,
+            "model": self.model,
+            "difficulties": list(self.difficulties),
+            "seeds": seeds,
+        }
+
+
 def in_markdown(table: Sequence[Sequence[str]]) -> str:
     """A table, whose first row are its headings, in Markdown."""
     lines = ["| " + " | ".join(row) + " |" for row in table]
     return "\n".join([lines[0], "|" + "---|" * len(table[0]), *lines[1:]])
 
 
-def _cell(estimate: IntervalEstimate, form: str) -> str:
+def _cell(estimate: IntervalEstimate, form: str, factor: float = 1.0) -> str:
     if math.isnan(estimate.value):
         return "-"
-    half = 0.5 * (estimate.interval[1] - estimate.interval[0])
-    return f"{estimate.value:{form}}" if math.isnan(half) else f"{estimate.value:{form}} ± {half:{form}}"
+    value, half = factor * estimate.value, 0.5 * factor * (estimate.interval[1] - estimate.interval[0])
+    return f"{value:{form}}" if math.isnan(half) else f"{value:{form}} ± {half:{form}}"
 
 
-def comparison_report(rows: Sequence[PolicySummary], arguments: Mapping[str, Any], seeds: range) -> dict[str, Any]:
+def comparison_report(
+    rows: Sequence[PolicySummary], arguments: Mapping[str, Any], scene: ComparedScene
+) -> dict[str, Any]:
     """The figures of policies for JSON, which lacks NaN."""
     return {
         "environment": dict(arguments),
-        "episodes": len(seeds),
-        "seed": seeds.start,
+        **scene.report(),
+        "episodes": len(scene.seeds),
+        "seed": scene.seeds.start,
         "rows": [_without_nan(asdict(row)) for row in rows],
     }
 
@@ -236,7 +318,13 @@ class EpisodeFilm:
         self._writer.close()
 
 
-def film_episode(path: Path, make_policy: Callable[[Any], Policy], arguments: Mapping[str, Any], seed: int) -> Episode:
+def film_episode(
+    path: Path,
+    make_policy: Callable[[Any], Policy],
+    arguments: Mapping[str, Any],
+    seed: int,
+    environment: str | None = None,
+) -> Episode:
     """Drives one episode of at most 60 s and films it.
 
     Args:
@@ -244,21 +332,24 @@ def film_episode(path: Path, make_policy: Callable[[Any], Policy], arguments: Ma
         make_policy: Makes the policy from an environment.
         arguments: Arguments of `RoverEnv`.
         seed: Seed of the reset.
+        environment: The registered environment; `Rover-v0` by default.
 
     Raises:
         MissingExtraError: The extra `render` is not installed.
         RoverGymError: An argument is out of range.
     """
     rendering: dict[str, Any] = {"render_mode": "rgb_array", "render_options": {}}
-    limit = round(MAX_EPISODE_STEPS * 0.05 * arguments.get("control_frequency", 20.0))
-    env = gym.make("Rover-v0", max_episode_steps=limit, **arguments, **rendering)
+    made = gym.make(environment or "Rover-v0", max_episode_steps=-1, **arguments, **rendering)
+    env = timed(made, EPISODE_SECONDS)
     try:
         with EpisodeFilm(path, env.metadata["render_fps"], path.stem) as film:
 
             def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
                 film.show(rover, seed, info["time"])
 
-            episode = run_episode(env, make_policy(env), seed, on_step=on_step)
+            rover: RoverEnv = env.unwrapped  # type: ignore[assignment] # `timed` has checked it
+            rover.on_period = on_step
+            episode = run_episode(env, make_policy(env), seed)
             film.end(episode)
             return episode
     finally:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.policy.named_policy import Policy
-from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.policy.pd_policy import driven_rover
 from rover_gym.validation import number
 
 
@@ -20,7 +20,7 @@ class DugIn:
     """
 
     def __init__(self, env: Any, policy: Policy, seconds: float) -> None:
-        rover = find_rover_env(env)
+        rover = driven_rover(env, type(self).__name__)
         self._periods = round(number("seconds", seconds, at_least=0.0, at_most=1e3) / rover.dt)
         self._n_wheels, self._policy = len(rover.model.wheel_names), policy
 

@@ -5,6 +5,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any
 
 import gymnasium as gym
@@ -15,7 +16,7 @@ from rover_gym.env.batch import RoverBatch
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import OptionError
-from rover_gym.policy.named_policy import Policy
+from rover_gym.policy.named_policy import Policy, named_policy
 from rover_gym.validation import number, refuse, whole
 
 ENDS = ("goal", "time", "high_centred", "roll_over", "left_field", "step_failed")
@@ -52,7 +53,7 @@ class Episode:
 
 def run_episode(
     env: gym.Env[Any, Any],
-    policy: Policy,
+    policy: Policy | str | PathLike[str],
     seed: int,
     *,
     options: Mapping[str, Any] | None = None,
@@ -62,7 +63,7 @@ def run_episode(
 
     Args:
         env: A rover environment with a time limit, wrapped or not.
-        policy: The policy that chooses the actions.
+        policy: The policy that chooses the actions, or its name or folder, as `named_policy` takes it.
         seed: Seed of the reset.
         options: Options of the reset.
         on_step: Called with the environment and `info` after the reset and after each step; not timed.
@@ -70,6 +71,7 @@ def run_episode(
     rover = env.unwrapped
     if not isinstance(rover, RoverEnv):
         raise TypeError(f"a rover environment is needed, not {rover!r}")
+    policy = named_policy(policy, rover.model).make(env)
     observation, info = env.reset(seed=seed, options=None if options is None else dict(options))
     on_step(rover, info)
     position = rover.simulation.q[:3]
@@ -139,7 +141,7 @@ class EvaluatedEpisode:
 
 
 def drive_all(
-    make_policy: Callable[[Any], Policy],
+    make_policy: Callable[[Any], Policy] | str | PathLike[str],
     seeds: Sequence[int],
     *,
     arguments: Mapping[str, Any],
@@ -153,8 +155,9 @@ def drive_all(
     An episode depends only on its seed and the policy, apart from the rounding of batched network evaluations.
 
     Args:
-        make_policy: Makes a policy from an environment, which gives layout and constants. If it has `hold_periods`, the
-            height scan is taken once in so many periods, and episodes begin where commands do.
+        make_policy: The name or folder of a policy, as `named_policy` takes it, whose arguments the environment then
+            has. Or a function that makes a policy from an environment, which gives layout and constants. If the policy
+            has `hold_periods`, the height scan is taken once in so many periods, and episodes begin where commands do.
         seeds: Seeds of the resets.
         arguments: Arguments of `RoverEnv`.
         max_episode_steps: Control periods until truncation; None for 60 s.
@@ -168,6 +171,9 @@ def drive_all(
     number("num_envs", num_envs, at_least=1.0)
     if max_episode_steps is not None:
         number("max_episode_steps", max_episode_steps, at_least=1.0)
+    if isinstance(make_policy, (str, PathLike)):
+        named = named_policy(make_policy, arguments.get("model"))
+        make_policy, arguments = named.make, {**arguments, **named.arguments}
     waiting = list(reversed(seeds))
     n = min(num_envs, len(waiting))
     if n == 0:
@@ -206,6 +212,59 @@ def drive_all(
                 active[i] = True
             idle.clear()
     return [done[seed] for seed in seeds]
+
+
+def drive_each(
+    env: gym.Env[Any, Any],
+    policy: Policy,
+    seeds: Sequence[int],
+    *,
+    progress: Callable[[int], None] = lambda _done: None,
+) -> list[EvaluatedEpisode]:
+    """Runs one episode per seed in an environment of this package, wrapped or not, one after the other.
+
+    Args:
+        env: The environment, with a time limit.
+        policy: The policy, which must fit the environment.
+        seeds: Seeds of the resets.
+        progress: Called with the number of episodes done.
+    """
+    done: list[EvaluatedEpisode] = []
+    rover: RoverEnv = env.unwrapped  # type: ignore[assignment] # run_episode refuses any other
+    for seed in seeds:
+        tilts: list[float] = []
+        rover.on_period = lambda _rover, info, tilts=tilts: tilts.append(float(info["tilt"]))
+        try:
+            episode = run_episode(env, policy, seed)
+        finally:
+            rover.on_period = None
+        done.append(
+            EvaluatedEpisode(
+                seed=seed,
+                end=episode.end,
+                time=episode.time,
+                distance=episode.distance,
+                energy=episode.energy,
+                slip=episode.slip,
+                tilt=float(np.mean(tilts[1:])),
+                max_tilt=max(tilts[1:]),
+            )
+        )
+        progress(len(done))
+    return done
+
+
+def timed(env: gym.Env[Any, Any], seconds: float) -> gym.Env[Any, Any]:
+    """An environment of this package that is truncated after so many seconds; a step may hold its command for several.
+
+    Raises:
+        OptionError: The environment is another one.
+    """
+    rover = env.unwrapped
+    if not isinstance(rover, RoverEnv):
+        refuse(OptionError, "env", env, "must be an environment of rover_gym")
+    repeat = env.get_wrapper_attr("repeat") if env.has_wrapper_attr("repeat") else 1
+    return gym.wrappers.TimeLimit(env, max(1, round(seconds / (rover.dt * repeat))))
 
 
 @dataclass

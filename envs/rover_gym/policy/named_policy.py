@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import RoverModel
+from rover_gym.models.lookup import ModelLike
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
 from rover_gym.policy.guided_policy import GuidedPolicy
@@ -24,13 +25,13 @@ NAMES_HELP = (
     "'pd' for the baseline, 'sand' for the one that crawls on sand, 'scan' for the search on the height scan, "
     "'foresight' for the same with a learned prediction, "
     "'anywhere' for the network that drives any rover without a planner, 'guided' for both together, "
-    "or the folder of a run of `rover train` or of a forecast."
+    "the folder of a run of `rover train` or of a forecast, or a file of stable-baselines3 (.zip)."
 )
 
 #: Why a policy is refused that is none.
 UNKNOWN = (
-    "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'guided' or the folder of a run of `rover train` or of a "
-    "forecast"
+    "must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'guided', the folder of a run of `rover train` or of a "
+    "forecast, or on the command line a file of stable-baselines3 that ends in .zip"
 )
 
 #: Policies without a folder.
@@ -73,18 +74,27 @@ class NamedPolicy:
     make: Callable[[Any], Policy]
 
 
-def named_policy(policy: str, model: RoverModel | None = None) -> NamedPolicy:
-    """The policy of a name.
+def named_policy(policy: object, model: ModelLike | None = None) -> NamedPolicy:
+    """The policy of a name, of a folder, or as it is.
 
     Args:
         policy: "pd", "sand", "scan", "foresight", "anywhere", "guided", or the folder of a run of `rover train` or of a
-            forecast.
-        model: The rover, to which the height scan is fitted; None for the built-in one.
+            forecast; or an object with `predict`.
+        model: The rover, to which the height scan is fitted, its name in the gallery or its file; None for the built-in
+            one.
 
     Raises:
         PolicyError: There is no such policy.
+        ModelError: There is no such model.
         OSError: A file may not be read.
     """
+    if isinstance(policy, NamedPolicy):
+        return policy
+    if not isinstance(policy, type) and callable(getattr(policy, "predict", None)):
+        return NamedPolicy({}, lambda _env: policy)  # type: ignore[arg-type, return-value] # it has predict
+    if not isinstance(policy, (str, PathLike)):
+        refuse(PolicyError, "policy", policy, UNKNOWN)
+    policy = fspath(policy)
     if policy in ("pd", "sand"):
         return NamedPolicy({}, SandPolicy if policy == "sand" else PDPolicy)
     seen = ScanPolicy.arguments(model)

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
@@ -170,7 +171,7 @@ class PDPolicy:
     """
 
     def __init__(self, env: Any, gains: PDGains | None = None, regulator: Regulator | None = None) -> None:
-        rover = find_rover_env(env)
+        rover = driven_rover(env, type(self).__name__)
         if gains is not None and not isinstance(gains, PDGains):
             refuse(OptionError, "gains", gains, "must be PDGains")
         self.gains = PDGains() if gains is None else gains
@@ -291,6 +292,32 @@ def _turn_and_straight(ahead: float, left: float, radius: float) -> float:
     if turn > math.tau - 1e-6:  # a goal straight ahead, within round-off
         turn = 0.0
     return radius * turn + straight
+
+
+def driven_rover(env: Any, policy: str) -> RoverEnv:
+    """The `RoverEnv` that a policy of this name drives, whose observations and actions `env` must have unchanged.
+
+    Raises:
+        OptionError: `env` has others: it is another task, or a wrapper changes them.
+    """
+    rover = find_rover_env(env)
+    for what in ("observation", "action"):
+        space = getattr(env, f"single_{what}_space", None) or getattr(env, f"{what}_space", None)
+        own: gym.spaces.Box = getattr(rover, f"{what}_space")
+        if not isinstance(space, gym.spaces.Box) or space.shape != own.shape:
+            given = f"of shape {space.shape}" if isinstance(space, gym.spaces.Box) else f"a {type(space).__name__}"
+        elif not (np.array_equal(space.low, own.low) and np.array_equal(space.high, own.high)):
+            given = "scaled"
+        else:
+            continue
+        refuse(
+            OptionError,
+            "env",
+            env,
+            f"{policy} needs the {what}s of Rover-v0, of shape {own.shape}; here they are {given}. "
+            "Make the policy with env.unwrapped, and drive that",
+        )
+    return rover
 
 
 def find_rover_env(env: Any) -> RoverEnv:

@@ -31,7 +31,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import drive_signs
 from rover_gym.mechanics import OptionError, StateError, atan2, sin_cos
 from rover_gym.policy.features import check_observed
-from rover_gym.policy.pd_policy import PDGains, PDPolicy, find_rover_env
+from rover_gym.policy.pd_policy import PDGains, PDPolicy, driven_rover
 from rover_gym.validation import array, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -119,7 +119,7 @@ class SandPolicy:
     """
 
     def __init__(self, env: Any, gains: SandGains | None = None) -> None:
-        rover = find_rover_env(env)
+        rover = driven_rover(env, type(self).__name__)
         if gains is not None and not isinstance(gains, SandGains):
             refuse(OptionError, "gains", gains, "must be SandGains")
         self.gains = SandGains() if gains is None else gains

@@ -11,13 +11,14 @@ import numpy.typing as npt
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import HeightScan, wheel_centres
 from rover_gym.mechanics import OptionError, RoverModel, StateError, exp, sin_cos
+from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.policy.arc_forecast import FORECAST_FILE, USUAL_WAY, ArcFeatures, ArcForecast, ForesightCosts
 from rover_gym.policy.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline, SearchTask
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import check_observed, ground_slope
 from rover_gym.policy.ground_map import GroundMap, MapOptions
 from rover_gym.policy.network_files import FOLDER, FORECAST, Network, PolicyError, is_there
-from rover_gym.policy.pd_policy import Turning, find_rover_env
+from rover_gym.policy.pd_policy import Turning, driven_rover
 from rover_gym.validation import array, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -275,7 +276,7 @@ class ScanPolicy:
         forecast: str | Path | bool | None = None,
         foresight: ForesightCosts | None = None,
     ) -> None:
-        rover = find_rover_env(env)
+        rover = driven_rover(env, type(self).__name__)
         options = (("gains", gains, ScanGains), ("costs", costs, PathCosts), ("map", map, MapOptions))
         for name, given, kind in (*options, ("foresight", foresight, ForesightCosts)):
             if given is not None and not isinstance(given, kind):
@@ -334,14 +335,18 @@ class ScanPolicy:
         self._period = self.hold_periods * rover.dt
 
     @staticmethod
-    def arguments(model: RoverModel | None = None) -> dict[str, Any]:
+    def arguments(model: ModelLike | None = None) -> dict[str, Any]:
         """Arguments for an environment with a height scan that fits the rover's size.
 
         Args:
-            model: The rover; None for the built-in one.
+            model: The rover, its name in the gallery or its file; None for the built-in one.
+
+        Raises:
+            ModelError: There is no such model.
         """
         rows, columns, spacing = SCAN
-        return {"height_scan": (rows, columns, round(spacing * _reach(RoverModel() if model is None else model), 2))}
+        rover = RoverModel() if model is None else as_model("model", model)
+        return {"height_scan": (rows, columns, round(spacing * _reach(rover), 2))}
 
     def predict(
         self,

@@ -15,7 +15,7 @@ from rover_gym.env.episode_scene import ResetOptions, origin_of
 from rover_gym.env.generators import Rows
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
-from rover_gym.env.task import TRUNK_LOAD, Task, make_task
+from rover_gym.env.task import MAX_EPISODE_STEPS, TRUNK_LOAD, Task, make_task
 from rover_gym.mechanics import (
     EpisodeRun,
     OptionError,
@@ -33,6 +33,8 @@ DEFAULTS: dict[str, Any] = {"terrain": "rocks", "difficulty": (1.0, 1.5), "stuck
 
 #: A drive ends in a trap when the trunk has been held for so long, s.
 HELD = 2.0
+#: Steps until an episode is truncated, 30 s.
+MAX_TRAP_STEPS = MAX_EPISODE_STEPS // 2
 #: Longest drive into a trap, s.
 LONGEST_DRIVE = 30.0
 #: Most drives until one ends in a trap.
@@ -208,3 +210,6 @@ class RoverTrapVectorEnv(RoverVectorEnv):
 
     #: The class of one rover.
     env_class: ClassVar[type[RoverEnv]] = RoverTrapEnv
+
+    #: Steps until truncation unless others are given.
+    own_limit: ClassVar[int] = MAX_TRAP_STEPS

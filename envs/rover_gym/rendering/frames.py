@@ -21,7 +21,9 @@ from vtkmodules.vtkFiltersSources import vtkArrowSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
 
 from rover_gym.ground import plane_of, sand_of, spheres_of, surfaces_of
+from rover_gym.maps.ground_lookup import TerrainLike, as_terrain
 from rover_gym.mechanics import RoverModel, Simulation, Terrain
+from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.rendering import appearance as look
 from rover_gym.rendering.draped_shadow import DrapedShadow
 from rover_gym.rendering.render_options import Camera, check_render_options
@@ -117,8 +119,8 @@ class FrameRenderer(Picture):
     Equal sequences of simulated states give equal frames. A renderer must not be shared between threads.
 
     Args:
-        model: The rover.
-        terrain: Its ground.
+        model: The rover, its name in the gallery or its file.
+        terrain: Its ground, or the file of a map or a mesh.
         width: Pixels, even.
         height: Pixels, even.
         camera: "follow", "side", "top" or a fixed pair (eye, target), m: see `RenderOptions`.
@@ -134,8 +136,8 @@ class FrameRenderer(Picture):
 
     def __init__(
         self,
-        model: RoverModel,
-        terrain: Terrain,
+        model: ModelLike,
+        terrain: TerrainLike,
         *,
         width: int = 640,
         height: int = 480,
@@ -153,6 +155,7 @@ class FrameRenderer(Picture):
             "antialiasing": antialiasing,
         }
         self.options = check_render_options("", options)
+        model, terrain = as_model("model", model), as_terrain("terrain", terrain)
         self._model, self._fit = model, float(model.clear_radius) / FITTED
         self._wheel_mass = model.mass / len(model.wheel_radii)
         super().__init__(self.options.width, self.options.height, antialiasing=self.options.antialiasing)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import errno
 import importlib.util
+import os
 import struct
 import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, fields
@@ -82,6 +84,18 @@ def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
         if not isinstance(options.get(name, False), bool):
             refuse(OptionError, prefix + name, options[name], "must be True or False")
     return RenderOptions(**options)
+
+
+def check_display(field: str) -> None:
+    """Rejects a window where the system has no display.
+
+    Raises:
+        OptionError: Neither X11 nor Wayland has a display, and SDL is not told to do without.
+    """
+    named = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER")
+    if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in named):
+        reason = "needs a display, and none is set (DISPLAY, WAYLAND_DISPLAY): use 'rgb_array', or `rover live`"
+        refuse(OptionError, field, "human", reason)
 
 
 def check_render_mode(field: str, render_mode: object) -> str:

@@ -60,6 +60,13 @@ def distances(name: str, simulation: Simulation) -> Array:
     return np.asarray(reading, dtype=np.float64).ravel()
 
 
+def hits(sensor: LaserScanner | DepthCamera, model: RoverModel, reading: Array) -> Array:
+    """(n, 3) places, m, that the rays of a reading (n,) hit, in the frame of the solid; nan where they hit nothing."""
+    place, rotation = sensor.mount.pose_on(model)
+    distance = np.where((reading > 0.0) & (reading < sensor.max_range), reading, np.nan)
+    return np.asarray(place + distance[:, None] * (sensor.directions.reshape(-1, 3) @ rotation.T))
+
+
 @dataclass
 class Sights:
     """What there is to show of n samples.

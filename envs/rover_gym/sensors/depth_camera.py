@@ -16,13 +16,30 @@ MAX_PIXELS = 4096
 MAX_VIEW_DEG = 170.0
 
 
+#: Kinds of images.
+IMAGES = ("uint8", "normalised", "channels_first")
+
+
+def check_image(kind: object) -> None:
+    """Rejects a kind of image that is none of `IMAGES`, nor None."""
+    if kind is not None and not (isinstance(kind, str) and kind in IMAGES):
+        refuse(OptionError, "image", kind, f"must be None or one of {', '.join(IMAGES)}")
+
+
+def as_image(picture: Array, kind: str) -> Array:
+    """A picture (height, width, channels) of numbers from 0 to 1 as an image of a kind."""
+    if kind == "uint8":
+        return np.rint(255.0 * picture)
+    return np.moveaxis(picture, -1, 0) if kind == "channels_first" else picture
+
+
 @dataclass(frozen=True, kw_only=True)
 class DepthCamera(Sensor):
     """A depth image of ground, rocks and rover, cast ray by ray in the core; it needs no renderer.
 
-    A reading is (height, width), m: for the centre of each pixel the depth along the optical axis, the mount's x axis.
-    Rows go from top to bottom, columns from left to right. Depths below `min_range` and lost pixels read 0; pixels
-    without a surface within `max_range` read `max_range`.
+    A reading is (height, width), m, or an image, if asked for. Each pixel has the depth at its centre along the optical
+    axis, the mount's x axis. Rows go from top to bottom, columns from left to right. Depths below `min_range` and lost
+    pixels read 0; pixels without a surface within `max_range` read `max_range`.
 
     The depth error of stereo or structured light grows with the square of the depth z: its standard deviation is `noise
     * z**2` (Khoshelham and Elberink 2012), where `noise` is the standard deviation of the disparity divided by focal
@@ -39,6 +56,9 @@ class DepthCamera(Sensor):
         gain: Depth measured over depth, or a range.
         dropout: Fraction of pixels that are lost in a sample, or a range.
         sees_rover: Whether the collision shapes of the rover's other solids are seen.
+        image: None for m. For an image, which shows 0 to `max_range`: "uint8" of shape (height, width, 1), from 0 to
+            255; "normalised" of that shape, float32 from 0 to 1; or "channels_first", the same of shape
+            (1, height, width).
     """
 
     name: str = "depth"
@@ -52,9 +72,11 @@ class DepthCamera(Sensor):
     gain: float | Range = 1.0
     dropout: float | Range = 0.0
     sees_rover: bool = True
+    image: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_image(self.image)
         whole("width", self.width, at_least=1, at_most=MAX_PIXELS)
         whole("height", self.height, at_least=1, at_most=MAX_PIXELS)
         number("view_deg", self.view_deg, above=0.0, at_most=MAX_VIEW_DEG)
@@ -70,9 +92,18 @@ class DepthCamera(Sensor):
         self.mount.solid_of(model)
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:  # noqa: ARG002 - of every model
-        """0 to `max_range`, (height, width)."""
-        shape = (self.height, self.width)
-        return np.zeros(shape), np.full(shape, self.max_range)
+        """0 to `max_range`, (height, width); of an image 0 to 255 or to 1."""
+        nearest, farthest = (np.full((self.height, self.width), depth) for depth in (0.0, self.max_range))
+        return self._shown(nearest), self._shown(farthest)
+
+    @property
+    def reading_type(self) -> type[np.float32] | type[np.uint8]:
+        """The type of the readings: uint8 for an image that is asked for as such."""
+        return np.uint8 if self.image == "uint8" else np.float32
+
+    def _shown(self, depth: Array) -> Array:
+        """A depth image (height, width), m, as it is read."""
+        return depth if self.image is None else as_image(depth[:, :, None] / self.max_range, self.image)
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model
         """Draws gain and dropout."""
@@ -102,7 +133,7 @@ class DepthCamera(Sensor):
         noise = gaussian(generator, self.noise, depth.shape) * depth**2
         measured = np.where(seen, np.clip(drawn["gain"] * depth + noise, 0.0, self.max_range), self.max_range)
         measured[nearer | lost(generator, float(drawn["dropout"]), depth.shape)] = 0.0
-        return measured.reshape(self.height, self.width), memory
+        return self._shown(measured.reshape(self.height, self.width)), memory
 
 
 @lru_cache(maxsize=8)

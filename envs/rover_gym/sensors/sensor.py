@@ -230,6 +230,11 @@ class Sensor(ABC):
             OptionError: The sensor names a solid that the model lacks, or that cannot carry it.
         """
 
+    @property
+    def reading_type(self) -> type[np.float32] | type[np.uint8]:
+        """The type of the readings in the observation."""
+        return np.float32
+
     @abstractmethod
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:
         """The least and the greatest reading, in the shape of a reading."""

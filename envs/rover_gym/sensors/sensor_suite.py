@@ -1,28 +1,26 @@
-"""The sensors of one rover or of a vector: when each is sampled, and the wrappers that add readings to observations."""
+"""The sensors of rovers: when each is sampled, and the wrapper that adds readings to observations."""
 
 import copy
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
-from gymnasium.vector import AutoresetMode, VectorWrapper
-from gymnasium.vector.utils import batch_space
 
-from rover_gym.env.batch import BatchSnapshot
+from rover_gym.env.batch import BatchSnapshot, RoverBatch
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
-from rover_gym.env.observation import Mask
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, RoverModel, StateError
+from rover_gym.rendering.render_options import RENDER_MODES, check_display
+from rover_gym.sensors.named_sensor import sensor_of
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
-from rover_gym.vector.vector_env import RoverVectorEnv
 
 #: Key of the environment's own observation.
 STATE = "state"
@@ -33,7 +31,10 @@ STREAM = 0x5E45_0125
 #: Times closer than this are equal, s.
 SAME_TIME = 1e-9
 
-Readings = dict[str, npt.NDArray[np.float32]]
+Readings = dict[str, npt.NDArray[Any]]
+
+#: A sensor, or a mapping of its class to its fields.
+SensorLike: TypeAlias = Sensor | Mapping[str, Any]
 
 
 @dataclass
@@ -69,7 +70,7 @@ class SensorSuite:
     """The sensors of a rover.
 
     Args:
-        sensors: Their configurations, with different names.
+        sensors: Their configurations, with different names; a mapping of a class to its fields is one, too.
         model: The rover.
         dt: Control period, s.
 
@@ -78,23 +79,23 @@ class SensorSuite:
             not fit the rover.
     """
 
-    def __init__(self, sensors: Sequence[Sensor], model: RoverModel, dt: float) -> None:
+    def __init__(self, sensors: Sequence[SensorLike], model: RoverModel, dt: float) -> None:
         if isinstance(sensors, Sensor) or not isinstance(sensors, (list, tuple)) or not sensors:
             refuse(OptionError, "sensors", sensors, "must be a list of sensors")
         self.sensors: dict[str, Sensor] = {}
-        for i, sensor in enumerate(sensors):
-            if not isinstance(sensor, Sensor):
-                refuse(OptionError, f"sensors[{i}]", sensor, "must be a sensor of rover_gym.sensors")
+        for i, given in enumerate(sensors):
+            sensor = sensor_of(f"sensors[{i}]", given)
             if sensor.name == STATE or sensor.name in self.sensors:
                 refuse(OptionError, f"sensors[{i}].name", sensor.name, "is used by another sensor")
             self._check_rate(f"sensors[{i}].rate", sensor.rate, dt)
             sensor.check(model)
             self.sensors[sensor.name] = sensor
         self.model, self.dt = model, dt
-        self.spaces: dict[str, gym.spaces.Space[npt.NDArray[np.float32]]] = {}
+        self.spaces: dict[str, gym.spaces.Box] = {}
         for name, sensor in self.sensors.items():
-            low, high = (bound.astype(np.float32) for bound in sensor.bounds(model))
-            self.spaces[name] = gym.spaces.Box(low, high, dtype=np.float32)
+            kind: Any = sensor.reading_type
+            low, high = (bound.astype(kind) for bound in sensor.bounds(model))
+            self.spaces[name] = gym.spaces.Box(low, high, dtype=kind)
 
     @staticmethod
     def _check_rate(field: str, rate: float | None, dt: float) -> None:
@@ -137,7 +138,7 @@ class SensorSuite:
 
     def readings(self, state: SuiteState) -> Readings:
         """The present readings, by name."""
-        return {name: own.reading.astype(np.float32) for name, own in state.sensors.items()}
+        return {name: own.reading.astype(self.sensors[name].reading_type) for name, own in state.sensors.items()}
 
     def space(self, inner: gym.Space[Any]) -> gym.spaces.Dict:
         """The space of an environment's observation with the readings."""
@@ -174,11 +175,11 @@ class SensedRovers:
         suite: The sensors.
     """
 
-    def set_sensors(self, inner: RoverEnv | RoverVectorEnv, rover: RoverEnv, n: int, sensors: Sequence[Sensor]) -> None:
+    def set_sensors(self, inner: Any, rover: RoverEnv, n: int, sensors: Sequence[SensorLike]) -> None:
         """Sets the sensors.
 
         Args:
-            inner: The environment whose snapshots are kept.
+            inner: The environment or the vector whose snapshots are kept.
             rover: The environment of one rover, read once.
             n: Number of rovers.
             sensors: The sensors that each rover has, with different names.
@@ -186,7 +187,7 @@ class SensedRovers:
         Raises:
             OptionError: A sensor does not fit the rover.
         """
-        self._inner: Any = inner
+        self._inner = inner
         self.suite = SensorSuite(sensors, rover.model, rover.dt)
         self._states: list[SuiteState | None] = [None] * n
 
@@ -221,6 +222,26 @@ class SensedRovers:
         self._inner.restore(snapshot.env)
         self._states[:] = states
 
+    def begin_sensors(self, batch: RoverBatch, rovers: Sequence[RoverEnv], chosen: Sequence[int]) -> None:
+        """Draws the sensors' properties for the rovers whose episodes have begun, and takes their first samples."""
+        for i, row in zip(chosen, batch.generator_rows(chosen), strict=True):
+            self._states[i] = self.suite.begin(moment_of(rovers[i]), row)
+
+    def advance_sensors(self, rovers: Sequence[RoverEnv], resting: Collection[int] = ()) -> None:
+        """Takes the samples that are due of the rovers that have moved, which are all but those at rest."""
+        for i, rover in enumerate(rovers):
+            if i not in resting:
+                self.suite.advance(self._state(i), moment_of(rover))
+
+    def readings_of(self, i: int) -> Readings:
+        """The present readings of rover i, by sensor."""
+        return self.suite.readings(self._state(i))
+
+    def all_readings(self) -> Readings:
+        """The present readings of all rovers, stacked, by sensor."""
+        each = [self.readings_of(i) for i in range(len(self._states))]
+        return {name: np.stack([one[name] for one in each]) for name in self.suite.spaces}
+
 
 def moment_of(env: RoverEnv) -> Moment:
     """A rover, for its sensors."""
@@ -245,7 +266,7 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
         OptionError: `env` is another environment, or a sensor does not fit it.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], sensors: Sequence[Sensor]) -> None:
+    def __init__(self, env: gym.Env[Any, Any], sensors: Sequence[SensorLike]) -> None:
         given: object = env
         if not isinstance(given, gym.Env) or not isinstance(given.unwrapped, RoverEnv):
             refuse(OptionError, "env", given, "must be a RoverEnv")
@@ -288,100 +309,26 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
         return {STATE: observation, **self.readings()}, float(reward), terminated, truncated, info
 
 
-class SensorVectorObservation(SensedRovers, VectorWrapper):
-    """Adds each rover's sensors to its observation, bit for bit as `SensorObservation` does for one rover.
-
-    Args:
-        env: A `RoverVectorEnv`; wrappers go around this one.
-        sensors: The sensors that each rover has, with different names.
-
-    Raises:
-        OptionError: `env` is another environment or uses `SameStep` autoreset, which does not allow final readings, or
-            a sensor does not fit the rover.
-    """
-
-    def __init__(self, env: RoverVectorEnv, sensors: Sequence[Sensor]) -> None:
-        if not isinstance(env, RoverVectorEnv):
-            refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
-        if env.autoreset_mode == AutoresetMode.SAME_STEP:
-            refuse(OptionError, "autoreset_mode", env.autoreset_mode.value, "must be NextStep or Disabled with sensors")
-        VectorWrapper.__init__(self, env)
-        self._rovers = env
-        self.set_sensors(env, env.prototype, env.num_envs, sensors)
-        self.single_observation_space = self.suite.space(env.single_observation_space)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-
-    def sensor_state(self, i: int) -> SuiteState:
-        """The sensors of rover i's episode with their drawn properties.
-
-        Raises:
-            ResetNeeded: The rover has not been reset.
-        """
-        return self._state(i)
-
-    def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Starts episodes, as `RoverVectorEnv.reset`."""
-        observation, infos = self._rovers.reset(seed=seed, options=options)
-        mask = (options or {}).get("reset_mask")
-        self._begin(range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist())
-        return self._with_readings(observation), infos
-
-    def step(self, actions: npt.NDArray[np.float32]) -> tuple[dict[str, Any], Array, Mask, Mask, dict[str, Any]]:
-        """Applies actions, as `RoverVectorEnv.step`, then takes the samples that are due."""
-        states = [self._state(i) for i in range(self.num_envs)]
-        begun = set(self._rovers.batch.over)
-        observation, reward, terminated, truncated, infos = self._rovers.step(actions)
-        for i, state in enumerate(states):
-            if i not in begun:
-                self.suite.advance(state, moment_of(self._rovers.envs[i]))
-        self._begin(sorted(begun))
-        return self._with_readings(observation), reward, terminated, truncated, infos
-
-    def _with_readings(self, observations: Any) -> dict[str, Any]:
-        """The observations `(n, ...)` and the readings of all rovers."""
-        each = [self.suite.readings(self._state(i)) for i in range(len(self._states))]
-        return {STATE: observations, **{name: np.stack([one[name] for one in each]) for name in self.suite.spaces}}
-
-    def _begin(self, chosen: Iterable[int]) -> None:
-        chosen = list(chosen)
-        rows = self._rovers.batch.generator_rows(chosen)
-        for i, row in zip(chosen, rows, strict=True):
-            self._states[i] = self.suite.begin(moment_of(self._rovers.envs[i]), row)
-
-
 def make_rover(
-    *, sensors: Sequence[Sensor] | None = None, make: Callable[..., gym.Env[Any, Any]] = RoverEnv, **arguments: Any
+    *, sensors: Sequence[SensorLike] | None = None, make: Callable[..., gym.Env[Any, Any]] = RoverEnv, **arguments: Any
 ) -> gym.Env[Any, Any]:
     """Makes a `RoverEnv`, wrapped in `SensorObservation` if there are sensors.
 
     Args:
         sensors: The sensors; None for the environment as it is.
         make: `RoverEnv` or a subclass.
-        **arguments: Its arguments.
+        **arguments: Its arguments; with `render_mode="human"` a window shows the frames.
+
+    Raises:
+        OptionError: A window is wanted, but there is no display.
     """
+    is_shown = arguments.get("render_mode") == "human"
+    if is_shown:
+        check_display("render_mode")
+        arguments["render_mode"] = "rgb_array"
     env = make(**arguments)
-    return env if sensors is None else SensorObservation(env, sensors)
-
-
-def make_rover_vector(
-    num_envs: int = 1,
-    *,
-    sensors: Sequence[Sensor] | None = None,
-    make: Callable[..., RoverVectorEnv] = RoverVectorEnv,
-    **arguments: Any,
-) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Makes a `RoverVectorEnv`, wrapped in `SensorVectorObservation` if there are sensors.
-
-    Args:
-        num_envs: Number of rovers.
-        sensors: The sensors that each rover has; None for the environment as it is.
-        make: `RoverVectorEnv` or a subclass.
-        **arguments: Its arguments.
-    """
-    env = make(num_envs, **arguments)
-    return env if sensors is None else SensorVectorObservation(env, sensors)
+    env = env if sensors is None else SensorObservation(env, sensors)
+    return gym.wrappers.HumanRendering(env) if is_shown else env
 
 
 def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
@@ -389,17 +336,5 @@ def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
     return make_rover(make=RoverGrainsEnv, **arguments)
 
 
-class RoverGrainsVectorEnv(RoverVectorEnv):
-    """A vector of `RoverGrainsEnv` environments; see `RoverVectorEnv`. Their grains are stepped one after the other."""
-
-    #: The class of one rover.
-    env_class: ClassVar[type[RoverEnv]] = RoverGrainsEnv
-
-
-def make_grains_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Makes a `RoverGrainsVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
-    return make_rover_vector(num_envs, make=RoverGrainsVectorEnv, **arguments)
-
-
 #: What Gymnasium asks of an entry point before it calls it.
-make_rover.metadata = make_grains_rover.metadata = RoverEnv.metadata  # type: ignore[attr-defined]
+make_rover.metadata = make_grains_rover.metadata = {**RoverEnv.metadata, "render_modes": [*RENDER_MODES, "human"]}  # type: ignore[attr-defined]

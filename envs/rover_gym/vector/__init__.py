@@ -6,6 +6,14 @@ library.
 
 from rover_gym.env.batch import BatchSnapshot, RoverBatch
 from rover_gym.vector.pushed_vector import RandomPushesVector
+from rover_gym.vector.sensed_vector import (
+    RoverCourseVectorEnv,
+    RoverGrainsVectorEnv,
+    SensorVectorObservation,
+    make_course_vector,
+    make_grains_vector,
+    make_rover_vector,
+)
 from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed
 from rover_gym.vector.vector_env import RoverVectorEnv
 
@@ -14,8 +22,14 @@ __all__ = [
     "ExploringSpeed",
     "RandomPushesVector",
     "RoverBatch",
+    "RoverCourseVectorEnv",
+    "RoverGrainsVectorEnv",
     "RoverVectorEnv",
+    "SensorVectorObservation",
     "VectorSpeed",
+    "make_course_vector",
+    "make_grains_vector",
+    "make_rover_vector",
     "measure_exploring",
     "measure_speed",
 ]

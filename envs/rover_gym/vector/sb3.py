@@ -7,20 +7,23 @@ model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 """
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any, Unpack
 
+import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.batch import BatchSnapshot, Drawn
 from rover_gym.env.generators import check_seed
+from rover_gym.env.observation import Observations
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
+from rover_gym.env.task import check_actions
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, StateError
+from rover_gym.sensors.sensor_suite import STATE, SensedRovers, SensedSnapshot, SensorLike
 from rover_gym.validation import Range, refuse
 from rover_gym.vector.vector_env import RoverVectorEnv
 
@@ -40,13 +43,13 @@ class VecEnvSnapshot:
     """The state from which a `RoverVecEnv` continues bit for bit; picklable.
 
     Attributes:
-        batch: The rovers.
+        batch: The rovers, and their sensors if they have any.
         reset_infos: Infos of the resets of the running episodes.
         seeds: Seeds that were set for the next reset.
         options: Options that were set for the next reset.
     """
 
-    batch: BatchSnapshot
+    batch: BatchSnapshot | SensedSnapshot
     reset_infos: list[dict[str, Any]]
     seeds: list[int | None]
     options: list[dict[str, Any]]
@@ -67,7 +70,9 @@ class RoverVecEnv(VecEnv):
     Args:
         n_envs: Number of rovers.
         threads: Threads that step the rovers; None for one per core.
-        max_episode_steps: Steps until truncation; None for no limit.
+        max_episode_steps: Steps until truncation; None for 1200, -1 for no limit.
+        sensors: The sensors that each rover has; observations are then dictionaries for `MultiInputPolicy`, as those of
+            `gymnasium.make_vec`. None for the observation alone.
         **arguments: Arguments of `RoverEnv`.
     """
 
@@ -77,7 +82,8 @@ class RoverVecEnv(VecEnv):
         n_envs: int,
         *,
         threads: int | None = None,
-        max_episode_steps: int | None = MAX_EPISODE_STEPS,
+        max_episode_steps: int | None = None,
+        sensors: Sequence[SensorLike] | None = None,
         **arguments: Unpack[RoverArguments],
     ) -> None:
         #: The same rovers as a vector of Gymnasium.
@@ -86,7 +92,13 @@ class RoverVecEnv(VecEnv):
         #: Whether a step takes the height scan, see `RoverBatch.step`.
         self.has_scan = True
         self._actions: object = None
-        super().__init__(self.batch.n, self.batch.observation_space, self.batch.action_space)
+        self._sensed: SensedRovers | None = None
+        space: gym.Space[Any] = self.batch.observation_space
+        if sensors is not None:
+            self._sensed = SensedRovers()
+            self._sensed.set_sensors(self.rovers, self.prototype, self.batch.n, sensors)
+            space = self._sensed.suite.space(space)
+        super().__init__(self.batch.n, space, self.batch.action_space)
 
     @property
     def prototype(self) -> RoverEnv:
@@ -104,7 +116,7 @@ class RoverVecEnv(VecEnv):
         self._begin(self.batch.draw(range(self.num_envs), self._seeds, options))
         self._reset_seeds()
         self._reset_options()
-        return self.batch.observation
+        return self._observed(self.batch.observation)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Sets the seeds of the next reset: the first rover's seed, which increases by one per rover.
@@ -151,20 +163,24 @@ class RoverVecEnv(VecEnv):
         if waiting := self.batch.over:
             check_actions(self._actions, (self.num_envs, self.batch.task.n_actions))
             self._begin(self.batch.draw(waiting))
-        stepped, finals = self.batch.step_on(self._actions, same_step=True, has_scan=self.has_scan)
+        stepped, finals = self.batch.step_on(
+            self._actions, same_step=True, has_scan=self.has_scan, at_end=self._take_samples
+        )
         observation, earned, terminated, timed_out, ended = stepped
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
         for i, (seen, last) in finals.items():
             last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
             last["terminal_observation"] = seen
+            if self._sensed is not None:
+                last["terminal_observation"] = {STATE: seen, **self._sensed.readings_of(i)}
             infos[i] = last
         if not self.batch.over:
             self._tell_resets(ended)
         # Only a rover that flies off at 1e37 m/s earns a reward out of float32's range.
         most = float(np.finfo(np.float32).max)
         reward = np.clip(earned, -most, most).astype(np.float32)
-        return observation, reward, dones, infos
+        return self._observed(observation), reward, dones, infos
 
     def _begin(self, drawn: Drawn) -> None:
         self.batch.begin(drawn)
@@ -173,6 +189,15 @@ class RoverVecEnv(VecEnv):
     def _tell_resets(self, begun: Sequence[int]) -> None:
         for i in begun:
             self.reset_infos[i] = self.batch.info(i)
+        if self._sensed is not None:
+            self._sensed.begin_sensors(self.batch, self.rovers.envs, begun)
+
+    def _take_samples(self, resting: Collection[int]) -> None:
+        if self._sensed is not None:
+            self._sensed.advance_sensors(self.rovers.envs, resting)
+
+    def _observed(self, observation: Observations) -> VecEnvObs:
+        return observation if self._sensed is None else {STATE: observation, **self._sensed.all_readings()}
 
     def snapshot(self) -> VecEnvSnapshot:
         """Returns the state of all rovers, of their episodes and random generators, for `restore`; picklable.
@@ -181,7 +206,7 @@ class RoverVecEnv(VecEnv):
             ResetNeeded: The rovers have not been reset.
         """
         kept = copy.deepcopy((self.reset_infos, self._seeds, self._options))
-        return VecEnvSnapshot(self.batch.snapshot(), *kept)
+        return VecEnvSnapshot((self._sensed or self.batch).snapshot(), *kept)
 
     def restore(self, snapshot: VecEnvSnapshot) -> None:
         """Restores a snapshot of a vector of as many rovers with the same arguments, which continues bit for bit.
@@ -191,7 +216,8 @@ class RoverVecEnv(VecEnv):
         """
         if not isinstance(snapshot, VecEnvSnapshot):
             refuse(StateError, "snapshot", snapshot, "must come from RoverVecEnv.snapshot()")
-        self.batch.restore(snapshot.batch)
+        rovers: Any = self._sensed or self.batch
+        rovers.restore(snapshot.batch)
         kept = copy.deepcopy((snapshot.reset_infos, snapshot.seeds, snapshot.options))
         self.reset_infos, self._seeds, self._options = kept
 

@@ -1,10 +1,11 @@
 """`RoverVectorEnv`: the Gymnasium vector environment that `gymnasium.make_vec` creates."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, ClassVar, Unpack
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -15,9 +16,10 @@ from rover_gym.env.episode_scene import ResetOptions
 from rover_gym.env.generators import spread_seeds
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.spec_json import RoverSpec, rover_spec
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.mechanics import OptionError
-from rover_gym.validation import Range, mapping, refuse
+from rover_gym.validation import Range, mapping, refuse, whole
 
 _Info = dict[str, Any]
 
@@ -31,7 +33,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     Args:
         num_envs: Number of rovers.
         threads: Threads that step the rovers; None for one per core.
-        max_episode_steps: Steps until truncation; None for no limit.
+        max_episode_steps: Steps until truncation; None for `own_limit`, -1 for no limit, as in `gymnasium.make`.
         autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, as Gymnasium defines them.
         **arguments: Arguments of `RoverEnv`.
 
@@ -43,22 +45,28 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     #: The class of one rover.
     env_class: ClassVar[type[RoverEnv]] = RoverEnv
 
+    #: Steps until truncation unless others are given.
+    own_limit: ClassVar[int] = MAX_EPISODE_STEPS
+
+    _spec: RoverSpec | None = None
+
     @takes_arguments
     def __init__(
         self,
         num_envs: int = 1,
         *,
         threads: int | None = None,
-        max_episode_steps: int | None = MAX_EPISODE_STEPS,
+        max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **arguments: Unpack[RoverArguments],
     ) -> None:
         super().__init__()
         self.autoreset_mode = _check_mode(autoreset_mode)
-        self.batch = self.env_class.make_batch(
-            num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments
-        )
+        limit = episode_limit(max_episode_steps, self.own_limit)
+        self.batch = self.env_class.make_batch(num_envs, threads=threads, max_episode_steps=limit, **arguments)
         self.num_envs = self.batch.n
+        #: Called at the end of each period, before the next episodes begin, with the rovers that have rested.
+        self.at_end: Callable[[Collection[int]], None] = _nothing
         self.envs = tuple(self.env_class.row(self.batch, i) for i in range(self.num_envs))
         self.metadata = {**self.prototype.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = self.prototype.render_mode
@@ -66,6 +74,15 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         self.single_action_space = self.prototype.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @property
+    def spec(self) -> RoverSpec | None:
+        """The specification that `gymnasium.make_vec` has made the vector from; its `to_json` writes objects, too."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, value: EnvSpec | None) -> None:
+        self._spec = rover_spec(value)
 
     @property
     def prototype(self) -> RoverEnv:
@@ -135,9 +152,11 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 check_actions(actions, (self.num_envs, self.batch.task.n_actions))
                 raise ResetNeeded(f"rovers {over}: call reset() with reset_mask first")
             observation, reward, terminated, truncated, _ = self.batch.step(actions)
+            self.at_end(())
             return observation, reward, terminated, truncated, self.batch.infos()
         same_step = mode == AutoresetMode.SAME_STEP
-        (observation, reward, terminated, truncated, _), finals = self.batch.step_on(actions, same_step=same_step)
+        stepped, finals = self.batch.step_on(actions, same_step=same_step, at_end=self.at_end)
+        observation, reward, terminated, truncated, _ = stepped
         infos = self.batch.infos()
         for i, (last, info) in finals.items():
             infos = self._add_info(infos, {"final_obs": last, "final_info": info}, i)
@@ -212,6 +231,32 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
+
+
+def _nothing(_resting: Collection[int]) -> None:
+    """What happens at the end of a period without sensors."""
+
+
+def episode_limit(given: object, own: int) -> int | None:
+    """Steps until truncation, or None for no limit, from an argument with the meaning it has in `gymnasium.make`.
+
+    Args:
+        given: None for the environment's own limit, -1 for no limit, or a number of steps.
+        own: The environment's own limit.
+
+    Raises:
+        OptionError: `given` is none of these.
+    """
+    if given is None:
+        return own
+    if (
+        isinstance(given, (bool, np.timedelta64))
+        or not isinstance(given, (int, np.integer))
+        or given < -1
+        or given == 0
+    ):
+        refuse(OptionError, "max_episode_steps", given, "must be a whole number from 1, -1 for no limit, or None")
+    return None if given == -1 else whole("max_episode_steps", given, at_least=1)
 
 
 def _check_mode(mode: object) -> AutoresetMode:

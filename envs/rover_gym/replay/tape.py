@@ -26,17 +26,18 @@ class Watched:
     """A policy, with what it carries from one prediction to the next.
 
     Attributes:
-        policy: The policy.
+        policy: The policy; None where another program drives.
         state: What it carries; None before its first prediction of an episode.
     """
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Policy | None) -> None:
         self.policy, self.state = policy, None
 
     def predict(
         self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
     ) -> tuple[npt.NDArray[np.float32], Any]:
         """As the policy's; keeps the state."""
+        assert self.policy is not None  # noqa: S101 - only a policy is asked
         action, self.state = self.policy.predict(observation, state, episode_start)
         return action, self.state
 
