@@ -447,6 +447,11 @@ fn shortened_balance<S: MechanicalSystem>(
         // together.
         let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
         shorten(ws, share);
+        // Springs of treads would else store what no motion gave them, step after step.
+        let d = S::DIMENSION.components();
+        for (p, law) in ws.p.chunks_exact_mut(d).zip(&ws.yielding) {
+            law.shorten_deflection(share, &mut p[1..]);
+        }
         place(system, options, ws);
         system.normalise(&mut ws.end);
         found = balance(system, options, start, ws, before);
