@@ -22,7 +22,7 @@ from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, T
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.rendering.appearance import GROUND_COLOUR, SKY_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page
-from rover_gym.replay.charts import LOAD_TIME, moving_mean
+from rover_gym.replay.charts import LOAD_TIME
 from rover_gym.replay.rover_scene import WHEEL_NAMES
 from rover_gym.runs import open_run, record_run
 from rover_gym.soil import SoilRun, rover_on_soil, settled_bed
@@ -92,9 +92,9 @@ def drive(path: Path, terrain: Terrain = ROCKS) -> RoverRun:
         for _ in range(100):
             sim.step(4)
             recorder.append(sampler.row(sim))
-    run = read_run(path).resample(10.0)
-    run.trajectory["wheel_forces"][12, 0, 0] = PEAK
-    return run
+    run = read_run(path)
+    run.trajectory["wheel_forces"][62, 0, 0] = PEAK  # between two frames of the page
+    return run.resample(10.0)
 
 
 @pytest.fixture(scope="module")
@@ -278,7 +278,7 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown[
     panel = browser.find_element(By.ID, "panel")
     assert panel.rect["x"] >= canvas.rect["x"] + canvas.rect["width"] - 1.0
 
-    loads = moving_mean(run.time, run.trajectory["wheel_forces"][:, :, 0], LOAD_TIME)
+    loads = run.mean(lambda run: run.trajectory["wheel_forces"][:, :, 0], LOAD_TIME)
     positions = []
     for row in (5, 15):
         go_to(browser, float(run.time[row] - run.time[0]) + 0.01)
@@ -403,7 +403,7 @@ def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_show
     first = picture(browser)
     go_to(browser, 0.5)
     later = picture(browser)
-    end = shown_load(moving_mean(run.time, run.wheel_forces[..., 1], LOAD_TIME)[-1, 0])
+    end = shown_load(run.mean(lambda run: run.wheel_forces[..., 1], LOAD_TIME)[-1, 0])
     await_that(lambda: end in readings(browser)[0], "the load at the end")
     go_to(browser, 0.0)
     back = picture(browser)

@@ -16,8 +16,9 @@ from rover_gym.figures.chapter_3 import draw_chapter_3
 from rover_gym.figures.drawing import KINDS
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
-from rover_gym.planar import BallSimulation, PlanarRun, Sine
+from rover_gym.planar import BallSimulation, Line, PlanarRun, Sine
 from rover_gym.record import RecordingError, read_trajectory
+from rover_gym.replay import write_page
 from rover_gym.reproduction.scene_runs import ball_on_incline, published
 from rover_gym.runs import open_run, record_run
 from rover_gym.soil import SoilRun
@@ -239,6 +240,41 @@ def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> N
     assert [chart["unit"] for chart in charts] == ["N", "mm", "mm/s"]
     error = error_of("replay", str(recording), "--gltf", str(tmp_path / "run.glb"))
     assert "is replayed as a page, with --html" in error
+
+
+def bouncing_ball() -> BallSimulation:
+    sim = BallSimulation(Line(slope=-0.2), radius=0.3, mass=3.0, restitution=0.6, friction=0.5, time_step=0.002)
+    sim.set_state([0.0, 1.3, 0.0])
+    return sim
+
+
+def test_the_page_of_a_bouncing_ball_shows_the_loads_of_its_impacts(tmp_path: Path) -> None:
+    """The page took a sample in twenty before the mean over 0.2 s: an impact of one step was seldom among them."""
+    record_run(bouncing_ball(), 2.0, tmp_path / "ball.h5", None)
+    run = open_run(tmp_path / "ball.h5", PlanarRun)
+    page = held(write_page(run.resample(25.0), tmp_path / "ball.html"))
+    load, gap, slip = (chart["values"][0] for chart in page.head["curves"]["charts"])
+    time = np.array(page.head["curves"]["time"])
+    assert len(load) == len(gap) == len(slip) == len(time) == 51
+    hits = [impact for impact in run.time[run.loads[:, 0] > 1e3] if impact < 1.8]
+    assert len(hits) >= 2
+    for impact in hits:
+        assert load[int(np.argmin(abs(time - impact)))] > 10.0
+    # Over the whole run, impacts and rests carry the weight's part along the normal.
+    whole = run.trajectory["impulses"][1:, 0, 0].sum()
+    assert np.trapezoid(load, time) == pytest.approx(whole, rel=0.05)
+    k = 30
+    within = np.abs(run.time - run.time[0] - time[k]) <= 0.02 + 1e-6
+    assert slip[k] == pytest.approx(1e3 * run.slip_speeds[within, 0].mean(), abs=0.1)
+
+
+def test_rows_between_which_steps_lie_keep_the_impulses_of_all_of_them(tmp_path: Path) -> None:
+    """A row at 25 a second held the impulses of its last step, and most impacts fell between two rows."""
+    record_run(bouncing_ball(), 1.0, tmp_path / "steps.h5", None)
+    record_run(bouncing_ball(), 1.0, tmp_path / "rows.h5", 25.0)
+    steps, rows = (open_run(tmp_path / f"{name}.h5", PlanarRun).trajectory for name in ("steps", "rows"))
+    np.testing.assert_array_equal(rows["q"][-1], steps["q"][-1])
+    np.testing.assert_allclose(20 * rows["impulses"].sum(axis=0), steps["impulses"].sum(axis=0), rtol=1e-12)
 
 
 def test_a_planar_run_read_back_is_the_simulations(tmp_path: Path) -> None:

@@ -51,8 +51,8 @@ def planar_channels(coordinates: int, discs: int) -> tuple[Channel, ...]:
     """The channels of a machine with so many coordinates and discs."""
     names, of_discs = COORDINATES[coordinates], DISCS[discs]
     impulses = (
-        "impulses of the last step along the normal (out of the ground) and the tangent (forward), summed"
-        " over the contacts of a disc"
+        "impulses of a step along the normal (out of the ground) and the tangent (forward), summed over the contacts"
+        " of a disc, mean over the steps since the last row"
     )
     rates = tuple(f"{name}_rate" for name in names)
     gaps = "distance from disc to ground, negative where they overlap"
@@ -80,22 +80,20 @@ class PlanarSampler(Sampler):
         super().__init__(sim)
         self.channels = planar_channels(len(sim.q), len(sim.centres))
 
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        super().clear()
+        self._impulses = np.zeros((len(self.sim.centres), 2))
+
+    def gather(self, report: Any) -> None:  # noqa: ARG002 - the impulses are the simulation's
+        """Adds the impulses of the last step."""
+        contacts = self.sim.contacts
+        np.add.at(self._impulses, contacts.discs, contacts.impulses)
+
     @property
     def impulses(self) -> Array:
-        """(n_discs, 2) impulses of the last step, N s."""
-        contacts, impulses = self.sim.contacts, np.zeros((len(self.sim.centres), 2))
-        np.add.at(impulses, contacts.discs, contacts.impulses)
-        return impulses
-
-    def step(self, n: int) -> bool:
-        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
-
-        Raises:
-            StepError: A step failed.
-        """
-        report = self.sim.step(n)
-        self.residual = report.residual
-        return bool(report.is_converged)
+        """(n_discs, 2) impulses of a step, mean since the last row, N s."""
+        return self._impulses / max(1, self.steps)
 
     def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
         """The attributes of a recording, taken from the simulation at its start."""
@@ -163,7 +161,7 @@ class PlanarRun(Run):
 
     @property
     def loads(self) -> Array:
-        """(n, n_discs) force of the ground on each disc along its normal, mean over a step, N."""
+        """(n, n_discs) force of the ground on each disc along its normal, mean since the previous sample, N."""
         step = float(self.trajectory.attributes["solver"]["time_step"])
         result: Array = self.trajectory["impulses"][..., 0] / step
         return result

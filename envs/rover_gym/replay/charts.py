@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from rover_gym.record.rover_run import Run
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+R = TypeVar("R", bound=Run)
 Array = npt.NDArray[np.float64]
 
 FOLLOW_TIME = 1.0  # s, window of the path that the eye follows: the eye does not shake with the machine
 
 LOAD_TIME = 0.2  # s, window of the loads: an impact lasts a step and says nothing of the weight carried
-
-
-def moving_mean(time: Array, values: Array, window: float) -> Array:
-    """Values `(n, m)` averaged over the samples within half of a window, s, without those that are not finite."""
-    half = 0.5 * window + 1e-6  # samples at the edge count, whatever their rounding
-    first = np.searchsorted(time, time - half, side="left")
-    last = np.searchsorted(time, time + half, side="right")
-    known = np.isfinite(values)
-    sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
-    counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
-    with np.errstate(invalid="ignore"):
-        result: Array = (sums[last] - sums[first]) / (counts[last] - counts[first])
-    return result
 
 
 class Chart(NamedTuple):
@@ -47,9 +37,9 @@ class Chart(NamedTuple):
     shown: bool = True
 
 
-def load_chart(title: str, time: Array, loads: Array, digits: int, wheels: list[tuple[str, str]]) -> Chart:
-    """The wheels' loads `(n, n_wheels)`, N, as means over `LOAD_TIME`."""
-    smooth = moving_mean(time, loads, LOAD_TIME)
+def load_chart(title: str, run: R, loads: Callable[[R], Array], digits: int, wheels: list[tuple[str, str]]) -> Chart:
+    """The wheels' loads as means over `LOAD_TIME`; `loads` gives those of a run, (n, n_wheels), N."""
+    smooth = run.mean(loads, LOAD_TIME)
     return Chart(f"{title}, mean over {LOAD_TIME:g} s", "N", smooth, digits, wheels, LOAD_TIME)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import Polyline
+from rover_gym.record.rover_run import moving_mean
 from rover_gym.rendering.appearance import (
     AXLE_COLOUR,
     GROUND_COLOUR,
@@ -20,7 +21,7 @@ from rover_gym.rendering.appearance import (
     Part,
     part_mesh,
 )
-from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 
 if TYPE_CHECKING:
@@ -198,9 +199,9 @@ def _soil_curves(run: SoilRun) -> dict[str, Any]:
     names = ("wheel",) if run.wheels.shape[1] == 1 else ("back wheel", "front wheel")
     wheels = list(zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True))
     charts = [
-        load_chart("wheel load", run.time, run.wheel_forces[..., 1], 1, wheels),
+        load_chart("wheel load", run, lambda run: run.wheel_forces[..., 1], 1, wheels),
         Chart("sinkage", "mm", 1e3 * run.sinkage, 2, wheels),
-        Chart("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1, wheels),
+        Chart("rim faster than rover", "mm/s", 1e3 * run.mean(lambda run: run.slip_speeds), 1, wheels),
     ]
     return panel_contents(run.title, run.time, charts)
 
@@ -258,8 +259,8 @@ def _planar_curves(run: PlanarRun) -> dict[str, Any]:
     """Contents of the panel."""
     discs = list(zip(run.names, PLANAR_WHEEL_COLOURS[: len(run.names)], strict=True))
     charts = [
-        load_chart("load", run.time, run.loads, 1, discs),
+        load_chart("load", run, lambda run: run.loads, 1, discs),
         Chart("gap", "mm", 1e3 * run.trajectory["gaps"], 2, discs),
-        Chart("rim faster than machine", "mm/s", 1e3 * run.slip_speeds, 1, discs),
+        Chart("rim faster than machine", "mm/s", 1e3 * run.mean(lambda run: run.slip_speeds), 1, discs),
     ]
     return panel_contents(run.title, run.time, charts)

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from rover_gym.ground import map_of, surfaces_of
 from rover_gym.mechanics import HeightField
 from rover_gym.record.channels import outcome_words
+from rover_gym.record.rover_run import moving_mean
 from rover_gym.rendering.appearance import GROUND_COLOUR_2, HAZE, WHEEL_COLOURS
-from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_ghost
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents, with_ghost
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.scenery import (
     MOST_HEIGHTS,
@@ -154,7 +155,7 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
     path = trunk_path(run)
     centre = moving_mean(run.time, path, FOLLOW_TIME) if follow else np.tile(path[0], (run.n_frames, 1))
     points, normals, across = feet(run, wheels)
-    forces = world_forces(run, normals, across)
+    forces = world_forces(run.mean(lambda run: run.trajectory["wheel_forces"]), normals, across)
     share = run.model.mass * _gravity(run) / max(1, len(wheels))
     positions, rotations = run.positions, run.rotations
     scene.facts["curves"] = rover_curves(run)
@@ -186,7 +187,7 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
         rut_map, samples, cells, levels = ruts
         scene.facts["ruts"] = rut_map.header()
         scene.arrays |= {"rut-sample": ("u4", samples), "rut-cell": ("u4", cells), "rut-level": ("u1", levels)}
-    scene.facts["events"] = _events(run)
+    scene.facts["events"] = _events(run.whole)
     return scene
 
 
@@ -234,19 +235,23 @@ def rover_curves(run: RoverRun) -> dict[str, Any]:
     ]
     blue, orange = WHEEL_COLOURS[0], WHEEL_COLOURS[3]
     charts = [
-        load_chart("wheel load", run.time, data["wheel_forces"][:, :, 0], 0, wheels),
+        load_chart("wheel load", run, lambda run: run.trajectory["wheel_forces"][:, :, 0], 0, wheels),
         Chart("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2, wheels, shown=bool(np.any(data["wheel_gaps"] > 1e-3))),
     ]
     if "v" in data.data:
-        speed = np.linalg.norm(data["v"][:, [0, 2]], axis=1)
-        charts.append(Chart("speed", "m/s", speed[:, None], 3, [("speed", blue)]))
+        speed = run.mean(lambda run: np.linalg.norm(run.trajectory["v"][:, [0, 2]], axis=1, keepdims=True))
+        charts.append(Chart("speed", "m/s", speed, 3, [("speed", blue)]))
     lean = np.degrees(data["q"][:, [3, 5]])
     charts.append(Chart("attitude", "degrees", lean, 2, [("roll", blue), ("pitch", orange)], shown=False))
-    for name, title, unit, digits in (("slip_ratio", "slip", "1", 3), ("motor_energy", "work of the motors", "J", 1)):
-        if name in data.data:
-            charts.append(Chart(title, unit, data[name][:, None], digits, [(title, blue)], shown=False))
+    if "slip_ratio" in data.data:
+        slip = run.mean(lambda run: run.trajectory["slip_ratio"][:, None])
+        charts.append(Chart("slip", "1", slip, 3, [("slip", blue)], shown=False))
+    if "motor_energy" in data.data:
+        work = "work of the motors"
+        charts.append(Chart(work, "J", data["motor_energy"][:, None], 1, [(work, blue)], shown=False))
     if "motor_torques" in data.data:
-        charts.append(Chart("motor torque", "N m", data["motor_torques"], 2, wheels, shown=False))
+        torques = run.mean(lambda run: run.trajectory["motor_torques"])
+        charts.append(Chart("motor torque", "N m", torques, 2, wheels, shown=False))
     return panel_contents(run.title, run.time, charts, facts(run))
 
 
