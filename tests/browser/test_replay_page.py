@@ -292,7 +292,8 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown[
     assert len(positions[0]) == 3
     # One impact must not flatten the other curves: the axis ends below it and notes that.
     assert (
-        browser.find_element(By.CSS_SELECTOR, "#panel .peak").text == f"cut off, peak {float(f'{loads.max():.3g}'):g} N"
+        browser.find_element(By.CSS_SELECTOR, "#panel .peak").text
+        == f"beyond the scale: peak {float(f'{loads.max():.3g}'):g} N"
     )
     curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
     heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]
@@ -386,7 +387,7 @@ def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: Shown[So
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
         f"wheel load, mean over {LOAD_TIME:g} s (N)",
         "sinkage (mm)",
-        "rim faster than rover (mm/s)",
+        "rim speed minus forward speed (mm/s)",
     ]
     red, green, blue = np.moveaxis(picture(browser), -1, 0)
     assert ((blue > red + 60.0) & (green < blue)).mean() > 0.002  # the body, blue

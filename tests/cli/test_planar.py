@@ -16,9 +16,11 @@ from rover_gym.figures.chapter_3 import draw_chapter_3
 from rover_gym.figures.drawing import KINDS
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
-from rover_gym.planar import BallSimulation, Line, PlanarRun, Sine
+from rover_gym.planar import BallSimulation, Line, PlanarRun, Polyline, Sine, TwoWheelRoverSimulation
 from rover_gym.record import RecordingError, read_trajectory
 from rover_gym.replay import write_page
+from rover_gym.replay.flat_scene import planar_scene
+from rover_gym.replay.page_scene import PageScene
 from rover_gym.reproduction.scene_runs import ball_on_incline, published
 from rover_gym.runs import open_run, record_run
 from rover_gym.soil import SoilRun
@@ -237,7 +239,7 @@ def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> N
     page = tmp_path / "page.html"
     assert rover("replay", str(recording), "--html", str(page)).exit_code == 0
     charts = held(page).head["curves"]["charts"]
-    assert [chart["unit"] for chart in charts] == ["N", "mm", "mm/s"]
+    assert [chart["unit"] for chart in charts] == ["N", "N s", "N s", "mm", "mm/s"]
     error = error_of("replay", str(recording), "--gltf", str(tmp_path / "run.glb"))
     assert "is replayed as a page, with --html" in error
 
@@ -253,7 +255,7 @@ def test_the_page_of_a_bouncing_ball_shows_the_loads_of_its_impacts(tmp_path: Pa
     record_run(bouncing_ball(), 2.0, tmp_path / "ball.h5", None)
     run = open_run(tmp_path / "ball.h5", PlanarRun)
     page = held(write_page(run.resample(25.0), tmp_path / "ball.html"))
-    load, gap, slip = (chart["values"][0] for chart in page.head["curves"]["charts"])
+    load, normal, _, gap, slip = (chart["values"][0] for chart in page.head["curves"]["charts"])
     time = np.array(page.head["curves"]["time"])
     assert len(load) == len(gap) == len(slip) == len(time) == 51
     hits = [impact for impact in run.time[run.loads[:, 0] > 1e3] if impact < 1.8]
@@ -263,9 +265,47 @@ def test_the_page_of_a_bouncing_ball_shows_the_loads_of_its_impacts(tmp_path: Pa
     # Over the whole run, impacts and rests carry the weight's part along the normal.
     whole = run.trajectory["impulses"][1:, 0, 0].sum()
     assert np.trapezoid(load, time) == pytest.approx(whole, rel=0.05)
+    assert sum(normal[1:]) == pytest.approx(whole, abs=0.05)  # each impulse is in one frame
     k = 30
     within = np.abs(run.time - run.time[0] - time[k]) <= 0.02 + 1e-6
     assert slip[k] == pytest.approx(1e3 * run.slip_speeds[within, 0].mean(), abs=0.1)
+
+
+def channel(scene: PageScene, name: str) -> np.ndarray:
+    (found,) = (one.values for one in scene.channels if one.name == name)
+    return found
+
+
+def test_a_planar_page_shows_forces_within_friction_cones(tmp_path: Path) -> None:
+    """Pages of a ball had no force arrows and no friction cones."""
+    sim = BallSimulation(Line(slope=-0.5), radius=0.3, mass=3.0, friction=0.1, time_step=0.002)
+    sim.set_state([0.0, 0.3 * np.hypot(1.0, 0.5), 0.0])
+    record_run(sim, 0.4, tmp_path / "ball.h5", None)
+    run = open_run(tmp_path / "ball.h5", PlanarRun).resample(25.0)
+    scene = planar_scene(run, follow=True)
+    assert scene.facts["friction"] == 0.1
+    normal = np.array([0.5, 1.0]) / np.hypot(0.5, 1.0)
+    assert channel(scene, "normals")[5, 0] == pytest.approx([*normal, 0.0], abs=1e-9)
+    foot, force = channel(scene, "forces")[5, 0, :2], channel(scene, "forces")[5, 0, 3:]
+    assert run.ground.height(foot[0]) == pytest.approx(foot[1], abs=1e-6)
+    # In shares of the weight: the normal part is cos(slope), and the ball slides, with all of its friction.
+    assert force[:2] @ normal == pytest.approx(normal[1], rel=1e-6)
+    assert force[:2] @ [normal[1], -normal[0]] == pytest.approx(-0.1 * normal[1], rel=1e-6)
+    assert force[2] == 0.0
+
+
+def test_a_wheel_at_a_step_is_pushed_back_by_its_corner(tmp_path: Path) -> None:
+    """Impulses along the normals of two contacts were one number, from which no arrow follows."""
+    sim = TwoWheelRoverSimulation(Polyline.step(1.0, 0.1), friction=0.6, time_step=0.002)
+    sim.set_state([0.2, 0.2, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, -5.0, -5.0])
+    record_run(sim, 0.6, tmp_path / "rover.h5", None)
+    run = open_run(tmp_path / "rover.h5", PlanarRun)
+    forces = channel(planar_scene(run, follow=True), "forces")
+    hit = int(np.argmin(forces[:, 1, 3]))
+    assert forces[hit, 1, 3] < -1.0  # backwards
+    assert forces[hit, 1, :2] == pytest.approx([1.0, 0.1], abs=0.01)
+    momentum = np.diff(run.trajectory["v"][:, 0]) * 250.0
+    np.testing.assert_allclose(run.trajectory["world_impulses"][1:, :, 0].sum(axis=1), momentum, atol=0.5)
 
 
 def test_rows_between_which_steps_lie_keep_the_impulses_of_all_of_them(tmp_path: Path) -> None:

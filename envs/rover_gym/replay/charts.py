@@ -24,8 +24,8 @@ class Chart(NamedTuple):
     """A chart of the panel.
 
     `values` are (n, n_series); `digits` stand after the point; `series` are name and colour of each curve;
-    `window`, s, is how long a lone impact lasts in the values: it must not set the scale; `shown`: at once, or when it
-    is chosen.
+    `window`, s, is how long a lone impact lasts in the values; with `cut` it does not set the scale. `shown`: at once,
+    or when it is chosen.
     """
 
     title: str
@@ -35,6 +35,7 @@ class Chart(NamedTuple):
     series: list[tuple[str, str]]
     window: float = 0.0
     shown: bool = True
+    cut: bool = True
 
 
 def load_chart(title: str, run: R, loads: Callable[[R], Array], digits: int, wheels: list[tuple[str, str]]) -> Chart:
@@ -57,6 +58,7 @@ def panel_contents(title: str, time: Array, charts: Iterable[Chart], facts: Iter
                 "series": [{"name": name, "colour": colour} for name, colour in chart.series],
                 "window": chart.window,
                 "shown": chart.shown,
+                "cut": chart.cut,
             }
             for chart in charts
         ],
