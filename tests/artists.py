@@ -48,7 +48,10 @@ def shown(figure: Figure) -> Iterator[Text]:
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
             for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
-                if not low - 1e-9 * (high - low) <= tick.get_loc() <= high + 1e-9 * (high - low) or not axis.get_visible():
+                if (
+                    not low - 1e-9 * (high - low) <= tick.get_loc() <= high + 1e-9 * (high - low)
+                    or not axis.get_visible()
+                ):
                     hidden |= {tick.label1, tick.label2}
     for text in figure.findobj(Text):
         if text.get_visible() and text.get_text().strip() and text not in hidden:

@@ -6,22 +6,27 @@ import subprocess
 from pathlib import Path
 
 import imageio_ffmpeg
+import matplotlib as mpl
 import numpy as np
 import pytest
+from artists import covered
 from commands import error_of, output_of, rover
 from matplotlib.figure import Figure
 from pages import held
 
-from rover_gym.figures.chapter_3 import draw_chapter_3
+from rover_gym.figures.chapter_3 import _sine_path, draw_chapter_3
 from rover_gym.figures.drawing import KINDS
+from rover_gym.figures.incline_figure import fill_incline
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
+from rover_gym.figures.style import STYLE
 from rover_gym.planar import BallSimulation, Line, PlanarRun, Polyline, Sine, TwoWheelRoverSimulation
+from rover_gym.planar.incline import Incline
 from rover_gym.record import RecordingError, read_trajectory
 from rover_gym.replay import write_page
 from rover_gym.replay.flat_scene import planar_scene
 from rover_gym.replay.page_scene import PageScene
-from rover_gym.reproduction.scene_runs import ball_on_incline, published
+from rover_gym.reproduction.scene_runs import ball_on_incline, ball_on_sine, published
 from rover_gym.runs import open_run, record_run
 from rover_gym.soil import SoilRun
 
@@ -216,6 +221,50 @@ def test_chapter_3_is_redrawn(tmp_path: Path) -> None:
     paths = draw_chapter_3(tmp_path)
     assert [path.name[:10] for path in paths] == ["figure-3.2", "figure-3.3", "figure-3.4", "figure-3.5"]
     assert all(is_png(path) for path in paths)
+
+
+def test_figure_3_4_shows_the_outline_of_the_ball(tmp_path: Path) -> None:
+    """The curve of a ball of 1.5 m floated over the ground without a hint of the ball."""
+    pair = []
+    for contact in ("centre_height", "nearest"):
+        sim, _ = ball_on_sine(contact)
+        record_run(sim, 0.05, tmp_path / f"{contact}.h5", 50.0)
+        pair.append(read_trajectory(tmp_path / f"{contact}.h5"))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 5.0))
+        _sine_path(figure, *pair)
+        assert covered(figure) == []
+    first = pair[1]["q"][0, :2]
+    distances = [np.linalg.norm(line.get_xydata() - first, axis=1) for line in figure.axes[0].lines]
+    assert any(np.allclose(distance, 1.5) for distance in distances)
+
+
+@pytest.mark.parametrize(
+    ("slope", "friction", "speed", "rolls"), [(20.0, 0.2, 2.0, True), (20.0, 0.2, 0.0, True), (45.0, 0.1, 0.5, False)]
+)
+def test_a_ball_on_an_incline_slides_and_rolls_as_the_closed_form_says(
+    slope: float, friction: float, speed: float, *, rolls: bool, tmp_path: Path
+) -> None:
+    arguments = ["--slope", slope, "--friction", friction, "--speed", speed, "--duration", "1", "--output", tmp_path]
+    told = json.loads(output_of("planar", "incline", *arguments, "--json"))
+    assert told["rolls"] is rolls
+    assert told["difference"] < 1e-3
+    alpha, ratio = np.radians(slope), 1.0 + 1.0 / 0.4
+    assert told["steepest"] == pytest.approx(np.arctan(friction * ratio))
+    if rolls:
+        gap = 9.81 * (friction * ratio * np.cos(alpha) - np.sin(alpha))  # by which rim and centre approach
+        assert told["end_of_sliding"] == pytest.approx(speed / gap, abs=0.004)
+        assert told["acceleration"] == pytest.approx(9.81 * np.sin(alpha) / 1.4)
+    else:
+        assert told["end_of_sliding"] is None
+        assert told["acceleration"] == pytest.approx(9.81 * (np.sin(alpha) - friction * np.cos(alpha)))
+    run = open_run(tmp_path / "incline.h5", PlanarRun)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 7.0))
+        fill_incline(figure, run, Incline(alpha, friction, speed, 0.4))
+        assert covered(figure) == []
+    (points,) = [line for line in figure.axes[3].lines if line.get_label() == "slides"]
+    assert (np.array(points.get_xdata()) > np.degrees(np.arctan(friction * ratio))).all()
 
 
 def test_a_default_run_ends_where_its_subject_ends(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from rover_gym.cli.options import BUILT_IN, ModelName, complete_policy, complete
 from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
 from rover_gym.env.start import MAX_DIFFICULTY
 from rover_gym.extras import MissingExtraError, require
-from rover_gym.figures.policy_figure import draw_policies
+from rover_gym.figures.policy_figure import draw_policies, title_of
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import (
     Contender,
@@ -185,7 +185,7 @@ def _write(
     (output / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     written = [output / "evaluation.md", output / "evaluation.json"]
     try:
-        draw_policies(rows, output / "evaluation.png")
+        draw_policies(rows, output / "evaluation.png", title_of(report))
         written.append(output / "evaluation.png")
     except MissingExtraError as error:
         typer.echo(f"no picture: {error}", err=True)

@@ -236,8 +236,10 @@ def _forward(q: Array) -> Array:
 
 
 def _averaged(run: RoverRun) -> str:
-    """Averaging interval of the recorded forces."""
+    """Averaging interval of the recorded forces: a row for rows of single steps and of `record_run`."""
     step = run.trajectory.attributes.get("solver", {}).get("time_step")
+    if "distance_to_goal" not in run.trajectory.data and run.n_frames > 1:
+        return f"the {1e3 * float(np.median(np.diff(run.time))):.3g} ms before each sample"
     return "the last time step" if step is None else f"the last time step of {1e3 * step:g} ms"
 
 
