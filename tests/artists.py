@@ -17,7 +17,8 @@ def covered(figure: Figure) -> list[str]:
     """Pairs of texts that overlap, and texts that lie over a curve, a bar or the frame's edge of their axes."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    texts = [(text, inner(text.get_window_extent(canvas.get_renderer()))) for text in shown(figure)]
+    # Of an annotation the text alone, without its arrow.
+    texts = [(text, inner(Text.get_window_extent(text, canvas.get_renderer()))) for text in shown(figure)]
     found = [
         f"{a.get_text()!r} and {b.get_text()!r}"
         for (a, one), (b, other) in combinations(texts, 2)

@@ -123,7 +123,7 @@ class LiveServer:
                     CommandError,
                     "do",
                     entries["do"],
-                    "is allowed on the page in control only, and another page is in control",
+                    "another page drives: press 'take the wheel', or send {\"do\": \"take\"}",
                 )
             self._loop.send(command)
         except RoverGymError as error:

@@ -17,6 +17,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.ground import sand_of
 from rover_gym.mechanics import OptionError, RoverGymError, RoverModel, Simulation, __version__
 from rover_gym.validation import checked, number, refuse
 
@@ -372,9 +373,11 @@ def describe(
         scene: Further parameters of the scene.
         seed: Seed of the run, or why there is none.
     """
+    sand = sand_of(sim.terrain)
     return {
         "title": title,
         "scene": {
+            **({} if sand is None else {"soil": sand.soil}),
             **(scene or {}),
             "model": sim.model.to_dict(),
             "q": sim.q,

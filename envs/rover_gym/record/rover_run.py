@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.ground import sand_of
 from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.record.channels import ITERATIONS, TIME, Channel, RecordingError, RoverSampler, sound
 from rover_gym.record.trajectory import Trajectory, read_trajectory
@@ -139,6 +140,12 @@ class RoverRun(Run):
     goal: tuple[float, float] | None
     title: str
     goal_tolerance: float | None = None
+
+    @property
+    def on_sand(self) -> bool:
+        """Whether the wheels sank into sand; the ground of a recording is its surface alone."""
+        scene = self.trajectory.attributes.get("scene", {})
+        return sand_of(self.terrain) is not None or scene.get("terrain") == "sand" or "soil" in scene
 
     @property
     def positions(self) -> npt.NDArray[np.float64]:

@@ -12,7 +12,7 @@ from rover_gym.ground import map_of, surfaces_of
 from rover_gym.mechanics import HeightField
 from rover_gym.record.channels import outcome_words
 from rover_gym.record.rover_run import moving_mean
-from rover_gym.rendering.appearance import GROUND_COLOUR_2, HAZE, WHEEL_COLOURS
+from rover_gym.rendering.appearance import GROUND_COLOUR_2, HAZE, SAND_GROUND, WHEEL_COLOURS
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents, with_ghost
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.scenery import (
@@ -47,6 +47,7 @@ WHEEL_NAMES = {
     "BR": "back right",
 }
 LONGEST_FACT = 100
+HEAVY = 100.0  # kg: loads of a heavier rover are whole newtons
 BEYOND = 45.0  # m of a map that are shown around the piece with all its detail
 MOST_AROUND, DIP = 10_000, 0.15  # heights of it, and how far it lies under the edge of that piece, of its cells
 PLANE = 400.0  # m, half of the edge of a plane
@@ -123,6 +124,8 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
     }
     scene = PageScene("rover", seen, float(run.model.clear_radius))
     scene.facts |= {"title": run.title, "rover": True, "shadow": True, "haze": HAZE[1], "far": 2.0 * PLANE}
+    if run.on_sand:
+        scene.facts["soil"] = list(SAND_GROUND)
     wheels = add_rover(scene, run)
     add_ground(scene, run)
     return scene, wheels
@@ -226,6 +229,14 @@ def facts(run: RoverRun) -> list[str]:
     return [fact[:LONGEST_FACT] for fact in told if fact is not None]
 
 
+def _depths(run: RoverRun, wheels: list[tuple[str, str]]) -> Chart:
+    """The wheels' gaps, or how deep they are in sand."""
+    gaps = 1e3 * run.trajectory["wheel_gaps"]
+    if run.on_sand:
+        return Chart("sinkage", "mm", -gaps, 2, wheels)
+    return Chart("wheel gap", "mm", gaps, 2, wheels, shown=bool(np.any(gaps > 1.0)))
+
+
 def rover_curves(run: RoverRun) -> dict[str, Any]:
     """Contents of the panel; the first charts are shown at once."""
     data = run.trajectory
@@ -234,9 +245,10 @@ def rover_curves(run: RoverRun) -> dict[str, Any]:
         for name, colour in zip(run.model.wheel_names, cycle(WHEEL_COLOURS), strict=False)
     ]
     blue, orange = WHEEL_COLOURS[0], WHEEL_COLOURS[3]
+    digits = 0 if run.model.mass > HEAVY else 1
     charts = [
-        load_chart("wheel load", run, lambda run: run.trajectory["wheel_forces"][:, :, 0], 0, wheels),
-        Chart("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2, wheels, shown=bool(np.any(data["wheel_gaps"] > 1e-3))),
+        load_chart("wheel load", run, lambda run: run.trajectory["wheel_forces"][:, :, 0], digits, wheels),
+        _depths(run, wheels),
     ]
     if "v" in data.data:
         speed = run.mean(lambda run: np.linalg.norm(run.trajectory["v"][:, [0, 2]], axis=1, keepdims=True))

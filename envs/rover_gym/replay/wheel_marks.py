@@ -156,9 +156,9 @@ def rut_edits(
     Returns:
         The map, and of each cell that becomes deeper the sample, the cell and the level, in order of the samples.
     """
-    sand, scene = sand_of(run.terrain), run.trajectory.attributes.get("scene", {})
-    if sand is None and scene.get("terrain") != "sand":
+    if not run.on_sand:
         return None
+    sand = sand_of(run.terrain)
     size = RUT_CELL if sand is None else sand.rut_cell
     surface = surface_heights(run.terrain, points[..., [0, 2]].reshape(-1, 2)).reshape(points.shape[:2])
     sinkage = np.nan_to_num(surface - points[..., 1])

@@ -71,7 +71,8 @@
     const head = new DataView(message);
     const [kind, scene, time] = [head.getUint32(0, true), head.getUint32(4, true), head.getFloat64(8, true)];
     if (kind === SCENE) {
-      stage.setScene(openScene(new Uint8Array(message, HEAD)), number >= 0);
+      const opened = openScene(new Uint8Array(message, HEAD));
+      stage.setScene(opened, number >= 0 && opened.reach === stage.scene.reach); // a rover of another size is fitted anew
       number = scene;
       before = now = null;
     } else if (scene === number) {
@@ -212,6 +213,7 @@
   let heard = -1;
   const show = (now) => {
     state = now;
+    document.title = part("name").textContent = `${now.scene.model}, driven by ${now.scene.driver}`;
     const pace = now.paused ? "paused" : now.pace === null ? "" : `${now.pace.toFixed(2)} x real time`;
     part("clock").textContent =
       `${now.time.toFixed(2)} s, ${now.speed?.toFixed(2)} m/s, goal ${now.distance?.toFixed(1)} m, ` +

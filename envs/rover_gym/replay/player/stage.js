@@ -138,6 +138,7 @@ class Stage {
     this.canvas.dataset.script = this.spent.slice().sort((a, b) => a - b)[this.spent.length >> 1].toFixed(2);
     const { geometries, textures } = this.view.renderer.info.memory;
     this.canvas.dataset.held = geometries + textures;
+    this.canvas.dataset.distance = this.eye.distance.toFixed(3);
     this.canvas.dataset.drawn = Number(this.canvas.dataset.drawn || 0) + 1;
   }
 
