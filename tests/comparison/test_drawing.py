@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from artists import covered
+
 from comparison.drawing import fill_flat_drive, plt
 
 CHART = Path(__file__).parents[2] / "docs" / "comparison" / "chart.json"
