@@ -34,7 +34,7 @@ TASKS = {
         "[the policies](../policies.md), [results](../policy-results.md)",
     ),
     "RoverSand-v0": (
-        "Drive to a goal on dry sand, among ripples and rocks. The rover has wide wheels, which sink in and leave ruts. "
+        "Drive to a goal on dry sand, among ripples and rocks. Its wide wheels sink in and leave ruts. "
         "`soil` chooses the sand.",
         "[sand](../sand.md#drive-to-a-goal-on-sand)",
     ),

@@ -120,7 +120,7 @@ def test_a_gamepad_drives_until_it_is_pulled_out(live: Live) -> None:
     await_that(lambda: live.loop.state.speed > 0.5, "speed")
     live.browser.execute_script(PULLED_OUT)
     at_rest(live)
-    assert text(live.browser, "gamepad") == "gamepad gone"
+    assert text(live.browser, "gamepad") == "gamepad disconnected"
 
 
 def test_sliders_change_friction_and_gravity(live: Live) -> None:
@@ -230,7 +230,7 @@ def test_a_second_page_watches_and_may_take_the_wheel(live: Live) -> None:
     first = live.browser.current_window_handle
     live.browser.switch_to.new_window("tab")
     live.browser.get(live.server.address)
-    await_that(lambda: "Another page is at the wheel" in text(live.browser, "wheel"), "the notice")
+    await_that(lambda: "Another page drives" in text(live.browser, "wheel"), "the notice")
     assert not live.browser.find_element(By.ID, "friction").is_enabled()
     live.browser.find_element(By.CSS_SELECTOR, "#wheel button").click()
     await_that(lambda: live.browser.find_element(By.ID, "friction").is_enabled(), "the wheel")

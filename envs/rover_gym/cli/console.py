@@ -426,7 +426,7 @@ def plain(value: Any) -> Any:
 
 #: Commands that a newcomer can type in this order, with what they do.
 FIRST_STEPS = (
-    ("rover drive", "drive to a goal on flat ground, tell how it went, and keep the run"),
+    ("rover drive", "drive to a goal on flat ground, report the outcome, and keep the run"),
     ("rover drive --difficulty 1 --policy scan", "find a way among rocks"),
     ("rover replay", "watch the newest run in the browser"),
     ("rover plot", "look at its path, wheel loads, slip and energy"),

@@ -123,7 +123,7 @@ class LiveServer:
                     CommandError,
                     "do",
                     entries["do"],
-                    "another page drives: press 'take the wheel', or send {\"do\": \"take\"}",
+                    'another page drives: press \'take the wheel\', or send {"do": "take"}',
                 )
             self._loop.send(command)
         except RoverGymError as error:

@@ -176,10 +176,10 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
         scene.channels.append(mass_channel(rover))
         scene.arrays["trail"] = ("f4", _wheel_paths(run).ravel())
         scene.facts["missing"] = {
-            "marks": "balls keep no marks",
-            "cones": "many balls touch a wheel, each with a normal of its own",
+            "marks": "tyres leave no marks on balls",
+            "cones": "a wheel touches many balls, each with its own normal",
             "slope": "the ground is balls",
-            **dict.fromkeys(("plan", "scan", "laser", "depth"), "runs of balls do not record it"),
+            **dict.fromkeys(("plan", "scan", "laser", "depth"), "not recorded in a run of balls"),
         }
     return scene
 

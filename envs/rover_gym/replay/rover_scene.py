@@ -177,7 +177,7 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
     if told is not None and told.ndim == 1:  # a live drive may change it
         scene.channels.append(FrameChannel.fine("friction", told[:, None, None]))
     elif (friction := _friction(attributes)) is None:
-        sights.missing["cones"] = "this run does not say its friction"
+        sights.missing["cones"] = "this run has no recorded friction coefficient"
     else:
         scene.facts["friction"] = friction
     if "q" in run.trajectory.data:

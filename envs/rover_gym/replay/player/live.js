@@ -52,7 +52,7 @@
       if (message.state) show(message.state);
     });
     socket.addEventListener("close", () => {
-      part("clock").textContent = "the drive is gone; trying to find it again";
+      part("clock").textContent = "connection lost, reconnecting";
       setTimeout(connect, 1000);
     });
   };
@@ -126,7 +126,7 @@
   addEventListener("gamepaddisconnected", (event) => {
     if (event.gamepad.index !== pad) return;
     pad = null;
-    part("gamepad").textContent = "gamepad gone";
+    part("gamepad").textContent = "gamepad disconnected";
     drive();
   });
   const beyond = (value) => (Math.abs(value) < DEAD ? 0 : value);
@@ -251,7 +251,7 @@
       if (now.wheel === "elsewhere") {
         const take = document.createElement("button");
         take.textContent = "take the wheel";
-        node.append("Another page is at the wheel. ", take);
+        node.append("Another page drives. ", take);
       }
       for (const control of document.querySelectorAll("#panel .row button, #panel input, #panel select, #bar button:not(#dark, #help)")) {
         control.disabled = now.wheel === "elsewhere";
@@ -263,8 +263,8 @@
   const charts = [
     { title: "wheel load (N)", of: (sample) => sample.loads, names: (sample) => sample.wheels },
     { title: "slip (1)", of: (sample) => [sample.slip], top: 0.2 },
-    { title: "energy of the motors (J)", of: (sample) => [sample.energy] },
-    { title: "solver's iterations a period (1)", of: (sample) => [sample.iterations], top: 10 },
+    { title: "work of the motors (J)", of: (sample) => [sample.energy] },
+    { title: "solver iterations per period (1)", of: (sample) => [sample.iterations], top: 10 },
   ];
   for (const chart of charts) {
     const title = part("charts").appendChild(document.createElement("h2"));

@@ -207,7 +207,7 @@ class Overlays {
     const all = [["marks", "m", this.bands && !balls], ["trails", "v", this.bands], ["forces", "f", this.arrows || (balls && this.chains)],
       ...this.sights.offers(),
       ["loads", "l", this.arrows], ["slope", "h", scene.rover && !balls], ["spheres", "k", rocks.children.length]];
-    const reason = (name) => scene.missing?.[name] ?? (name === "spheres" ? "no rocks lie here" : "this run does not hold it");
+    const reason = (name) => scene.missing?.[name] ?? (name === "spheres" ? "there are no rocks" : "not recorded in this run");
     return all.filter(([, , there]) => there || scene.rover).map(([name, key, there]) => [name, key, there ? "" : reason(name)]);
   }
 
