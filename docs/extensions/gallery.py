@@ -5,7 +5,7 @@ import html
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -24,7 +24,7 @@ from rover_gym.runs import open_run, record_run
 
 #: Width and height of a frame, pixels, and its quality as WebP.
 SIZE, QUALITY = (560, 350), 74
-SECONDS = 3.0  # of driving before the frame is taken
+SECONDS = 3.0  # of driving before the frame is taken, or what FRAMES says
 LONGEST, RATE = 12.0, 20.0  # s of a drive on a page, and its samples a second
 SEED, ROCKY_SEED = 7, 11
 
@@ -55,20 +55,72 @@ class _Fixed:
         return self._action, state
 
 
+class Shot(NamedTuple):
+    """How the frame of an environment is taken, so that no two look alike.
+
+    Attributes:
+        seconds: Of driving before it.
+        aside: From which side the camera looks along the way to the goal, degrees.
+        back, up: Of the camera behind the rover and over it, in reaches of the rover.
+    """
+
+    seconds: float = SECONDS
+    aside: float = 22.0
+    back: float = 3.6
+    up: float = 1.4
+
+
+#: What differs from `Shot()`.
+FRAMES = {
+    "RoverRocks-v0": Shot(aside=-25.0, up=1.8),
+    "RoverHills-v0": Shot(aside=28.0, back=4.5, up=2.2),
+    "RoverSand-v0": Shot(seconds=6.0, aside=-15.0),
+    "RoverWaypoints-v0": Shot(seconds=5.0, aside=-12.0, back=6.0, up=4.2),
+    "RoverBattery-v0": Shot(seconds=5.0, aside=8.0, back=4.4, up=2.6),
+    "RoverCommand-v0": Shot(seconds=2.0, aside=-30.0, back=4.6, up=0.9),
+    "RoverArcs-v0": Shot(seconds=2.0, aside=15.0, back=3.4, up=2.2),
+    "RoverGoal-v0": Shot(seconds=1.0, aside=38.0, back=4.4, up=3.0),
+    "RoverTrap-v0": Shot(aside=-12.0, back=3.2, up=2.0),
+    "RoverGrains-v0": Shot(aside=60.0, back=3.4, up=1.7),
+}
+
+
 def frame(name: str) -> np.ndarray:
-    """An environment after some seconds of driving."""
+    """An environment after some seconds of driving, with its goal."""
     width, height = SIZE
-    env = gym.make(name, render_mode="rgb_array", render_options={"width": width, "height": height})
+    camera = sight(name, _driven(gym.make(name), name))
+    options = {"width": width, "height": height, "camera": camera}
+    return _driven(gym.make(name, render_mode="rgb_array", render_options=options), name)[2]
+
+
+def _driven(env: gym.Env[Any, Any], name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Drives to where the frame is taken: the rover's place, the goal's, the frame, and the rover's reach, m."""
     env.reset(seed=SEED)
-    driver = _Fixed(env)
-    for k in range(round(SECONDS / env.unwrapped.dt)):
+    driver, image = _Fixed(env), np.zeros((0, 0, 3))
+    for k in range(round(FRAMES.get(name, Shot()).seconds / env.unwrapped.dt)):  # type: ignore[attr-defined]
         terminated = env.step(driver.predict(None)[0])[2]
-        if k % 3 == 0 or terminated:  # frames on the way, so that the wheels leave their marks
-            image = env.render()
+        if env.render_mode is not None and (k % 3 == 0 or terminated):  # on the way, so that the wheels leave marks
+            image = np.asarray(env.render())
         if terminated:
             break
+    rover = env.unwrapped
+    place, (x, z) = rover.simulation.q[:3], rover.goal  # type: ignore[attr-defined]
+    reach = float(rover.model.clear_radius)  # type: ignore[attr-defined]
     env.close()
-    return np.asarray(image)
+    return place, np.array([x, place[1], z]), image, reach
+
+
+def sight(name: str, driven: tuple[np.ndarray, np.ndarray, np.ndarray, float]) -> tuple[list[float], list[float]]:
+    """Eye and target of a frame."""
+    place, goal, _, reach = driven
+    shot = FRAMES.get(name, Shot())
+    way = (goal - place) / max(1e-9, float(np.linalg.norm(goal - place)))
+    c, s = np.cos(np.radians(shot.aside)), np.sin(np.radians(shot.aside))
+    back = np.array([c * way[0] - s * way[2], 0.0, s * way[0] + c * way[2]])
+    eye = place - shot.back * reach * back + np.array([0.0, shot.up * reach, 0.0])
+    # It looks between rover and goal, and both are in the picture.
+    ways = [(end - eye) / np.linalg.norm(end - eye) for end in (place, goal)]
+    return eye.tolist(), (eye + 0.55 * ways[0] + 0.45 * ways[1]).tolist()
 
 
 def record(name: str, path: Path) -> None:

@@ -28,7 +28,7 @@ from selenium.webdriver.common.by import By
 from rover_gym.grains import GrainRun
 from rover_gym.rendering.appearance import SAND_COLOUR
 from rover_gym.replay import write_page
-from rover_gym.replay.charts import LOAD_TIME, moving_mean
+from rover_gym.replay.charts import LOAD_TIME
 from rover_gym.runs import open_run, record_run
 
 # Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card.
@@ -167,7 +167,7 @@ def test_the_curves_follow_the_timeline(shown: Shown[GrainRun]) -> None:
         "deepest overlap (% of a radius)",
     ]
     go_to(browser, float(run.time[7]) + 0.01)
-    loads = moving_mean(run.time, run.wheel_forces[..., 1], LOAD_TIME)[7]
+    loads = run.mean(lambda run: run.wheel_forces[..., 1], LOAD_TIME)[7]
     pairs = zip(run.model.wheel_names, loads, strict=True)
     expected = [word for name, load in pairs for word in (name, shown_load(load))]
     await_that(lambda: readings(browser)[0] == expected, "the loads at that time")

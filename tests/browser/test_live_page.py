@@ -120,7 +120,7 @@ def test_a_gamepad_drives_until_it_is_pulled_out(live: Live) -> None:
     await_that(lambda: live.loop.state.speed > 0.5, "speed")
     live.browser.execute_script(PULLED_OUT)
     at_rest(live)
-    assert text(live.browser, "gamepad") == "gamepad gone"
+    assert text(live.browser, "gamepad") == "gamepad disconnected"
 
 
 def test_sliders_change_friction_and_gravity(live: Live) -> None:
@@ -211,12 +211,26 @@ def test_the_scene_shows_the_ground_and_the_curves_are_drawn(live: Live) -> None
     assert min(drawn) > 10
 
 
+@pytest.mark.nightly("tests/browser/test_live_page.py::test_a_key_moves_the_rover_and_its_release_stops_it")
+def test_another_rover_is_named_and_the_camera_comes_nearer(live: Live) -> None:
+    """The page did not say which rover drove, and showed a small one from as far away as the large one before it."""
+    canvas = live.browser.find_element(By.CSS_SELECTOR, "#root canvas")
+    await_that(lambda: text(live.browser, "name") == "rover, driven by hand", "the rover's name")
+    before = float(canvas.get_attribute("data-distance") or "nan")
+    choose(live.browser, "model", "open-rover")
+    await_that(lambda: text(live.browser, "name").startswith("open-rover"), "the other rover's name")
+    await_that(lambda: float(canvas.get_attribute("data-distance") or "nan") < 0.7 * before, "a nearer camera")
+    choose(live.browser, "model", "rover")
+    await_that(lambda: text(live.browser, "name").startswith("rover,"), "the first rover's name")
+    at_rest(live)
+
+
 @pytest.mark.nightly("tests/live/test_live_server.py::test_a_browser_that_vanishes_stops_the_rover_and_frees_the_wheel")
 def test_a_second_page_watches_and_may_take_the_wheel(live: Live) -> None:
     first = live.browser.current_window_handle
     live.browser.switch_to.new_window("tab")
     live.browser.get(live.server.address)
-    await_that(lambda: "Another page is at the wheel" in text(live.browser, "wheel"), "the notice")
+    await_that(lambda: "Another page drives" in text(live.browser, "wheel"), "the notice")
     assert not live.browser.find_element(By.ID, "friction").is_enabled()
     live.browser.find_element(By.CSS_SELECTOR, "#wheel button").click()
     await_that(lambda: live.browser.find_element(By.ID, "friction").is_enabled(), "the wheel")

@@ -1,5 +1,6 @@
 """Overlays of the player in a real browser: a key each, greyed with a reason where a run holds nothing, and a ghost."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -77,15 +78,28 @@ def test_a_key_shows_an_overlay_and_takes_it_away(name: str, shown: Shown[RoverR
     assert (np.abs(without - bare).max(axis=-1) > 20.0).sum() < 0.2 * changed
 
 
-def test_the_help_names_the_key_of_every_overlay(shown: Shown[RoverRun]) -> None:
-    """And so does that of the live page, in capitals."""
+def test_the_help_names_the_key_of_every_overlay_and_escape_closes_it(shown: Shown[RoverRun]) -> None:
+    """Escape left the help open."""
     buttons = shown.browser.find_elements(By.CSS_SELECTOR, "#overlays button")
     assert {button.get_attribute("data-name") for button in buttons} == {"marks", *KEYS}
     assert all(button.is_enabled() for button in buttons)
-    told = [node.get_attribute("textContent") for node in shown.browser.find_elements(By.CSS_SELECTOR, "#keys kbd")]
-    assert set(KEYS.values()) <= set(told)
-    live = player_file("live.html")
-    assert all(f"<kbd>{key.upper()}</kbd>" in live for key in KEYS.values())
+    help_box = shown.browser.find_element(By.ID, "keys")
+    press(shown.browser, "?")
+    await_that(help_box.is_displayed, "the help")
+    told = [node.text for node in help_box.find_elements(By.CSS_SELECTOR, "kbd")]
+    assert {key.upper() for key in KEYS.values()} <= set(told)
+    press(shown.browser, "Escape")
+    await_that(lambda: not help_box.is_displayed(), "a page without its help")
+
+
+@pytest.mark.parametrize("page", ["recorded.html", "live.html"])
+def test_the_help_on_a_touch_screen_is_about_touch(page: str) -> None:
+    """A phone showed a list of keys."""
+    text = player_file(page)
+    (touch,) = re.findall(r'<p data-for="touch">(.*?)</p>', text, flags=re.DOTALL)
+    assert "<kbd>" not in touch
+    assert "pinch" in touch
+    assert "<kbd>" not in re.sub(r'<p data-for="mouse"[^>]*>.*?</p>', "", text, flags=re.DOTALL)
 
 
 def test_what_a_run_does_not_hold_is_grey_and_says_why_and_a_ghost_drives_along(tmp_path: Path) -> None:

@@ -6,19 +6,27 @@ import subprocess
 from pathlib import Path
 
 import imageio_ffmpeg
+import matplotlib as mpl
 import numpy as np
 import pytest
+from artists import covered
 from commands import error_of, output_of, rover
 from matplotlib.figure import Figure
 from pages import held
 
-from rover_gym.figures.chapter_3 import draw_chapter_3
+from rover_gym.figures.chapter_3 import _sine_path, draw_chapter_3
 from rover_gym.figures.drawing import KINDS
+from rover_gym.figures.incline_figure import fill_incline
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
-from rover_gym.planar import BallSimulation, PlanarRun, Sine
+from rover_gym.figures.style import STYLE
+from rover_gym.planar import BallSimulation, Line, PlanarRun, Polyline, Sine, TwoWheelRoverSimulation
+from rover_gym.planar.incline import Incline
 from rover_gym.record import RecordingError, read_trajectory
-from rover_gym.reproduction.scene_runs import ball_on_incline, published
+from rover_gym.replay import write_page
+from rover_gym.replay.flat_scene import planar_scene
+from rover_gym.replay.page_scene import PageScene
+from rover_gym.reproduction.scene_runs import ball_on_incline, ball_on_sine, published
 from rover_gym.runs import open_run, record_run
 from rover_gym.soil import SoilRun
 
@@ -215,6 +223,50 @@ def test_chapter_3_is_redrawn(tmp_path: Path) -> None:
     assert all(is_png(path) for path in paths)
 
 
+def test_figure_3_4_shows_the_outline_of_the_ball(tmp_path: Path) -> None:
+    """The curve of a ball of 1.5 m floated over the ground without a hint of the ball."""
+    pair = []
+    for contact in ("centre_height", "nearest"):
+        sim, _ = ball_on_sine(contact)
+        record_run(sim, 0.05, tmp_path / f"{contact}.h5", 50.0)
+        pair.append(read_trajectory(tmp_path / f"{contact}.h5"))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 5.0))
+        _sine_path(figure, *pair)
+        assert covered(figure) == []
+    first = pair[1]["q"][0, :2]
+    distances = [np.linalg.norm(line.get_xydata() - first, axis=1) for line in figure.axes[0].lines]
+    assert any(np.allclose(distance, 1.5) for distance in distances)
+
+
+@pytest.mark.parametrize(
+    ("slope", "friction", "speed", "rolls"), [(20.0, 0.2, 2.0, True), (20.0, 0.2, 0.0, True), (45.0, 0.1, 0.5, False)]
+)
+def test_a_ball_on_an_incline_slides_and_rolls_as_the_closed_form_says(
+    slope: float, friction: float, speed: float, *, rolls: bool, tmp_path: Path
+) -> None:
+    arguments = ["--slope", slope, "--friction", friction, "--speed", speed, "--duration", "1", "--output", tmp_path]
+    told = json.loads(output_of("planar", "incline", *arguments, "--json"))
+    assert told["rolls"] is rolls
+    assert told["difference"] < 1e-3
+    alpha, ratio = np.radians(slope), 1.0 + 1.0 / 0.4
+    assert told["steepest"] == pytest.approx(np.arctan(friction * ratio))
+    if rolls:
+        gap = 9.81 * (friction * ratio * np.cos(alpha) - np.sin(alpha))  # by which rim and centre approach
+        assert told["end_of_sliding"] == pytest.approx(speed / gap, abs=0.004)
+        assert told["acceleration"] == pytest.approx(9.81 * np.sin(alpha) / 1.4)
+    else:
+        assert told["end_of_sliding"] is None
+        assert told["acceleration"] == pytest.approx(9.81 * (np.sin(alpha) - friction * np.cos(alpha)))
+    run = open_run(tmp_path / "incline.h5", PlanarRun)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 7.0))
+        fill_incline(figure, run, Incline(alpha, friction, speed, 0.4))
+        assert covered(figure) == []
+    (points,) = [line for line in figure.axes[3].lines if line.get_label() == "slides"]
+    assert (np.array(points.get_xdata()) > np.degrees(np.arctan(friction * ratio))).all()
+
+
 def test_a_default_run_ends_where_its_subject_ends(tmp_path: Path) -> None:
     """A step of 5 cm was drawn on an axis of 70 m."""
     output_of("planar", "rover", "--ground", "step", "--output", tmp_path)
@@ -236,9 +288,82 @@ def test_a_planar_run_is_plotted_and_replayed(command: str, tmp_path: Path) -> N
     page = tmp_path / "page.html"
     assert rover("replay", str(recording), "--html", str(page)).exit_code == 0
     charts = held(page).head["curves"]["charts"]
-    assert [chart["unit"] for chart in charts] == ["N", "mm", "mm/s"]
+    assert [chart["unit"] for chart in charts] == ["N", "N s", "N s", "mm", "mm/s"]
     error = error_of("replay", str(recording), "--gltf", str(tmp_path / "run.glb"))
     assert "is replayed as a page, with --html" in error
+
+
+def bouncing_ball() -> BallSimulation:
+    sim = BallSimulation(Line(slope=-0.2), radius=0.3, mass=3.0, restitution=0.6, friction=0.5, time_step=0.002)
+    sim.set_state([0.0, 1.3, 0.0])
+    return sim
+
+
+def test_the_page_of_a_bouncing_ball_shows_the_loads_of_its_impacts(tmp_path: Path) -> None:
+    """The page took a sample in twenty before the mean over 0.2 s: an impact of one step was seldom among them."""
+    record_run(bouncing_ball(), 2.0, tmp_path / "ball.h5", None)
+    run = open_run(tmp_path / "ball.h5", PlanarRun)
+    page = held(write_page(run.resample(25.0), tmp_path / "ball.html"))
+    load, normal, _, gap, slip = (chart["values"][0] for chart in page.head["curves"]["charts"])
+    time = np.array(page.head["curves"]["time"])
+    assert len(load) == len(gap) == len(slip) == len(time) == 51
+    hits = [impact for impact in run.time[run.loads[:, 0] > 1e3] if impact < 1.8]
+    assert len(hits) >= 2
+    for impact in hits:
+        assert load[int(np.argmin(abs(time - impact)))] > 10.0
+    # Over the whole run, impacts and rests carry the weight's part along the normal.
+    whole = run.trajectory["impulses"][1:, 0, 0].sum()
+    assert np.trapezoid(load, time) == pytest.approx(whole, rel=0.05)
+    assert sum(normal[1:]) == pytest.approx(whole, abs=0.05)  # each impulse is in one frame
+    k = 30
+    within = np.abs(run.time - run.time[0] - time[k]) <= 0.02 + 1e-6
+    assert slip[k] == pytest.approx(1e3 * run.slip_speeds[within, 0].mean(), abs=0.1)
+
+
+def channel(scene: PageScene, name: str) -> np.ndarray:
+    (found,) = (one.values for one in scene.channels if one.name == name)
+    return found
+
+
+def test_a_planar_page_shows_forces_within_friction_cones(tmp_path: Path) -> None:
+    """Pages of a ball had no force arrows and no friction cones."""
+    sim = BallSimulation(Line(slope=-0.5), radius=0.3, mass=3.0, friction=0.1, time_step=0.002)
+    sim.set_state([0.0, 0.3 * np.hypot(1.0, 0.5), 0.0])
+    record_run(sim, 0.4, tmp_path / "ball.h5", None)
+    run = open_run(tmp_path / "ball.h5", PlanarRun).resample(25.0)
+    scene = planar_scene(run, follow=True)
+    assert scene.facts["friction"] == 0.1
+    normal = np.array([0.5, 1.0]) / np.hypot(0.5, 1.0)
+    assert channel(scene, "normals")[5, 0] == pytest.approx([*normal, 0.0], abs=1e-9)
+    foot, force = channel(scene, "forces")[5, 0, :2], channel(scene, "forces")[5, 0, 3:]
+    assert run.ground.height(foot[0]) == pytest.approx(foot[1], abs=1e-6)
+    # In shares of the weight: the normal part is cos(slope), and the ball slides, with all of its friction.
+    assert force[:2] @ normal == pytest.approx(normal[1], rel=1e-6)
+    assert force[:2] @ [normal[1], -normal[0]] == pytest.approx(-0.1 * normal[1], rel=1e-6)
+    assert force[2] == 0.0
+
+
+def test_a_wheel_at_a_step_is_pushed_back_by_its_corner(tmp_path: Path) -> None:
+    """Impulses along the normals of two contacts were one number, from which no arrow follows."""
+    sim = TwoWheelRoverSimulation(Polyline.step(1.0, 0.1), friction=0.6, time_step=0.002)
+    sim.set_state([0.2, 0.2, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, -5.0, -5.0])
+    record_run(sim, 0.6, tmp_path / "rover.h5", None)
+    run = open_run(tmp_path / "rover.h5", PlanarRun)
+    forces = channel(planar_scene(run, follow=True), "forces")
+    hit = int(np.argmin(forces[:, 1, 3]))
+    assert forces[hit, 1, 3] < -1.0  # backwards
+    assert forces[hit, 1, :2] == pytest.approx([1.0, 0.1], abs=0.01)
+    momentum = np.diff(run.trajectory["v"][:, 0]) * 250.0
+    np.testing.assert_allclose(run.trajectory["world_impulses"][1:, :, 0].sum(axis=1), momentum, atol=0.5)
+
+
+def test_rows_between_which_steps_lie_keep_the_impulses_of_all_of_them(tmp_path: Path) -> None:
+    """A row at 25 a second held the impulses of its last step, and most impacts fell between two rows."""
+    record_run(bouncing_ball(), 1.0, tmp_path / "steps.h5", None)
+    record_run(bouncing_ball(), 1.0, tmp_path / "rows.h5", 25.0)
+    steps, rows = (open_run(tmp_path / f"{name}.h5", PlanarRun).trajectory for name in ("steps", "rows"))
+    np.testing.assert_array_equal(rows["q"][-1], steps["q"][-1])
+    np.testing.assert_allclose(20 * rows["impulses"].sum(axis=0), steps["impulses"].sum(axis=0), rtol=1e-12)
 
 
 def test_a_planar_run_read_back_is_the_simulations(tmp_path: Path) -> None:

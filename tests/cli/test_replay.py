@@ -18,9 +18,9 @@ from pages import held
 from rover_gym import Plane, RoverModel, SphereField
 from rover_gym.figures import draw_run
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
+from rover_gym.record.rover_run import moving_mean
 from rover_gym.rendering.appearance import rover_parts, sphere_mesh
 from rover_gym.replay import write_gltf, write_page, write_vrml
-from rover_gym.replay.charts import moving_mean
 from rover_gym.replay.rover_scene import WHEEL_NAMES, facts
 from rover_gym.replay.scenery import ground_tiles, identifiers
 from rover_gym.rotations import axis_angles, continuous, quaternions

@@ -14,8 +14,10 @@ from typer.testing import CliRunner
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.cli import app
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
+from rover_gym.replay.rover_scene import rover_curves, rover_scene
 from rover_gym.reproduction import inclined_plane, sphere_rug
 from rover_gym.reproduction.scene_runs import GRAVITY, WHEEL_RADIUS, distance_to_siconos, reference_data
+from rover_gym.runs import record_run
 
 KILLED = """
 import os, signal, sys
@@ -116,6 +118,39 @@ def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None
     for fps in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(OptionError, match="fps"):
             run.resample(fps)
+
+
+def dropped_rover() -> Simulation:
+    sim = Simulation(RoverModel(), Plane(), time_step=0.002)
+    q = np.zeros(sim.model.nq)
+    q[1] = 0.6
+    sim.set_state(q)
+    sim.set_wheel_torques(np.full(6, 15.0))
+    return sim
+
+
+def test_forces_and_torques_of_a_thinned_run_are_means_of_all_steps(tmp_path: Path) -> None:
+    """Rows at 25 a second held the forces of one step in twenty, and pages took one row in several."""
+    record_run(dropped_rover(), 1.2, tmp_path / "steps.h5", None)
+    record_run(dropped_rover(), 1.2, tmp_path / "rows.h5", 25.0)
+    steps, rows = (read_run(tmp_path / f"{name}.h5") for name in ("steps", "rows"))
+    for name in ("wheel_forces", "motor_torques"):
+        means = steps.trajectory[name][1:].reshape(30, 20, 6, -1).mean(axis=1)
+        np.testing.assert_allclose(rows.trajectory[name][1:].reshape(means.shape), means, rtol=1e-9, atol=1e-9)
+
+    thinned = steps.resample(10.0)
+    impact = int(np.argmax(steps.trajectory["wheel_forces"][:, 0, 0]))
+    frame = int(np.argmin(np.abs(thinned.time - steps.time[impact])))
+    near = np.abs(steps.time - thinned.time[frame]) <= 0.1 + 1e-6
+    loads = rover_curves(thinned)["charts"][0]["values"][0]
+    assert loads[frame] == pytest.approx(steps.trajectory["wheel_forces"][near, 0, 0].mean(), abs=0.5)
+    scene = rover_scene(thinned, follow=True)
+    (forces,) = (channel.values for channel in scene.channels if channel.name == "forces")
+    share = steps.model.mass * 9.81 / 6
+    near = np.abs(steps.time - thinned.time[frame]) <= 0.05 + 1e-6
+    assert share * forces[frame, 0, 4] == pytest.approx(steps.trajectory["wheel_forces"][near, 0, 0].mean(), rel=0.02)
+    hits = [event for event in scene.facts["events"] if "hits with" in event["name"]]
+    assert any(abs(event["time"] - steps.time[impact]) < 0.01 for event in hits)
 
 
 def test_a_run_without_rover_ground_or_samples_is_refused(tmp_path: Path) -> None:

@@ -112,43 +112,69 @@ def _plot(axes: Axes, shown: list[Curve]) -> None:
     axes.set_yscale("log")
 
 
-#: Text of a curve's label, the point that carries it (finest step first), offset in points, alignment.
+#: Text of a curve's label.
 LABELS = {
-    (OURS, "linearised"): (OURS, 4, (9, 5), "left"),
-    ("Drake", "lagged, stiff"): ("Drake, lagged", 0, (8, -8), "left"),
-    ("Drake", "SAP, stiff"): ("Drake, SAP", -1, (8, 0), "left"),
-    ("MuJoCo", "discrete, elliptic"): ("MuJoCo, best", 0, (6, -3), "left"),
-    ("MuJoCo", "defaults"): ("MuJoCo, defaults", 0, (6, 3), "left"),
-    ("Bullet", "50 iterations"): ("Bullet", 0, (8, -3), "left"),
-    ("Pinocchio", "ADMM in a Python loop"): ("Pinocchio, ADMM (Python loop)", 0, (8, 5), "left"),
-    ("Siconos", "NSGS in a Python loop"): ("Siconos (Python loop)", 0, (8, 0), "left"),
+    (OURS, "linearised"): OURS,
+    ("Drake", "lagged, stiff"): "Drake, lagged",
+    ("Drake", "SAP, stiff"): "Drake, SAP",
+    ("MuJoCo", "discrete, elliptic"): "MuJoCo, best",
+    ("MuJoCo", "defaults"): "MuJoCo, defaults",
+    ("Bullet", "50 iterations"): "Bullet",
+    ("Pinocchio", "ADMM in a Python loop"): "Pinocchio, ADMM\n(Python loop)",
+    ("Siconos", "NSGS in a Python loop"): "Siconos\n(Python loop)",
 }
+LINE = 0.055  # height of a line of a label, of the axes
+
+
+def _names(axes: Axes, shown: list[Curve]) -> None:
+    """Names the curves at the right edge, in the order of their ends and one below the other, each with a thin line."""
+    low, high = np.log(axes.get_ylim())
+    ends = []
+    for engine, _, cost, error in shown:
+        k = int(np.argmax(cost))
+        height = (np.log(error[k]) - low) / (high - low)
+        ends.append((height, (cost[k], error[k]), LABELS[engine["engine"], engine["variant"]], engine["engine"]))
+    top = 1.0
+    for height, end, text, engine in sorted(ends, reverse=True, key=lambda one: one[0]):
+        half = 0.5 * LINE * (1 + text.count("\n"))
+        middle = min(height, top - half)
+        top = middle - half
+        axes.annotate(
+            text,
+            end,
+            (1.02, middle),
+            xycoords="data",
+            textcoords="axes fraction",
+            ha="left",
+            va="center",
+            fontsize=10.0,
+            color=COLOURS[engine],
+            fontweight="bold" if engine == OURS else "normal",
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": COLOURS[engine], "linewidth": 0.6, "alpha": 0.6, "shrinkB": 4.0},
+        )
 
 
 def flat_drive(data: dict[str, Any], path: Path) -> Path:
     """The picture of the README."""
     figure, axes = plt.subplots(figsize=(8.0, 5.6), dpi=125)
+    fill_flat_drive(axes, data)
+    figure.tight_layout()
+    figure.savefig(path)
+    plt.close(figure)
+    return path
+
+
+def fill_flat_drive(axes: Axes, data: dict[str, Any]) -> None:
+    """Error of the flat drive against its cost, every engine at its best."""
     shown = [c for c in curves(data, "flat_drive") if c[0]["best"]]
     _plot(axes, shown)
     left, right = axes.get_xlim()
-    axes.set_xlim(0.5 * left, 30.0 * right)  # room for labels
+    axes.set_xlim(0.5 * left, right)  # room for the step sizes
     _shade(axes, shown)
+    _names(axes, shown)
     for curve in shown:
-        engine, _, cost, error = curve
-        text, index, offset, side = LABELS[engine["engine"], engine["variant"]]
-        index = min(index, len(cost) - 1)
-        axes.annotate(
-            text,
-            (cost[index], error[index]),
-            offset,
-            textcoords="offset points",
-            ha=side,
-            fontsize=10.5,
-            color=COLOURS[engine["engine"]],
-            fontweight="bold" if engine["engine"] == OURS else "normal",
-            zorder=5,
-        )
-        if engine["engine"] == OURS:
+        if curve[0]["engine"] == OURS:
             _steps(axes, curve, (1e-1, 2e-2, 5e-3, 1e-3, 1e-4), 9)
     axes.axhline(GOAL[1], color="#999999", linewidth=0.9, linestyle=(0, (2, 3)), zorder=1)
     axes.annotate(
@@ -167,10 +193,6 @@ def flat_drive(data: dict[str, Any], path: Path) -> Path:
     axes.set_ylabel("error of the path (RMS), m", fontsize=10.5)
     axes.set_title("A drive of 22 m in a curve, one point per step size, 0.1 to 100 ms", fontsize=11.5, loc="left")
     _finish(axes)
-    figure.tight_layout()
-    figure.savefig(path)
-    plt.close(figure)
-    return path
 
 
 def others(data: dict[str, Any], path: Path) -> Path:

@@ -7,11 +7,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 import typer
 
 import rover_gym
 from rover_gym.cli import app
+from rover_gym.registration import ENVIRONMENTS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -106,3 +108,35 @@ def test_the_rule_of_a_table_has_a_line_of_its_own() -> None:
     assert [
         page.name for page in PAGES if re.search(r"^\|.*[^|\s-].*\|---", page.read_text(encoding="utf-8"), re.M)
     ] == []
+
+
+def test_every_environment_has_a_card_and_is_named_in_gallery_and_contents(
+    extension: Callable[[str], ModuleType],
+) -> None:
+    """Five of the registered environments had no card."""
+    told = extension("cards").pages()
+    names = {name: f"{name.lower()}.md" for name in ENVIRONMENTS}
+    assert set(names.values()) == told.keys()
+    assert all(told[file].startswith(f"# {name}\n") for name, file in names.items())
+    contents, gallery = ((DOCS / name).read_text(encoding="utf-8") for name in ("index.md", "gallery.md"))
+    assert [name for name in names if f"_generated/{name.lower()}\n" not in contents] == []
+    assert [name for name, file in names.items() if f"[`{name}`](_generated/{file})" not in gallery] == []
+    assert "`charge`" in told["roverbattery-v0.md"]
+    assert "| registered as | `RoverEnv(terrain='hills')` |" in told["roverhills-v0.md"]
+
+
+def test_frames_of_the_gallery_show_rover_and_goal_from_different_sides(
+    extension: Callable[[str], ModuleType],
+) -> None:
+    """Frames looked along the drive: four showed the same rover on the same plane, and none its goal."""
+    gallery = extension("gallery")
+    place, goal = np.array([1.0, 0.4, 2.0]), np.array([8.0, 0.4, 5.0])
+    seen = {}
+    for name in ENVIRONMENTS:
+        eye, target = (np.array(point) for point in gallery.sight(name, (place, goal, np.zeros(0), 1.0)))
+        way = (target - eye) / np.linalg.norm(target - eye)
+        for end in (place, goal):
+            away = (end - eye) / np.linalg.norm(end - eye)
+            assert np.degrees(np.arccos(way @ away)) < 25.0, name  # the picture is 50 degrees wide
+        seen[name] = tuple(eye)
+    assert len(set(seen.values())) == len(ENVIRONMENTS)

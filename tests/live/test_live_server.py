@@ -111,7 +111,7 @@ def test_of_two_pages_one_is_at_the_wheel(served: Served) -> None:
         assert heard(first, "state", lambda state: state["pages"] == 2)["wheel"] == "here"
         assert heard(second, "state")["wheel"] == "elsewhere"
         say(second, do="change", name="friction", value=0.1)
-        assert "another page is in control" in heard(second, "error")
+        assert "another page drives" in heard(second, "error")
         assert served.loop.state.scene.friction == 0.7
         say(second, do="take")
         assert heard(second, "state", lambda state: state["wheel"] == "here")
@@ -119,7 +119,7 @@ def test_of_two_pages_one_is_at_the_wheel(served: Served) -> None:
         say(second, do="change", name="friction", value=0.1)
         assert heard(first, "state", lambda state: state["scene"]["friction"] == 0.1)
         say(first, do="pause")
-        assert "another page is in control" in heard(first, "error")
+        assert "another page drives" in heard(first, "error")
         second.close()
         assert heard(first, "state", lambda state: state["wheel"] == "free")
         say(first, do="pause")

@@ -64,3 +64,10 @@ def test_a_model_is_found_by_name_or_file(tmp_path):
             open_model(wrong)
     with pytest.raises(OSError, match=r"none\.toml"):
         open_model("none.toml")
+
+
+def test_a_line_behind_the_trunk_is_not_a_negative_distance_ahead() -> None:
+    """The turning centre lay "-0.04 m ahead" of the trunk's origin."""
+    told = check_statics(RoverModel()).turning_centre
+    assert "0.04 m behind the trunk's origin" in told
+    assert "ahead" not in told

@@ -30,7 +30,7 @@ app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
-    epilog=f"Errors are one line; with {DEBUG}=1 in the environment they tell where they came from.",
+    epilog=f"Errors are one line; with {DEBUG}=1 in the environment they include a traceback.",
 )
 
 DRIVE = "Drive and watch"

@@ -5,6 +5,7 @@ import inspect
 import json
 import math
 import os
+import re
 import signal
 import threading
 import warnings
@@ -250,7 +251,7 @@ def plain_table(rows: Sequence[Sequence[str]]) -> Table:
         is_number = bool(numbers) and all(text[0] in "0123456789-" for text in numbers)
         table.add_column(heading, justify="right" if is_number else "left")
     for row in rows[1:]:
-        table.add_row(*row)
+        table.add_row(*map(tidy, row))
     return table
 
 
@@ -271,7 +272,7 @@ class Row:
 
 def row(label: str, text: str, **values: Any) -> Row:
     """One line of a table of results, with its values for JSON."""
-    return Row(label, text, values)
+    return Row(label, tidy(text), values)
 
 
 class Results:
@@ -363,6 +364,21 @@ def status(text: str) -> Iterator[None]:
         yield
 
 
+LEAST = 1e-9  # below it, a figure of a table is rounding
+
+
+def figure(value: float) -> str:
+    """A number in a table: four digits, "-" for an unknown one, and 0 for what is rounding."""
+    if not math.isfinite(value):
+        return "-" if math.isnan(value) else str(value)
+    return "0" if abs(value) < LEAST else f"{value:.4g}"
+
+
+def tidy(text: str) -> str:
+    """Text of a table without the sign of a zero, and with "-" for an unknown number."""
+    return re.sub(r"\bnan\b", "-", re.sub(r"(?<![\w.])-(?=0(?:\.0*)?(?![\d.e]))", "", text))
+
+
 def plain(value: Any) -> Any:
     """A value as JSON can say it: NaN and infinity, which it lacks, are null."""
     if is_dataclass(value) and not isinstance(value, type):
@@ -382,7 +398,7 @@ def plain(value: Any) -> Any:
 
 #: Commands that a newcomer can type in this order, with what they do.
 FIRST_STEPS = (
-    ("rover drive", "drive to a goal on flat ground, tell how it went, and keep the run"),
+    ("rover drive", "drive to a goal on flat ground, report the outcome, and keep the run"),
     ("rover drive --difficulty 1 --policy scan", "find a way among rocks"),
     ("rover replay", "watch the newest run in the browser"),
     ("rover plot", "look at its path, wheel loads, slip and energy"),

@@ -140,7 +140,7 @@ def drive(
     antialiasing: FilmAntialiasing = True,
     as_json: AsJson = False,
 ) -> None:
-    """Drive a rover to its goal, record the drive and tell how it went.
+    """Drive a rover to its goal, record the drive and report the outcome.
 
     The environment is Rover-v0, among rocks RoverRocks-v0, on hills RoverHills-v0.
     Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.

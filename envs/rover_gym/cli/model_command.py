@@ -81,7 +81,7 @@ def import_model(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Read a URDF or MJCF, tell what was understood, and write a model file and a picture."""
+    """Read a URDF or MJCF, report what was understood, and write a model file and a picture."""
     if picture is not None:
         require("matplotlib", "demo")
     picture = picture or output.with_suffix(".png")

@@ -25,6 +25,7 @@ from rover_gym.mechanics import (
     Spline,
     TwoWheelRoverSimulation,
 )
+from rover_gym.planar.incline import Incline, ball_on_slope
 from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.validation import number, refuse
 
@@ -134,6 +135,58 @@ def rover(
     if given.ground is PlanarGroundKind.line:
         warn_of_slope(given.slope, given.friction)
     _run(sim, "the two-wheel rover", given, given.output / "rover.h5")
+
+
+@planar.command()
+@plain_errors
+def incline(
+    *,
+    slope: Annotated[float, typer.Option(help="Slope, degrees, downwards.")] = 20.0,
+    friction: Annotated[float, typer.Option(min=0.0, max=10.0, help="Friction coefficient.")] = 0.2,
+    speed: Annotated[
+        float, typer.Option(min=0.0, max=1e3, help="Speed down the slope at the start, without rotation, m/s.")
+    ] = 2.0,
+    inertia: Annotated[
+        float, typer.Option(min=0.01, max=1.0, help="Moment of inertia over m r²: 0.4 of a solid ball, 1 of a hoop.")
+    ] = 0.4,
+    duration: Annotated[float, typer.Option(min=0.01, max=100.0, help="Time to simulate, s.")] = 1.5,
+    time_step: Annotated[float, typer.Option(help="Time step, s.")] = 0.002,
+    output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
+    as_json: AsJson = False,
+) -> None:
+    """Let a ball slide and roll down a slope; draw where it sticks and slips, with the analytic curves."""
+    path = output / "incline.h5"
+    check_paths({}, output=Into(output, (path.name, path.with_suffix(".png").name)))
+    angle = float(np.radians(number("slope", slope, at_least=0.0, at_most=80.0)))
+    case = Incline(angle, friction, speed, inertia)
+    sim = ball_on_slope(case, time_step=time_step)
+    with Results(as_json=as_json) as results:
+        title = f"a ball on a slope of {slope:g} degrees, friction {friction:g}"
+        run = results.record(sim, duration, path, PlanarRun, title=title)
+        from rover_gym.figures.incline_figure import down_slope, draw_incline  # noqa: PLC0415 - matplotlib is slow to load
+
+        centre, rim = down_slope(run, case)
+        stuck = np.flatnonzero(np.abs(rim - centre) < 1e-6)
+        stuck = stuck[stuck > 0]
+        end = float(run.time[stuck[0]]) if len(stuck) else math.inf
+        both = np.abs(np.array([centre, rim]) - case.speeds(run.time)).max()
+        results.table(
+            title,
+            [
+                row("the ball", "slides, then rolls" if np.isfinite(end) else "slides", rolls=bool(np.isfinite(end))),
+                row("steepest slope to roll on", f"{np.degrees(case.steepest):.2f} degrees", steepest=case.steepest),
+                row("sliding ends, simulated", _moment(end), end_of_sliding=end),
+                row("sliding ends, analytic", _moment(case.end_of_sliding), analytic_end=case.end_of_sliding),
+                row("acceleration in the end", f"{case.final:.3f} m/s²", acceleration=case.final),
+                row("largest difference of speeds", f"{1e3 * both:.2g} mm/s", difference=float(both)),
+            ],
+        )
+        results.path("trajectory", path)
+        results.path("figure", draw_incline(run, case, path.with_suffix(".png")))
+
+
+def _moment(time: float) -> str:
+    return f"{time:.3f} s" if math.isfinite(time) else "never"
 
 
 planar.command()(soil)

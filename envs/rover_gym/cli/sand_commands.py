@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from rover_gym.cli.console import AsJson, Results, plain_errors
+from rover_gym.cli.console import AsJson, Results, figure, plain_errors
 from rover_gym.cli.paths import check_paths
 from rover_gym.cli.usage import WholeHelp
 from rover_gym.mechanics import OptionError
@@ -43,11 +43,16 @@ SLIPS = (-0.5, -0.2, 0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 def _say(name: str, rows: Sequence[Mapping[str, Any]], *, as_json: bool) -> None:
     """Prints rows with the same columns as a table, or as a list of JSON objects."""
     with Results(as_json=as_json) as results:
-        results.add(**{name: list(rows)})
-        table = Table(*rows[0])
-        for line in rows:
-            table.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in line.values()))
-        results.show(table)
+        _show(results, name, rows)
+
+
+def _show(results: Results, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Adds rows to the results of a command."""
+    results.add(**{name: list(rows)})
+    table = Table(*rows[0])
+    for line in rows:
+        table.add_row(*(figure(cell) if isinstance(cell, float) else str(cell) for cell in line.values()))
+    results.show(table)
 
 
 @sand.command()
@@ -79,9 +84,29 @@ def bed(
     gravity: Gravity = EARTH,
     slip: Slip = None,
     slip_angle: Annotated[float, typer.Option(help="Angle from the wheel's plane to its travel, degrees.")] = 0.0,
+    rover: Annotated[
+        str | None,
+        typer.Option(help="Take a wheel of this rover and its share of the mass: a name of the gallery, or a file."),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(dir_okay=False, help="Plot of pull, sinkage and torque over the slip."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Drive one wheel over a bed at given slips: sinkage, drawbar pull, side force and torque in steady motion."""
+    """Drive one wheel over a bed at given slips: sinkage, drawbar pull, side force and torque in steady motion.
+
+    The wheel of `--rover` gets 24 grousers of a twentieth of its radius, as in `rover sand rovers`, and `--width`.
+    """
+    check_paths({"the rover": rover}, plot=plot)
+    whose = "a wheel"
+    if rover is not None:
+        model = open_model(rover)
+        radius = float(model.wheel_radii[0])
+        wheel_of = with_wide_wheels(model, width / radius).to_dict()["wheels"][0]
+        grouser_height, grousers = wheel_of["grouser_height"], wheel_of["grousers"]
+        mass = float(model.mass) / len(model.wheel_names)
+        whose = f"a wheel of {Path(rover).stem}"
     mass = number("mass", mass, above=0.0)
     wheel = SingleWheel(radius, width, grouser_height, grousers).on(named_soil(soil))
     slips = list(slip or SLIPS)
@@ -90,7 +115,13 @@ def bed(
         {"slip": s, "sinkage_mm": 1e3 * z, "drawbar_N": pull, "across_N": -side, "torque_Nm": torque}
         for s, (z, pull, side, _, torque) in zip(slips, found.tolist(), strict=True)
     ]
-    _say("runs", runs, as_json=as_json)
+    with Results(as_json=as_json) as results:
+        _show(results, "runs", runs)
+        if plot is not None:
+            from rover_gym.figures.sand_figure import draw_wheel_on_sand  # noqa: PLC0415 - matplotlib is slow to load
+
+            size = f"radius {1e3 * radius:.3g} mm, width {1e3 * width:.3g} mm, load {mass * gravity:.3g} N"
+            results.path("figure", draw_wheel_on_sand(runs, f"Drawbar pull of {whose} on {soil} ({size})", plot))
 
 
 @sand.command()

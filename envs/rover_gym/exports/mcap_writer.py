@@ -20,7 +20,7 @@ from rover_gym.mechanics import RoverModel, Simulation, Terrain
 from rover_gym.record.channels import RecordingError, RoverSampler, storable, versions
 from rover_gym.record.rover_run import RoverRun, film_rows
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
+from rover_gym.rendering.appearance import ROCK_COLOUR
 from rover_gym.replay import scenery
 from rover_gym.replay.sights import SENSORS, hits, sensor_of
 from rover_gym.validation import TERRAINS, array, checked, number, refuse, vector
@@ -344,7 +344,8 @@ class McapWriter:
         tiles = scenery.ground_tiles(run)
         if tiles is not None:
             vertices, light, dark = tiles
-            colours = ((GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark))
+            first, second = scenery.ground_colours(run)
+            colours = ((first, vertices, light), (second, vertices, dark))
             messages.add_meshes(found, stamp, "ground", messages.WORLD, colours)
         for i, (vertices, faces) in enumerate(scenery.surfaces(run)):
             coloured = [(colour, vertices, triangles) for colour, triangles in faces]

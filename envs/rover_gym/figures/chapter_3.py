@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.figures.planar_drawing import GROUND
-from rover_gym.figures.style import save_figures
+from rover_gym.figures.style import circle, save_figures
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
 from rover_gym.reproduction.scene_runs import ball_on_incline, ball_on_sine, published
@@ -101,10 +101,20 @@ def _sine_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
     _plot_published(axes, "fig_3_4_ball_sine")
     axes.plot(*centre["q"][:, :2].T, color=OURS, label="ours, centre stops at the ground")
     axes.plot(*rim["q"][:, :2].T, color=RIM, linestyle="--", label="ours, rim touches, from 1.5 m higher")
+    _outlines(axes, rim)
     axes.set(xlabel="x (m)", ylabel="y (m)", xlim=(-5.0, 2.0))
     axes.set_aspect("equal", adjustable="box")
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="circles: the ball at start and end")
     figure.suptitle("Figure 3.4: a ball on a sine over 10 s, from (-2.5, 1)")
+
+
+def _outlines(axes: Axes, rim: Trajectory) -> None:
+    """Draws the ball that touches with its rim, at the start and where it has come to rest."""
+    radius = float(rim.attributes["scene"]["machine"]["radius"])
+    for row in (0, -1):
+        x, y, angle = rim["q"][row]
+        circle(axes, x, y, radius, color=RIM)
+        axes.plot([x, x + radius * np.cos(angle)], [y, y + radius * np.sin(angle)], color=RIM, linewidth=0.8)
 
 
 def _sine_curves(figure: Figure, centre: Trajectory) -> None:

@@ -143,14 +143,14 @@ def _explain(axes: Axes, threshold: float) -> None:
     """Marks where an axis becomes logarithmic."""
     axes.axhline(threshold, color="0.6", linewidth=0.5)
     axes.annotate(
-        "logarithmic above this line",
+        "logarithmic\nabove this line",
         (1.0, threshold),
         xycoords=("axes fraction", "data"),
-        xytext=(-3, 2),
+        xytext=(3, 0),
         textcoords="offset points",
-        ha="right",
+        ha="left",
         va="bottom",
-        fontsize=7.5,
+        rotation=90.0,
+        fontsize=6.5,
         color="0.45",
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
     )

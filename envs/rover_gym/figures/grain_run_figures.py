@@ -73,6 +73,8 @@ def rut_maps(figure: Sheet, run: GrainRun) -> None:
         else:
             axes.set(ylabel="z (m)")
         axes.set_title(name, loc="left")
+        if name.startswith("before"):
+            continue  # the map after has the same colours
         # A bar beside or over its map, of its length: the map's shape, not the panel's, sets both.
         place = (0.0, -0.24, 1.0, 0.03) if is_wide else (1.015, 0.0, 0.012, 1.0)
         bar = axes.inset_axes(place)

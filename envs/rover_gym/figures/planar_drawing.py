@@ -81,10 +81,10 @@ def disc_loads(axes: Axes, run: PlanarRun) -> None:
     peak, bulk = float(loads.max()), float(np.percentile(loads, 98.0))
     if bulk > 0.0 and peak > 4.0 * bulk:  # one impact must not flatten the rest
         axes.set_ylim(-0.05 * bulk, 1.5 * bulk)
-        axes.annotate(
-            f"cut off, peak {peak:,.0f} N", (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=8.0
-        )
-    axes.set(xlabel="time (s)", ylabel="load (N)")
+        axes.set(ylabel=f"load, without its\npeak of {peak:,.0f} N (N)")
+    else:
+        axes.set(ylabel="load (N)")
+    axes.set(xlabel="time (s)")
 
 
 def disc_gaps(axes: Axes, run: PlanarRun) -> None:

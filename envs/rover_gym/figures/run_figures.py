@@ -51,16 +51,26 @@ SET_POINT: dict[str, Any] = {"linestyle": (0, (1, 1.5)), "linewidth": 1.0}
 
 def wheel_gaps(figure: Sheet, run: RoverRun) -> None:
     """Gap between each wheel and the ground, left and right wheels in separate panels."""
+    _wheel_heights(figure, run, "gap", 1e3 * finite(run.trajectory["wheel_gaps"]))
+    title(figure, "Gaps between wheels and ground, negative where they overlap", run)
+
+
+def sinkage(figure: Sheet, run: RoverRun) -> None:
+    """Depth of each wheel in sand, left and right wheels in separate panels."""
+    _wheel_heights(figure, run, "sinkage", -1e3 * finite(run.trajectory["wheel_gaps"]))
+    title(figure, "Sinkage of the wheels", run)
+
+
+def _wheel_heights(figure: Sheet, run: RoverRun, what: str, heights: Array) -> None:
+    """Heights (n, n_wheels) over or under the ground, mm."""
     style = WheelStyle.of(run.model)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
-    gaps = 1e3 * finite(run.trajectory["wheel_gaps"])
     for axes, wheels, name in zip(panels, style.sides, ("left", "right"), strict=True):
         axes.axhline(0.0, color=DARK, linewidth=0.6)
-        style.plot(axes, run.time, gaps, wheels, nested=True)
-        axes.set(ylabel=f"gap, {name} wheels (mm)")
-    linear_then_log(panels[0], 10.0, *extremes(gaps, -1.0, 1.0))
+        style.plot(axes, run.time, heights, wheels, nested=True)
+        axes.set(ylabel=f"{what}, {name} wheels (mm)")
+    linear_then_log(panels[0], 10.0, *extremes(heights, -1.0, 1.0))
     panels[1].set(xlabel="time (s)")
-    title(figure, "Gaps between wheels and ground, negative where they overlap", run)
     style.legend(figure)
 
 
@@ -236,8 +246,10 @@ def _forward(q: Array) -> Array:
 
 
 def _averaged(run: RoverRun) -> str:
-    """Averaging interval of the recorded forces."""
+    """Averaging interval of the recorded forces: a row for rows of single steps and of `record_run`."""
     step = run.trajectory.attributes.get("solver", {}).get("time_step")
+    if "distance_to_goal" not in run.trajectory.data and run.n_frames > 1:
+        return f"the {1e3 * float(np.median(np.diff(run.time))):.3g} ms before each sample"
     return "the last time step" if step is None else f"the last time step of {1e3 * step:g} ms"
 
 
@@ -257,13 +269,14 @@ def _has(*names: str) -> Callable[[RoverRun], bool]:
 def _leaves_the_ground(run: RoverRun) -> bool:
     """Whether a wheel is lifted at some time: otherwise the gaps are an empty chart."""
     gaps = run.trajectory.data.get("wheel_gaps")
-    return gaps is not None and bool(np.any(gaps > LIFTED))
+    return gaps is not None and not run.on_sand and bool(np.any(gaps > LIFTED))
 
 
 #: By file name.
 DRAWINGS = {
     "path": Drawing(path_from_above, 6.5, _has("q", "wheel_centres")),
     "wheel-gaps": Drawing(wheel_gaps, 5.5, _leaves_the_ground),
+    "sinkage": Drawing(sinkage, 5.5, lambda run: run.on_sand and "wheel_gaps" in run.trajectory.data),
     "wheel-loads": Drawing(wheel_loads, 6.0, _has("wheel_forces")),
     "slip": Drawing(slip, 6.5, _has("q", "v", "wheel_forces")),
     "attitude": Drawing(attitude, 6.0, _has("q", "v")),

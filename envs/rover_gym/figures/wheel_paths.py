@@ -24,6 +24,9 @@ HEADING_DISTANCE = 1.8  # spacing of the heading arrows, in arrow lengths
 ARROW = 0.045  # of the map's width
 
 
+SAND = "YlOrBr_r"  # colours of the height of sand
+
+
 class Footprints(NamedTuple):
     """The visible parts of a field's spheres, from above.
 
@@ -46,7 +49,7 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
     _show_extent(axes, run)
     others: dict[str, dict[str, Any]] = {}
     if surfaces_of(run.terrain):
-        _draw_heights(figure, axes, run.terrain)
+        _draw_heights(figure, axes, run.terrain, SAND if run.on_sand else "copper")
     if any(isinstance(part, SphereField) for part in parts_of(run.terrain)):
         _draw_spheres(figure, axes, run.terrain)
     wheels = WheelStyle.of(run.model)
@@ -89,14 +92,14 @@ def footprints(terrain: Terrain) -> Footprints:
     return Footprints(centres[:, [0, 2]], at_ground, distance + radii)
 
 
-def _draw_heights(figure: Sheet, axes: Axes, terrain: Terrain) -> None:
-    """The ground's height as filled contours."""
+def _draw_heights(figure: Sheet, axes: Axes, terrain: Terrain, colours: str) -> None:
+    """The ground's height as filled contours, with a colour bar."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     z, x = np.linspace(left, right, 150), np.linspace(bottom, top, 100)
     grid_z, grid_x = np.meshgrid(z, x)
     places = np.column_stack((grid_x.ravel(), grid_z.ravel()))
     heights = surface_heights(terrain, places).reshape(grid_x.shape)
-    filled = axes.contourf(z, x, np.ma.masked_invalid(heights), levels=20, cmap="copper", alpha=0.45, zorder=0)
+    filled = axes.contourf(z, x, np.ma.masked_invalid(heights), levels=20, cmap=colours, alpha=0.45, zorder=0)
     figure.colorbar(filled, ax=axes, shrink=0.8, pad=0.02, label="height of the ground (m)")
 
 
@@ -125,6 +128,8 @@ def _draw_spheres(figure: Sheet, axes: Axes, field: Terrain) -> None:
     span = max(float(prints.heights.max()) - low, 1e-6)
     circles.set_clim(low - 0.1 * span, low + 2.2 * span)  # light greys only, so that the tracks stand out
     axes.add_collection(circles, autolim=False)
+    if surfaces_of(field):
+        return  # the colour bar is that of the ground
     above = "the ground" if is_on_ground else "y = 0"
     bar = figure.colorbar(circles, ax=axes, shrink=0.8, pad=0.02, label=f"top of the sphere above {above} (m)")
     bar.ax.set_ylim(low, low + span)

@@ -385,6 +385,14 @@ class GrainRun(Run):
         """Some samples of the run, by their indices `(n,)`."""
         return replace(self, trajectory=self.trajectory.at(rows), rows=self.rows[rows])
 
+    @property
+    def whole(self) -> GrainRun:
+        """The run with all samples of its file, of which `resample` and `at` have kept some."""
+        if self.trajectory.thinned is None:
+            return self
+        whole = self.trajectory.thinned[0]
+        return replace(self, trajectory=whole, rows=np.arange(len(whole["time"])))
+
 
 def is_grains(trajectory: Trajectory) -> bool:
     """Whether a trajectory is a run of balls in space."""

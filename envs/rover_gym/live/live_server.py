@@ -133,7 +133,7 @@ class LiveServer:
                 CommandError,
                 "do",
                 entries["do"],
-                "is allowed on the page in control only, and another page is in control",
+                'another page drives: press \'take the wheel\', or send {"do": "take"}',
             )
         server = asyncio.get_running_loop()
 

@@ -83,7 +83,7 @@ class LiveView:
         run = _Moment(state)
         points, normals, across = feet(run, self._wheels)
         share = state.model.mass * state.scene.gravity / max(1, len(self._wheels))
-        forces = np.clip(world_forces(run, normals, across) / share, -1e4, 1e4)
+        forces = np.clip(world_forces(run.trajectory["wheel_forces"], normals, across) / share, -1e4, 1e4)
         return [
             *poses_of(run.positions, run.rotations),
             FrameChannel.fine("centre", run.positions[:, :1]),

@@ -159,7 +159,13 @@ def _turning(model: RoverModel, x: Array, z: Array) -> tuple[str, float]:
     reach = np.tan(np.minimum(limit[steered], math.pi / 2.0))
     with np.errstate(divide="ignore"):
         radius = float(np.max(np.abs(z[steered]) + offsets[steered] / reach))
-    return f"a common one on the line {round(line, 4) + 0.0:+.4g} m ahead of the trunk's origin", radius
+    return f"a common one on the line {_along(line)} the trunk's origin", radius
+
+
+def _along(place: float) -> str:
+    """A place along the rover, m, in words: "0.28 m behind"."""
+    rounded = round(place, 4)
+    return "through" if rounded == 0.0 else f"{abs(rounded):.4g} m {'ahead of' if rounded > 0.0 else 'behind'}"
 
 
 def _step(model: RoverModel, loads: Array, front: npt.NDArray[np.intp], friction: float) -> tuple[float, bool]:

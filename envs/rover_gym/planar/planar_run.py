@@ -47,12 +47,16 @@ COORDINATES = {
 DISCS = {1: ("ball",), 2: ("wheel A", "wheel B"), 3: ("front wheels", "middle wheels", "back wheels")}
 
 
+#: Channel of the impulses in the world frame, which earlier recordings lack.
+IN_WORLD = "world_impulses"
+
+
 def planar_channels(coordinates: int, discs: int) -> tuple[Channel, ...]:
     """The channels of a machine with so many coordinates and discs."""
     names, of_discs = COORDINATES[coordinates], DISCS[discs]
     impulses = (
-        "impulses of the last step along the normal (out of the ground) and the tangent (forward), summed"
-        " over the contacts of a disc"
+        "impulses of a step along the normal (out of the ground) and the tangent (forward), summed over the contacts"
+        " of a disc, mean over the steps since the last row"
     )
     rates = tuple(f"{name}_rate" for name in names)
     gaps = "distance from disc to ground, negative where they overlap"
@@ -63,6 +67,14 @@ def planar_channels(coordinates: int, discs: int) -> tuple[Channel, ...]:
         Channel("centres", "m", "centres of the discs: x forward, y up", (discs, 2), of_discs, read="sim.centres"),
         Channel("gaps", "m", gaps, (discs,), of_discs, read="sim.gaps"),
         Channel("impulses", "N s", impulses, (discs, 2), of_discs, read="impulses"),
+        Channel(
+            IN_WORLD,
+            "N s",
+            "impulses along x and y, mean over the steps since the last row",
+            (discs, 2),
+            of_discs,
+            read=IN_WORLD,
+        ),
         Channel("torques", "N m", "driving torques, positive drives forward", (discs,), of_discs, read="sim.torques"),
         *energy_channels("", "the mass centre at height 0"),
         RESIDUAL,
@@ -80,22 +92,28 @@ class PlanarSampler(Sampler):
         super().__init__(sim)
         self.channels = planar_channels(len(sim.q), len(sim.centres))
 
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        super().clear()
+        self._impulses, self._in_world = np.zeros((2, len(self.sim.centres), 2))
+
+    def gather(self, report: Any) -> None:  # noqa: ARG002 - the impulses are the simulation's
+        """Adds the impulses of the last step."""
+        contacts = self.sim.contacts
+        impulses, normals = contacts.impulses, contacts.normals
+        tangents = np.column_stack((normals[:, 1], -normals[:, 0]))
+        np.add.at(self._impulses, contacts.discs, impulses)
+        np.add.at(self._in_world, contacts.discs, impulses[:, :1] * normals + impulses[:, 1:] * tangents)
+
     @property
     def impulses(self) -> Array:
-        """(n_discs, 2) impulses of the last step, N s."""
-        contacts, impulses = self.sim.contacts, np.zeros((len(self.sim.centres), 2))
-        np.add.at(impulses, contacts.discs, contacts.impulses)
-        return impulses
+        """(n_discs, 2) impulses of a step, mean since the last row, N s."""
+        return self._impulses / max(1, self.steps)
 
-    def step(self, n: int) -> bool:
-        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
-
-        Raises:
-            StepError: A step failed.
-        """
-        report = self.sim.step(n)
-        self.residual = report.residual
-        return bool(report.is_converged)
+    @property
+    def world_impulses(self) -> Array:
+        """(n_discs, 2) impulses of a step along x and y, mean since the last row, N s."""
+        return self._in_world / max(1, self.steps)
 
     def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
         """The attributes of a recording, taken from the simulation at its start."""
@@ -163,10 +181,23 @@ class PlanarRun(Run):
 
     @property
     def loads(self) -> Array:
-        """(n, n_discs) force of the ground on each disc along its normal, mean over a step, N."""
-        step = float(self.trajectory.attributes["solver"]["time_step"])
-        result: Array = self.trajectory["impulses"][..., 0] / step
+        """(n, n_discs) force of the ground on each disc along its normal, mean since the previous sample, N."""
+        result: Array = self.trajectory["impulses"][..., 0] / self.time_step
         return result
+
+    @property
+    def time_step(self) -> float:
+        """Time step of the simulation, s."""
+        return float(self.trajectory.attributes["solver"]["time_step"])
+
+    @property
+    def forces(self) -> Array | None:
+        """(n, n_discs, 2) force of the ground on each disc along x and y, mean since the previous sample, N.
+
+        None for recordings of earlier versions, which do not hold it.
+        """
+        impulses = self.trajectory.data.get(IN_WORLD)
+        return None if impulses is None else impulses / self.time_step
 
     @property
     def speed(self) -> Array:
@@ -203,7 +234,9 @@ def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
     coordinates = trajectory["q"].shape[1] if trajectory["q"].ndim == 2 else 0
     if discs not in DISCS or coordinates not in COORDINATES or len(ANGLES[coordinates]) != discs:
         refuse(RecordingError, f"{path}: centres", discs, "must be one, two or three discs with their coordinates")
-    channels = planar_channels(coordinates, discs)
+    channels = [
+        one for one in planar_channels(coordinates, discs) if one.name != IN_WORLD or IN_WORLD in trajectory.data
+    ]
     check_rows(trajectory, path, channels, bounded=("q", "v", "centres"), needed=True)
     with sound(path, "scene"):
         ground = _ground(scene["ground"])

@@ -17,6 +17,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.ground import sand_of
 from rover_gym.mechanics import OptionError, RoverGymError, RoverModel, Simulation, __version__
 from rover_gym.validation import checked, number, refuse
 
@@ -237,17 +238,46 @@ class RoverSampler(Sampler):
         n = len(wheels)
         self._solids = wheel_solids(model)
         gaps = "distance from wheel to ground, negative where they overlap"
-        forces = "mean contact force of the last step along n (ground to wheel), t (rolling direction), b = t x n"
-        torques = "mean torque that each drive gave in the last step, positive drives forward"
+        since = "mean since the last row (in recordings of episodes: of the last step)"
+        forces = f"contact force along n (ground to wheel), t (rolling direction), b = t x n, {since}"
+        torques = f"torque that each drive gave, {since}, positive drives forward"
         self.channels = (
             TIME,
-            *rover_channels(model, "sim.wheel_forces", forces),
+            *rover_channels(model, "wheel_forces", forces),
             Channel("wheel_gaps", "m", gaps, (n,), wheels, read="sim.wheel_gaps"),
-            Channel("motor_torques", "N m", torques, (n,), wheels, read="sim.motor_torques"),
+            Channel("motor_torques", "N m", torques, (n,), wheels, read="motor_torques"),
             *energy_channels(" of the whole rover", "all mass centres at the world's origin"),
             RESIDUAL,
             ITERATIONS,
         )
+
+    def clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        super().clear()
+        self._forces: npt.NDArray[np.float64] | None = None
+        self._torques: npt.NDArray[np.float64] | None = None
+
+    def gather(self, report: Any) -> None:  # noqa: ARG002 - the forces are the simulation's
+        """Adds the forces and torques of the last step."""
+        forces, torques = self.sim.wheel_forces, self.sim.motor_torques
+        self._forces = forces if self._forces is None else self._forces + forces
+        self._torques = torques if self._torques is None else self._torques + torques
+
+    @property
+    def wheel_forces(self) -> npt.NDArray[np.float64]:
+        """(n_wheels, 3) mean since the last row, N; of the last step if the sampler took none."""
+        if self._forces is not None:
+            return self._forces / self.steps
+        forces: npt.NDArray[np.float64] = self.sim.wheel_forces
+        return forces
+
+    @property
+    def motor_torques(self) -> npt.NDArray[np.float64]:
+        """(n_wheels,) mean since the last row, N m; of the last step if the sampler took none."""
+        torques: npt.NDArray[np.float64] = (
+            self.sim.motor_torques if self._torques is None else self._torques / self.steps
+        )
+        return torques
 
     @property
     def rover(self) -> Simulation:
@@ -344,9 +374,11 @@ def describe(
         scene: Further parameters of the scene.
         seed: Seed of the run, or why there is none.
     """
+    sand = sand_of(sim.terrain)
     return {
         "title": title,
         "scene": {
+            **({} if sand is None else {"soil": sand.soil}),
             **(scene or {}),
             "model": sim.model.to_dict(),
             "q": sim.q,

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.ground import sand_of
 from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.record.channels import ITERATIONS, TIME, Channel, RecordingError, RoverSampler, sound
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.validation import number, refuse, vector
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
 LARGEST = 1e9  # m, rad or s: largest value that leaves enough digits in single precision
@@ -74,6 +75,51 @@ class Run:
         changed: Any = replace(self, trajectory=self.trajectory.at(rows))  # type: ignore[type-var]
         return changed  # type: ignore[no-any-return]
 
+    @property
+    def whole(self) -> Self:
+        """The run with all samples of its file, of which `resample` and `at` have kept some."""
+        if self.trajectory.thinned is None:
+            return self
+        changed: Any = replace(self, trajectory=self.trajectory.thinned[0])  # type: ignore[type-var]
+        return changed  # type: ignore[no-any-return]
+
+    def mean(
+        self, values: Callable[[Self], npt.NDArray[np.float64]], window: float | None = None
+    ) -> npt.NDArray[np.float64]:
+        """Means of a force or a rate about each sample, taken from all samples of the file.
+
+        An impact lasts one step. Means of a reduced run's own samples would miss most impacts.
+
+        Args:
+            values: Gives the values (n, ...) of a run with n samples.
+            window: Width of the window, s. Default: the median time between the samples of this run.
+        """
+        whole = self.whole
+        measured = values(whole)
+        if window is None:
+            if len(whole.time) == len(self.time):
+                return measured
+            window = float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+        columns = moving_mean(whole.time, measured.reshape(len(measured), -1), window)
+        rows = slice(None) if self.trajectory.thinned is None else self.trajectory.thinned[1]
+        result: npt.NDArray[np.float64] = columns[rows].reshape(-1, *measured.shape[1:])
+        return result
+
+
+def moving_mean(
+    time: npt.NDArray[np.float64], values: npt.NDArray[np.float64], window: float
+) -> npt.NDArray[np.float64]:
+    """Values `(n, m)` averaged over the samples within half of a window, s, without those that are not finite."""
+    half = 0.5 * window + 1e-6  # samples at the edge count, whatever their rounding
+    first = np.searchsorted(time, time - half, side="left")
+    last = np.searchsorted(time, time + half, side="right")
+    known = np.isfinite(values)
+    sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
+    counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
+    with np.errstate(invalid="ignore"):
+        result: npt.NDArray[np.float64] = (sums[last] - sums[first]) / (counts[last] - counts[first])
+    return result
+
 
 @dataclass(frozen=True)
 class RoverRun(Run):
@@ -94,6 +140,12 @@ class RoverRun(Run):
     goal: tuple[float, float] | None
     title: str
     goal_tolerance: float | None = None
+
+    @property
+    def on_sand(self) -> bool:
+        """Whether the wheels sank into sand; the ground of a recording is its surface alone."""
+        scene = self.trajectory.attributes.get("scene", {})
+        return sand_of(self.terrain) is not None or scene.get("terrain") == "sand" or "soil" in scene
 
     @property
     def positions(self) -> npt.NDArray[np.float64]:

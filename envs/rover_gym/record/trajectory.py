@@ -61,6 +61,7 @@ class Trajectory:
     units: Mapping[str, str]
     attributes: Mapping[str, Any]
     terrain: Terrain | None = None
+    thinned: tuple[Trajectory, npt.NDArray[np.int64]] | None = None
 
     def __getitem__(self, name: str) -> npt.NDArray[np.float64]:
         """The data set of a name.
@@ -73,8 +74,9 @@ class Trajectory:
         return self.data[name]
 
     def at(self, rows: npt.NDArray[np.int64]) -> Trajectory:
-        """Some samples of the run, by their indices `(n,)`."""
-        return replace(self, data={name: values[rows] for name, values in self.data.items()})
+        """Some samples of the run, by their indices `(n,)`; `thinned` keeps all of them."""
+        whole, kept = (self, rows) if self.thinned is None else (self.thinned[0], self.thinned[1][rows])
+        return replace(self, data={name: values[rows] for name, values in self.data.items()}, thinned=(whole, kept))
 
 
 def read_trajectory(path: str | Path) -> Trajectory:

@@ -192,12 +192,12 @@ class FrameRenderer(Picture):
             self._scene.RemoveActor(actor)
         plane, (centres, radii) = plane_of(terrain), spheres_of(terrain)
         self._plane = plane
-        self._soil = SoilShading()
+        sand = sand_of(terrain)
+        self._soil = SoilShading(sand=sand is not None)
         self._ground = None if plane is None else GroundActors(plane, self._soil)
         self._rocks = RockActors(centres, radii, self._ground) if len(radii) else None
         self._surfaces = [SurfaceActor(surface, self._soil) for surface in surfaces_of(terrain)]
         self._shadows: dict[str, vtkActor] = {}
-        sand = sand_of(terrain)
         self._ruts = None if sand is None else RutActor(sand)
         self._shadow = DrapedShadow(self._model, terrain) if plane is None or self._balls is not None else None
         self._marks = None if sand is not None else TyreMarks(self._model, terrain)

@@ -40,7 +40,7 @@ def rut_mesh(ruts: Array, cell: float, terrain: Terrain) -> tuple[Array, Faces, 
     across = -np.diff(around, axis=1).sum(axis=(0, 1)) / (2.0 * cell)
     lit = (SUN[1] - SUN[0] * along - SUN[2] * across) / np.sqrt(1.0 + along**2 + across**2) / SUN[1]
     shade = np.clip(1.0 - (1.0 - DARKEST) * around.mean(axis=(0, 1)) / WIDE, DARKEST, 1.0)
-    ground = 0.5 * (np.array(look.GROUND_COLOUR) + look.GROUND_COLOUR_2)
+    ground = np.mean(look.SAND_GROUND, axis=0)
     colours = np.clip((shade * np.clip(0.45 + 0.55 * lit, 0.4, 1.25))[:, None] * ground, 0.0, 1.0)
     flat = corners * cell
     vertices = np.column_stack((flat[:, 0], heights_of(terrain, flat) + 0.5 * LIFT, flat[:, 1]))

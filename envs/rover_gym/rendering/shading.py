@@ -38,9 +38,12 @@ SOIL = f"""
   vec2 side = clamp(edge / wide, -0.5, 0.5) * 2.0;
   float checks = 0.5 + 0.5 * side.x * side.y;
   if (dot(facing, -lightDirectionVC1) < level) checks = 1.0;
-  vec3 albedo = mix({_rgb(look.GROUND_COLOUR)}, {_rgb(look.GROUND_COLOUR_2)}, checks);
+  vec3 albedo = mix(lighter, darker, checks);
   albedo *= 0.72 + 0.3 * texture({GRAIN}, at * 0.9).r + 0.26 * texture({GRAIN}, at * 0.071 + 0.3).r;
 """
+
+
+TONES = ("lighter", "darker")  # fields of the checkered ground
 
 
 def dress(actor: vtkActor) -> None:
@@ -57,10 +60,12 @@ class SoilShading:
 
     Args:
         tile: Edge of its tiles, m.
+        sand: Whether it is sand.
     """
 
-    def __init__(self, tile: float = TILE) -> None:
+    def __init__(self, tile: float = TILE, *, sand: bool = False) -> None:
         self._tile = tile
+        self._colours = look.SAND_GROUND if sand else (look.GROUND_COLOUR, look.GROUND_COLOUR_2)
         self._world = vtkMatrix4x4()
         self._actors: list[vtkActor] = []
         self._grain = _grain()
@@ -70,6 +75,7 @@ class SoilShading:
         facing = "normalVCVSOutput" if sunlit else "-lightDirectionVC1"  # a shadow is a flat body, without normals
         level = f"vec3 facing = {facing}; float level = {LEVEL if steep else -2.0:.2f};"
         level += f" float sunlit = {float(sunlit):.1f}, tile = {self._tile:.6f};"
+        level += "".join(f" vec3 {name} = {_rgb(colour)};" for name, colour in zip(TONES, self._colours, strict=True))
         shading = actor.GetShaderProperty()
         shading.ClearAllFragmentShaderReplacements()
         _replace(actor, level + SOIL + LIT)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from rover_gym.record.rover_run import Run
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+R = TypeVar("R", bound=Run)
 Array = npt.NDArray[np.float64]
 
 FOLLOW_TIME = 1.0  # s, window of the path that the eye follows: the eye does not shake with the machine
@@ -17,25 +20,12 @@ FOLLOW_TIME = 1.0  # s, window of the path that the eye follows: the eye does no
 LOAD_TIME = 0.2  # s, window of the loads: an impact lasts a step and says nothing of the weight carried
 
 
-def moving_mean(time: Array, values: Array, window: float) -> Array:
-    """Values `(n, m)` averaged over the samples within half of a window, s, without those that are not finite."""
-    half = 0.5 * window + 1e-6  # samples at the edge count, whatever their rounding
-    first = np.searchsorted(time, time - half, side="left")
-    last = np.searchsorted(time, time + half, side="right")
-    known = np.isfinite(values)
-    sums = np.vstack((np.zeros(values.shape[1]), np.cumsum(np.where(known, values, 0.0), axis=0)))
-    counts = np.vstack((np.zeros(values.shape[1]), np.cumsum(known, axis=0)))
-    with np.errstate(invalid="ignore"):
-        result: Array = (sums[last] - sums[first]) / (counts[last] - counts[first])
-    return result
-
-
 class Chart(NamedTuple):
     """A chart of the panel.
 
     `values` are (n, n_series); `digits` stand after the point; `series` are name and colour of each curve;
-    `window`, s, is how long a lone impact lasts in the values: it must not set the scale; `shown`: at once, or when it
-    is chosen.
+    `window`, s, is how long a lone impact lasts in the values; with `cut` it does not set the scale. `shown`: at once,
+    or when it is chosen.
     """
 
     title: str
@@ -45,11 +35,12 @@ class Chart(NamedTuple):
     series: list[tuple[str, str]]
     window: float = 0.0
     shown: bool = True
+    cut: bool = True
 
 
-def load_chart(title: str, time: Array, loads: Array, digits: int, wheels: list[tuple[str, str]]) -> Chart:
-    """The wheels' loads `(n, n_wheels)`, N, as means over `LOAD_TIME`."""
-    smooth = moving_mean(time, loads, LOAD_TIME)
+def load_chart(title: str, run: R, loads: Callable[[R], Array], digits: int, wheels: list[tuple[str, str]]) -> Chart:
+    """The wheels' loads as means over `LOAD_TIME`; `loads` gives those of a run, (n, n_wheels), N."""
+    smooth = run.mean(loads, LOAD_TIME)
     return Chart(f"{title}, mean over {LOAD_TIME:g} s", "N", smooth, digits, wheels, LOAD_TIME)
 
 
@@ -67,6 +58,7 @@ def panel_contents(title: str, time: Array, charts: Iterable[Chart], facts: Iter
                 "series": [{"name": name, "colour": colour} for name, colour in chart.series],
                 "window": chart.window,
                 "shown": chart.shown,
+                "cut": chart.cut,
             }
             for chart in charts
         ],

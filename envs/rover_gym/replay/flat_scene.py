@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Polyline
+from rover_gym.mechanics import PlanarGround, Polyline, RoverModel
+from rover_gym.record.rover_run import moving_mean
 from rover_gym.rendering.appearance import (
     AXLE_COLOUR,
     GROUND_COLOUR,
@@ -20,7 +21,7 @@ from rover_gym.rendering.appearance import (
     Part,
     part_mesh,
 )
-from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 
 if TYPE_CHECKING:
@@ -43,6 +44,8 @@ SEEN = 9.0  # width of the picture, in diameters of the largest disc
 ASPECT = 1.5  # width over height of the picture
 LAND = 1.5  # picture widths of ground beyond the way
 TILE = 0.5  # m, length of the ground's squares
+ARROW = 2.5  # longest radii: 0.45 of it are the arrow of a disc's share of the weight
+STANDARD_GRAVITY = 9.81  # m/s²
 THICK = 0.4  # of a disc along its axle, in its radii
 
 
@@ -59,7 +62,77 @@ def planar_scene(run: PlanarRun, *, follow: bool) -> PageScene:
     centre = np.column_stack((_planar_eye(run, follow=follow), np.zeros(run.n_frames)))
     scene.channels.append(FrameChannel.fine("centre", centre[:, None]))
     scene.facts |= {"title": run.title, "front": True, "far": 20.0 * distance, "curves": _planar_curves(run)}
+    _add_forces(scene, run)
     return scene
+
+
+def _add_forces(scene: PageScene, run: PlanarRun) -> None:
+    """Adds forces and friction cones of the discs, in shares of the weight, at the nearest points of the ground."""
+    gravity = float(np.linalg.norm(run.trajectory.attributes["solver"].get("gravity", (0.0, -STANDARD_GRAVITY))))
+    share = mass_of(run.trajectory.attributes["scene"]["machine"]) * max(gravity, 1e-3) / len(run.radius)
+    feet, normals = nearest_points(run)
+    tangents = np.stack((normals[..., 1], -normals[..., 0]), axis=-1)
+
+    def along(run: PlanarRun) -> Array:
+        return run.trajectory["impulses"] / run.time_step
+
+    if run.forces is None:
+        parts = run.mean(along)
+        forces = parts[..., :1] * normals + parts[..., 1:] * tangents
+    else:
+        forces = run.mean(lambda run: np.asarray(run.forces))
+    front = np.broadcast_to(0.5 * THICK * run.radius[:, None], (*feet.shape[:2], 1))
+    flat = np.zeros((*feet.shape[:2], 1))
+    shares = np.clip(forces / share, -1e4, 1e4)
+    scene.channels.append(FrameChannel.fine("forces", np.concatenate((feet, front, shares, flat), axis=2)))
+    scene.channels.append(FrameChannel.turns("normals", np.concatenate((normals, flat), axis=2)))
+    scene.facts |= {"friction": float(run.trajectory.attributes["solver"]["friction"]), "on": ["forces", "cones"]}
+    scene.facts["arrow"] = ARROW * float(run.radius.max())
+    scene.facts["wheels"] = [
+        {"frame": i, "radius": float(radius), "width": float(THICK * radius), "colour": colour, "name": name}
+        for i, (radius, colour, name) in enumerate(zip(run.radius, PLANAR_WHEEL_COLOURS, run.names, strict=False))
+    ]
+
+
+def mass_of(machine: dict[str, Any]) -> float:
+    """Mass of a planar machine from its recorded parameters, kg."""
+    if "model" in machine:
+        return float(RoverModel.from_dict(machine["model"]).mass)
+    return float(machine["mass"]) + float(np.sum(machine.get("wheel_mass", 0.0)))
+
+
+def nearest_points(run: PlanarRun) -> tuple[Array, Array]:
+    """Nearest points of the ground to the discs' centres, m, and normals there, (n, n_discs, 2) both."""
+    feet, normals = np.zeros((2, run.n_frames, len(run.radius), 2))
+    for k, centres in enumerate(run.discs[..., :2]):
+        feet[k], normals[k] = _nearest(run.ground, centres, run.radius[:, None])
+    return feet, normals
+
+
+def _nearest(ground: PlanarGround, centres: Array, radius: Array) -> tuple[Array, Array]:
+    """The same of one frame: centres (n_discs, 2) and radii (n_discs, 1), m."""
+    x = centres[:, :1] + np.linspace(-1.5, 1.5, 97) * radius
+    if isinstance(ground, Polyline):
+        near = (ground.x >= x.min()) & (ground.x <= x.max())
+        ends = np.array([x.min(), x.max()])
+        xs = np.concatenate((ends[:1], ground.x[near], ends[1:]))
+        y = np.concatenate((ground.height(ends[:1]), ground.y[near], ground.height(ends[1:])))
+        points = np.broadcast_to(np.column_stack((xs, y)), (len(centres), len(xs), 2))
+    else:
+        points = np.stack((x, ground.height(x.ravel()).reshape(x.shape)), axis=-1)
+    way = np.diff(points, axis=1)
+    length = np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-12)
+    share = ((centres[:, None] - points[:, :-1]) * way).sum(axis=2, keepdims=True) / length**2
+    places = points[:, :-1] + np.clip(share, 0.0, 1.0) * way
+    disc = np.arange(len(centres))
+    k = np.argmin(np.linalg.norm(centres[:, None] - places, axis=2), axis=1)
+    feet, along = places[disc, k], (way / length)[disc, k]
+    normals = np.column_stack((-along[:, 1], along[:, 0]))
+    out = centres - feet
+    far = np.linalg.norm(out, axis=1, keepdims=True)
+    # At a corner the normal points to the centre. Where the centre itself stops at the ground it does not.
+    above = (far > 0.2 * radius) & ((out * normals).sum(axis=1, keepdims=True) > 0.0)
+    return feet, np.where(above, out / np.maximum(far, 1e-12), normals)
 
 
 def soil_scene(run: SoilRun, *, follow: bool) -> PageScene:
@@ -198,9 +271,9 @@ def _soil_curves(run: SoilRun) -> dict[str, Any]:
     names = ("wheel",) if run.wheels.shape[1] == 1 else ("back wheel", "front wheel")
     wheels = list(zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True))
     charts = [
-        load_chart("wheel load", run.time, run.wheel_forces[..., 1], 1, wheels),
+        load_chart("wheel load", run, lambda run: run.wheel_forces[..., 1], 1, wheels),
         Chart("sinkage", "mm", 1e3 * run.sinkage, 2, wheels),
-        Chart("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1, wheels),
+        Chart("rim speed minus forward speed", "mm/s", 1e3 * run.mean(lambda run: run.slip_speeds), 1, wheels),
     ]
     return panel_contents(run.title, run.time, charts)
 
@@ -258,8 +331,24 @@ def _planar_curves(run: PlanarRun) -> dict[str, Any]:
     """Contents of the panel."""
     discs = list(zip(run.names, PLANAR_WHEEL_COLOURS[: len(run.names)], strict=True))
     charts = [
-        load_chart("load", run.time, run.loads, 1, discs),
+        load_chart("load", run, lambda run: run.loads, 1, discs),
+        *_impulse_charts(run, discs),
         Chart("gap", "mm", 1e3 * run.trajectory["gaps"], 2, discs),
-        Chart("rim faster than machine", "mm/s", 1e3 * run.slip_speeds, 1, discs),
+        Chart("rim speed minus forward speed", "mm/s", 1e3 * run.mean(lambda run: run.slip_speeds), 1, discs),
     ]
     return panel_contents(run.title, run.time, charts)
+
+
+def _impulse_charts(run: PlanarRun, discs: list[tuple[str, str]]) -> list[Chart]:
+    """Impulses of the ground since the previous frame, along normal and tangent."""
+    whole = run.whole
+    steps = np.diff(whole.time, prepend=whole.time[0])[:, None, None] / run.time_step
+    sums = np.cumsum(whole.trajectory["impulses"] * steps, axis=0)
+    rows = slice(None) if run.trajectory.thinned is None else run.trajectory.thinned[1]
+    impulses = np.diff(sums[rows], axis=0, prepend=np.nan)
+    every = float(np.median(np.diff(run.time))) if run.n_frames > 1 else 0.0
+    title = "{} impulse" + f" in {1e3 * every:.3g} ms"
+    return [
+        Chart(title.format("normal"), "N s", impulses[..., 0], 3, discs, cut=False),
+        Chart(title.format("friction"), "N s", impulses[..., 1], 3, discs, cut=False),
+    ]

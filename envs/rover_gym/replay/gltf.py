@@ -16,8 +16,16 @@ import numpy.typing as npt
 from rover_gym.extras import require
 from rover_gym.files import write_whole
 from rover_gym.mechanics import __version__
-from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, Colour, Part, sphere_mesh
-from rover_gym.replay.scenery import coloured_meshes, goal_parts, ground_tiles, parts_by_solid, spheres, surfaces
+from rover_gym.rendering.appearance import ROCK_COLOUR, Colour, Part, sphere_mesh
+from rover_gym.replay.scenery import (
+    coloured_meshes,
+    goal_parts,
+    ground_colours,
+    ground_tiles,
+    parts_by_solid,
+    spheres,
+    surfaces,
+)
 from rover_gym.rotations import continuous, quaternions
 from rover_gym.validation import checked
 
@@ -45,9 +53,8 @@ def write_gltf(run: RoverRun, path: str | Path) -> Path:
     tiles = ground_tiles(run)
     if tiles is not None:
         vertices, light, dark = tiles
-        writer.add_node(
-            "ground", writer.add_mesh("ground", ((GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark)))
-        )
+        first, second = ground_colours(run)
+        writer.add_node("ground", writer.add_mesh("ground", ((first, vertices, light), (second, vertices, dark))))
     for k, (vertices, faces) in enumerate(surfaces(run)):
         painted = [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
         writer.add_node(f"surface_{k}", writer.add_mesh(f"surface_{k}", painted))

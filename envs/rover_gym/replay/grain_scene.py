@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.ground import plane_of, spheres_of
+from rover_gym.record.rover_run import moving_mean
 from rover_gym.rendering.appearance import (
     FIXED_BALL_COLOUR,
     GROUND_COLOUR,
@@ -21,7 +22,7 @@ from rover_gym.rendering.appearance import (
     TILE,
     WHEEL_COLOURS,
 )
-from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents
 from rover_gym.replay.flat_scene import CHAIN_COLOUR
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.rover_scene import ABOVE, GRAVITY, PLANE, add_ground, add_rover, add_surfaces, mass_channel
@@ -58,7 +59,7 @@ def grain_curves(run: GrainRun) -> dict[str, Any]:
     if run.model is not None:
         wheels = list(zip(run.model.wheel_names, cycle(WHEEL_COLOURS), strict=False))
         charts += [
-            load_chart("wheel load", run.time, run.wheel_forces[..., 1], 1, wheels),
+            load_chart("wheel load", run, lambda run: run.wheel_forces[..., 1], 1, wheels),
             Chart("sinkage", "mm", 1e3 * run.sinkage, 2, wheels),
         ]
     potential = data["potential_energy"] - data["potential_energy"][0]
@@ -168,15 +169,17 @@ def grain_scene(run: GrainRun, *, follow: bool) -> PageScene:
     else:
         share = rover.model.mass * GRAVITY / max(1, run.wheel_centres.shape[1])
         scene.channels.append(
-            FrameChannel.fine("forces", np.concatenate((run.wheel_centres, run.wheel_forces / share), axis=2))
+            FrameChannel.fine(
+                "forces", np.concatenate((run.wheel_centres, run.mean(lambda run: run.wheel_forces) / share), axis=2)
+            )
         )
         scene.channels.append(mass_channel(rover))
         scene.arrays["trail"] = ("f4", _wheel_paths(run).ravel())
         scene.facts["missing"] = {
-            "marks": "balls keep no marks",
-            "cones": "many balls touch a wheel, each with a normal of its own",
+            "marks": "tyres leave no marks on balls",
+            "cones": "a wheel touches many balls, each with its own normal",
             "slope": "the ground is balls",
-            **dict.fromkeys(("plan", "scan", "laser", "depth"), "runs of balls do not record it"),
+            **dict.fromkeys(("plan", "scan", "laser", "depth"), "not recorded in a run of balls"),
         }
     return scene
 

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from rover_gym.ground import map_of, surfaces_of
 from rover_gym.mechanics import HeightField
 from rover_gym.record.channels import outcome_words
-from rover_gym.rendering.appearance import GROUND_COLOUR_2, HAZE, WHEEL_COLOURS
-from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, moving_mean, panel_contents, with_ghost
+from rover_gym.record.rover_run import moving_mean
+from rover_gym.rendering.appearance import GROUND_COLOUR_2, HAZE, SAND_GROUND, WHEEL_COLOURS
+from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents, with_ghost
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.scenery import (
     MOST_HEIGHTS,
@@ -46,6 +47,7 @@ WHEEL_NAMES = {
     "BR": "back right",
 }
 LONGEST_FACT = 100
+HEAVY = 100.0  # kg: loads of a heavier rover are whole newtons
 BEYOND = 45.0  # m of a map that are shown around the piece with all its detail
 MOST_AROUND, DIP = 10_000, 0.15  # heights of it, and how far it lies under the edge of that piece, of its cells
 PLANE = 400.0  # m, half of the edge of a plane
@@ -122,6 +124,8 @@ def bare_scene(run: RoverRun) -> tuple[PageScene, list[DrawnWheel]]:
     }
     scene = PageScene("rover", seen, float(run.model.clear_radius))
     scene.facts |= {"title": run.title, "rover": True, "shadow": True, "haze": HAZE[1], "far": 2.0 * PLANE}
+    if run.on_sand:
+        scene.facts["soil"] = list(SAND_GROUND)
     wheels = add_rover(scene, run)
     add_ground(scene, run)
     return scene, wheels
@@ -154,7 +158,7 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
     path = trunk_path(run)
     centre = moving_mean(run.time, path, FOLLOW_TIME) if follow else np.tile(path[0], (run.n_frames, 1))
     points, normals, across = feet(run, wheels)
-    forces = world_forces(run, normals, across)
+    forces = world_forces(run.mean(lambda run: run.trajectory["wheel_forces"]), normals, across)
     share = run.model.mass * _gravity(run) / max(1, len(wheels))
     positions, rotations = run.positions, run.rotations
     scene.facts["curves"] = rover_curves(run)
@@ -173,7 +177,7 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
     if told is not None and told.ndim == 1:  # a live drive may change it
         scene.channels.append(FrameChannel.fine("friction", told[:, None, None]))
     elif (friction := _friction(attributes)) is None:
-        sights.missing["cones"] = "this run does not say its friction"
+        sights.missing["cones"] = "this run has no recorded friction coefficient"
     else:
         scene.facts["friction"] = friction
     if "q" in run.trajectory.data:
@@ -186,7 +190,7 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
         rut_map, samples, cells, levels = ruts
         scene.facts["ruts"] = rut_map.header()
         scene.arrays |= {"rut-sample": ("u4", samples), "rut-cell": ("u4", cells), "rut-level": ("u1", levels)}
-    scene.facts["events"] = _events(run)
+    scene.facts["events"] = _events(run.whole)
     return scene
 
 
@@ -225,6 +229,14 @@ def facts(run: RoverRun) -> list[str]:
     return [fact[:LONGEST_FACT] for fact in told if fact is not None]
 
 
+def _depths(run: RoverRun, wheels: list[tuple[str, str]]) -> Chart:
+    """The wheels' gaps, or how deep they are in sand."""
+    gaps = 1e3 * run.trajectory["wheel_gaps"]
+    if run.on_sand:
+        return Chart("sinkage", "mm", -gaps, 2, wheels)
+    return Chart("wheel gap", "mm", gaps, 2, wheels, shown=bool(np.any(gaps > 1.0)))
+
+
 def rover_curves(run: RoverRun) -> dict[str, Any]:
     """Contents of the panel; the first charts are shown at once."""
     data = run.trajectory
@@ -233,20 +245,25 @@ def rover_curves(run: RoverRun) -> dict[str, Any]:
         for name, colour in zip(run.model.wheel_names, cycle(WHEEL_COLOURS), strict=False)
     ]
     blue, orange = WHEEL_COLOURS[0], WHEEL_COLOURS[3]
+    digits = 0 if run.model.mass > HEAVY else 1
     charts = [
-        load_chart("wheel load", run.time, data["wheel_forces"][:, :, 0], 0, wheels),
-        Chart("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2, wheels, shown=bool(np.any(data["wheel_gaps"] > 1e-3))),
+        load_chart("wheel load", run, lambda run: run.trajectory["wheel_forces"][:, :, 0], digits, wheels),
+        _depths(run, wheels),
     ]
     if "v" in data.data:
-        speed = np.linalg.norm(data["v"][:, [0, 2]], axis=1)
-        charts.append(Chart("speed", "m/s", speed[:, None], 3, [("speed", blue)]))
+        speed = run.mean(lambda run: np.linalg.norm(run.trajectory["v"][:, [0, 2]], axis=1, keepdims=True))
+        charts.append(Chart("speed", "m/s", speed, 3, [("speed", blue)]))
     lean = np.degrees(data["q"][:, [3, 5]])
     charts.append(Chart("attitude", "degrees", lean, 2, [("roll", blue), ("pitch", orange)], shown=False))
-    for name, title, unit, digits in (("slip_ratio", "slip", "1", 3), ("motor_energy", "work of the motors", "J", 1)):
-        if name in data.data:
-            charts.append(Chart(title, unit, data[name][:, None], digits, [(title, blue)], shown=False))
+    if "slip_ratio" in data.data:
+        slip = run.mean(lambda run: run.trajectory["slip_ratio"][:, None])
+        charts.append(Chart("slip", "1", slip, 3, [("slip", blue)], shown=False))
+    if "motor_energy" in data.data:
+        work = "work of the motors"
+        charts.append(Chart(work, "J", data["motor_energy"][:, None], 1, [(work, blue)], shown=False))
     if "motor_torques" in data.data:
-        charts.append(Chart("motor torque", "N m", data["motor_torques"], 2, wheels, shown=False))
+        torques = run.mean(lambda run: run.trajectory["motor_torques"])
+        charts.append(Chart("motor torque", "N m", torques, 2, wheels, shown=False))
     return panel_contents(run.title, run.time, charts, facts(run))
 
 

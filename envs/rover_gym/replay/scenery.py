@@ -17,6 +17,7 @@ from rover_gym.rendering.appearance import (
     GROUND_COLOUR,
     GROUND_COLOUR_2,
     ROCK_COLOUR,
+    SAND_GROUND,
     Colour,
     Part,
     part_mesh,
@@ -140,8 +141,14 @@ def surfaces(run: RoverRun) -> list[tuple[Array, list[tuple[Colour, Triangles]]]
             continue
         middles = vertices[triangles][:, :, [0, 2]].mean(axis=1)
         dark = np.floor(middles / SQUARE).sum(axis=1) % 2.0 == 1.0
-        pieces.append((vertices, [(GROUND_COLOUR, triangles[~dark]), (GROUND_COLOUR_2, triangles[dark])]))
+        light, other = ground_colours(run)
+        pieces.append((vertices, [(light, triangles[~dark]), (other, triangles[dark])]))
     return pieces
+
+
+def ground_colours(run: RoverRun) -> tuple[Colour, Colour]:
+    """Colours of the two kinds of squares of the ground."""
+    return SAND_GROUND if run.on_sand else (GROUND_COLOUR, GROUND_COLOUR_2)
 
 
 def ground_tiles(run: RoverRun) -> tuple[Array, Triangles, Triangles] | None:

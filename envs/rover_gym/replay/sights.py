@@ -33,8 +33,8 @@ SENSORS = ("laser", "depth")
 PATH = "plan_path"
 
 NO_SENSOR = "this run has no {}: record with `rover drive --sensor {}`"
-NO_PLAN = "this run's driver told no path: drive with `--policy scan`, `foresight` or `planner`"
-NO_LIVE_PLAN = "this driver tells no path: choose scan, foresight or planner"
+NO_PLAN = "this policy recorded no path: drive with `--policy scan`, `foresight` or `planner`"
+NO_LIVE_PLAN = "this driver plans no path: choose scan, foresight or planner"
 NO_LIVE_SCAN = "this driver has no height scan: choose scan or foresight"
 NO_SCAN = "this run has no height scan: drive with `--policy scan`, or set `height_scan`"
 

@@ -15,8 +15,6 @@ import numpy.typing as npt
 
 from rover_gym.files import written_whole
 from rover_gym.rendering.appearance import (
-    GROUND_COLOUR,
-    GROUND_COLOUR_2,
     ROCK_COLOUR,
     SKY_COLOUR,
     SKY_COLOUR_2,
@@ -27,6 +25,7 @@ from rover_gym.rendering.appearance import (
 from rover_gym.replay.scenery import (
     first_view,
     goal_parts,
+    ground_colours,
     ground_tiles,
     identifiers,
     parts_by_solid,
@@ -111,7 +110,7 @@ def _ground(run: RoverRun) -> Iterator[str]:
         vertices, light, dark = tiles
         points = ", ".join(_numbers(vertex) for vertex in vertices)
         corners = ", ".join(f"{a} {b} {c} -1" for a, b, c in np.vstack((light, dark)))
-        colours = f"{_numbers(GROUND_COLOUR)}, {_numbers(GROUND_COLOUR_2)}"
+        colours = ", ".join(_numbers(colour) for colour in ground_colours(run))
         indices = " ".join(["0"] * len(light) + ["1"] * len(dark))
         yield (
             "DEF Ground Shape { appearance Appearance { material Material { } } geometry IndexedFaceSet { solid FALSE"

@@ -102,12 +102,12 @@ def marks(run: RoverRun, wheels: list[DrawnWheel], points: Array) -> npt.NDArray
     return result
 
 
-def world_forces(run: RoverRun, normals: Array, across: Array) -> Array:
-    """(n, n_wheels, 3) forces of the ground on the wheels in the world frame, N, from those along n, t and b."""
+def world_forces(forces: Array, normals: Array, across: Array) -> Array:
+    """(n, n_wheels, 3) forces of the ground on the wheels in the world frame, N, from `forces` along n, t and b."""
     rolling = np.cross(normals, across)
     rolling /= np.maximum(np.linalg.norm(rolling, axis=-1, keepdims=True), 1e-9)
     axes = np.stack((normals, rolling, np.cross(rolling, normals)), axis=-2)
-    result: Array = np.einsum("nwk,nwki->nwi", run.trajectory["wheel_forces"], axes)
+    result: Array = np.einsum("nwk,nwki->nwi", forces, axes)
     return result
 
 
@@ -156,9 +156,9 @@ def rut_edits(
     Returns:
         The map, and of each cell that becomes deeper the sample, the cell and the level, in order of the samples.
     """
-    sand, scene = sand_of(run.terrain), run.trajectory.attributes.get("scene", {})
-    if sand is None and scene.get("terrain") != "sand":
+    if not run.on_sand:
         return None
+    sand = sand_of(run.terrain)
     size = RUT_CELL if sand is None else sand.rut_cell
     surface = surface_heights(run.terrain, points[..., [0, 2]].reshape(-1, 2)).reshape(points.shape[:2])
     sinkage = np.nan_to_num(surface - points[..., 1])

@@ -76,10 +76,11 @@ class Curves {
     const sorted = Float64Array.from(known).sort();
     const share = Math.max(0.5, Math.min(0.95, 1 - (1.5 * chart.window) / end)); // of the values that no impact touches
     const bulk = sorted[Math.floor(share * (sorted.length - 1))] ?? 0;
-    if (bulk > 0 && high > 4 * bulk) high = 1.5 * bulk;
+    if (chart.cut && bulk > 0 && high > 4 * bulk) high = 1.5 * bulk;
     const y = (value) => BOX.top + ((high - Math.min(value, high)) / (high - low)) * (BOX.height - BOX.top - BOX.bottom);
 
     add(place, "h2", {}, `${chart.title} (${chart.unit})`);
+    if (peak > high) add(place, "p", { class: "peak" }, `beyond the scale: peak ${Number(peak.toPrecision(3))} ${chart.unit}`);
     const svg = add(place, "svg", { viewBox: `0 0 ${BOX.width} ${BOX.height}` });
     for (const value of ticks(low, high)) {
       add(svg, "line", { class: "grid", x1: BOX.left, x2: BOX.width - BOX.right, y1: y(value), y2: y(value) });
@@ -92,10 +93,6 @@ class Curves {
     add(svg, "text", { x: BOX.width / 2, y: BOX.height - 4, "text-anchor": "middle" }, "time (s)");
     chart.values.forEach((values, k) => add(svg, "path", { class: chart.series[k].ghost ? "curve ghost" : "curve",
       stroke: chart.series[k].colour, d: this.path(values, y) }));
-    if (peak > high) {
-      const at = { class: "peak", x: BOX.width - BOX.right - 2, y: BOX.top + 10, "text-anchor": "end" };
-      add(svg, "text", at, `cut off, peak ${Number(peak.toPrecision(3))} ${chart.unit}`);
-    }
     const cursor = add(svg, "line", { class: "cursor", y1: BOX.top, y2: BOX.height - BOX.bottom });
     const readings = this.legend(place, chart);
     svg.addEventListener("click", (event) => {

@@ -52,7 +52,7 @@
       if (message.state) show(message.state);
     });
     socket.addEventListener("close", () => {
-      part("clock").textContent = "the drive is gone; trying to find it again";
+      part("clock").textContent = "connection lost, reconnecting";
       setTimeout(connect, 1000);
     });
   };
@@ -71,7 +71,8 @@
     const head = new DataView(message);
     const [kind, scene, time] = [head.getUint32(0, true), head.getUint32(4, true), head.getFloat64(8, true)];
     if (kind === SCENE) {
-      stage.setScene(openScene(new Uint8Array(message, HEAD)), number >= 0);
+      const opened = openScene(new Uint8Array(message, HEAD));
+      stage.setScene(opened, number >= 0 && opened.reach === stage.scene.reach); // a rover of another size is fitted anew
       number = scene;
       before = now = null;
     } else if (scene === number) {
@@ -125,7 +126,7 @@
   addEventListener("gamepaddisconnected", (event) => {
     if (event.gamepad.index !== pad) return;
     pad = null;
-    part("gamepad").textContent = "gamepad gone";
+    part("gamepad").textContent = "gamepad disconnected";
     drive();
   });
   const beyond = (value) => (Math.abs(value) < DEAD ? 0 : value);
@@ -212,6 +213,7 @@
   let heard = -1;
   const show = (now) => {
     state = now;
+    document.title = part("name").textContent = `${now.scene.model}, driven by ${now.scene.driver}`;
     const pace = now.paused ? "paused" : now.pace === null ? "" : `${now.pace.toFixed(2)} x real time`;
     part("clock").textContent =
       `${now.time.toFixed(2)} s, ${now.speed?.toFixed(2)} m/s, goal ${now.distance?.toFixed(1)} m, ` +
@@ -249,7 +251,7 @@
       if (now.wheel === "elsewhere") {
         const take = document.createElement("button");
         take.textContent = "take the wheel";
-        node.append("Another page is at the wheel. ", take);
+        node.append("Another page drives. ", take);
       }
       for (const control of document.querySelectorAll("#panel .row button, #panel input, #panel select, #bar button:not(#dark, #help)")) {
         control.disabled = now.wheel === "elsewhere";
@@ -261,8 +263,8 @@
   const charts = [
     { title: "wheel load (N)", of: (sample) => sample.loads, names: (sample) => sample.wheels },
     { title: "slip (1)", of: (sample) => [sample.slip], top: 0.2 },
-    { title: "energy of the motors (J)", of: (sample) => [sample.energy] },
-    { title: "solver's iterations a period (1)", of: (sample) => [sample.iterations], top: 10 },
+    { title: "work of the motors (J)", of: (sample) => [sample.energy] },
+    { title: "solver iterations per period (1)", of: (sample) => [sample.iterations], top: 10 },
   ];
   for (const chart of charts) {
     const title = part("charts").appendChild(document.createElement("h2"));

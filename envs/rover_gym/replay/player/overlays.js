@@ -207,7 +207,7 @@ class Overlays {
     const all = [["marks", "m", this.bands && !balls], ["trails", "v", this.bands], ["forces", "f", this.arrows || (balls && this.chains)],
       ...this.sights.offers(),
       ["loads", "l", this.arrows], ["slope", "h", scene.rover && !balls], ["spheres", "k", rocks.children.length]];
-    const reason = (name) => scene.missing?.[name] ?? (name === "spheres" ? "no rocks lie here" : "this run does not hold it");
+    const reason = (name) => scene.missing?.[name] ?? (name === "spheres" ? "there are no rocks" : "not recorded in this run");
     return all.filter(([, , there]) => there || scene.rover).map(([name, key, there]) => [name, key, there ? "" : reason(name)]);
   }
 
@@ -228,8 +228,9 @@ class Overlays {
       ({ foot, force: vector.clone(), normal: new THREE.Vector3(axis(i, 0), axis(i, 1), axis(i, 2)).normalize() }));
     this.sights.show({ before, after, share }, contacts);
     this.tyres.forEach((meshes, i) => this.colour(meshes, on.has("loads") ? 0.5 * forces[i].vector.length() : null));
-    for (const { vector } of forces) vector.multiplyScalar(ARROW * scene.reach);
-    this.arrows.draw(on.has("forces") ? forces : [], scene.reach);
+    const size = scene.arrow ?? scene.reach;
+    for (const { vector } of forces) vector.multiplyScalar(ARROW * size);
+    this.arrows.draw(on.has("forces") ? forces : [], size);
   }
 
   // Colours a wheel by its load in mean shares, from blue at none over yellow to red at 2; null takes the colour away.

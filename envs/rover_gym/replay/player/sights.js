@@ -110,15 +110,19 @@ class Plan {
 }
 
 // Cones of the forces that friction allows, one at the foot of each wheel that bears something: orange where it slides.
+// They are drawn by their edges and a faint surface, which hides nothing behind them.
 class Cones {
   constructor(view, count) {
-    const cone = new THREE.ConeGeometry(1, 1, 24, 1, true).rotateX(Math.PI).translate(0, 0.5, 0);
-    const material = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.35, side: THREE.DoubleSide, depthWrite: false, fog: false });
-    this.mesh = new THREE.InstancedMesh(cone, material, count);
-    this.mesh.setColorAt(0, new THREE.Color());
-    this.mesh.frustumCulled = false;
-    this.mesh.renderOrder = 3;
-    view.world.add(this.mesh);
+    const paint = { transparent: true, side: THREE.DoubleSide, depthWrite: false, fog: false };
+    this.meshes = [[24, { opacity: 0.1 }], [12, { opacity: 0.75, wireframe: true, depthTest: false }]].map(([sides, more], i) => {
+      const cone = new THREE.ConeGeometry(1, 1, sides, 1, true).rotateX(Math.PI).translate(0, 0.5, 0);
+      const mesh = new THREE.InstancedMesh(cone, new THREE.MeshBasicMaterial({ ...paint, ...more }), count);
+      mesh.setColorAt(0, new THREE.Color());
+      mesh.frustumCulled = false;
+      mesh.renderOrder = 3 + i;
+      view.world.add(mesh);
+      return mesh;
+    });
   }
 
   show(visible, contacts, friction, scale) {
@@ -132,12 +136,18 @@ class Cones {
       const height = Math.min(load, LONGEST) * scale;
       turn.setFromUnitVectors(up, normal);
       matrix.compose(foot, turn, new THREE.Vector3(friction * height, height, friction * height));
-      this.mesh.setMatrixAt(shown, matrix);
-      this.mesh.setColorAt(shown++, colour.set(along > SLIDES * friction * load ? 0xff8c1a : 0x3d7bff));
+      colour.set(along > SLIDES * friction * load ? 0xff8c1a : 0x3d7bff);
+      for (const mesh of this.meshes) {
+        mesh.setMatrixAt(shown, matrix);
+        mesh.setColorAt(shown, colour);
+      }
+      shown++;
     }
-    this.mesh.count = shown;
-    this.mesh.visible = shown > 0;
-    this.mesh.instanceMatrix.needsUpdate = this.mesh.instanceColor.needsUpdate = true;
+    for (const mesh of this.meshes) {
+      mesh.count = shown;
+      mesh.visible = shown > 0;
+      mesh.instanceMatrix.needsUpdate = mesh.instanceColor.needsUpdate = true;
+    }
   }
 }
 
@@ -231,7 +241,7 @@ class Sights {
     const { on, scene, frames } = this.view;
     const { reach } = scene;
     const friction = before.friction?.value(0, 0) ?? scene.friction; // a live drive may change it
-    this.cones?.show(on.has("cones"), contacts, friction, ARROW * reach);
+    this.cones?.show(on.has("cones"), contacts, friction, ARROW * (scene.arrow ?? reach));
     const trunk = frames[0];
     const feet = contacts.filter(({ force }) => force.length() > BEARS).map(({ foot }) => foot);
     if (this.mass) {

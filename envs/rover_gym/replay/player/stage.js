@@ -3,6 +3,15 @@
 
 const part = (name) => document.getElementById(name);
 
+// What the picture's buttons do, for tooltips and help.
+const TELLS = {
+  orbit: "turn about what moves", chase: "follow from behind", top: "look from above", wheel: "look at a wheel; again: the next",
+  mast: "look from the mast", marks: "tyre marks", trails: "paths of the wheels", forces: "contact forces", cones: "friction cones",
+  mass: "mass centre and support", plan: "planned path", scan: "height scan", laser: "laser", depth: "depth camera",
+  loads: "loads as colours", slope: "slope as colours", spheres: "rocks as simulated spheres",
+};
+const TOUCH = matchMedia("(pointer: coarse)").matches;
+
 class Stage {
   constructor() {
     this.canvas = document.querySelector("#root canvas");
@@ -17,13 +26,32 @@ class Stage {
       this.stale = true;
       event.target.blur();
     });
-    part("help").addEventListener("click", () => part("keys").toggleAttribute("hidden"));
+    part("help").addEventListener("click", () => this.help());
+    window.addEventListener("keydown", (event) => event.key === "Escape" && !part("keys").hidden && this.help(false));
+    part("help").title = TOUCH ? "help" : "help (?)";
+    part("dark").title = TOUCH ? "dark mode" : "dark mode (N)";
     this.setDark(matchMedia("(prefers-color-scheme: dark)").matches);
+  }
+
+  // Opens or closes the help: on a touch screen the gestures, else the keys of what this scene can show.
+  help(open = part("keys").hidden) {
+    const box = part("keys");
+    for (const node of box.querySelectorAll("[data-for]")) node.hidden = (node.dataset.for === "touch") !== TOUCH;
+    const entries = !this.scene ? [] : [...this.eye.presets().map((name, i) => [String(i + 1), name]),
+      ...this.view.overlays.offers().filter(([, , reason]) => !reason).map(([name, key]) => [key, name])];
+    box.querySelector(".picture").replaceChildren(...entries.flatMap(([key, name], i) => {
+      const cap = document.createElement("kbd");
+      cap.textContent = key.toUpperCase();
+      return [i ? " · " : "", cap, ` ${TELLS[name]}`];
+    }));
+    box.hidden = !open;
+    if (open) this.say("");
   }
 
   // Shows a scene; `keep` leaves the camera as it is.
   setScene(scene, keep = false) {
     this.scene = scene;
+    if (!keep) for (const name of scene.on ?? []) this.view.on.add(name);
     this.view.setScene(scene);
     this.eye.start(scene, keep);
     this.offer();
@@ -45,7 +73,7 @@ class Stage {
     button.type = "button";
     button.textContent = name;
     button.dataset.name = name;
-    button.title = reason || `key ${key}`;
+    button.title = reason || (TOUCH ? TELLS[name] : `${TELLS[name]} (${key.toUpperCase()})`);
     button.disabled = reason !== "";
     button.addEventListener("click", () => {
       act();
@@ -86,8 +114,8 @@ class Stage {
   key(event) {
     const number = Number(event.key);
     if (number >= 1 && number <= this.eye.presets().length) this.choose(this.eye.presets()[number - 1]);
-    else if (event.key === "n") this.setDark(!this.view.dark);
-    else if (event.key === "?") part("keys").toggleAttribute("hidden");
+    else if (event.key.toLowerCase() === "n") this.setDark(!this.view.dark);
+    else if (event.key === "?") this.help();
     else {
       const offer = this.view.overlays?.offers().find(([, key]) => key === event.key.toLowerCase());
       if (!offer) return false;
@@ -110,6 +138,7 @@ class Stage {
     this.canvas.dataset.script = this.spent.slice().sort((a, b) => a - b)[this.spent.length >> 1].toFixed(2);
     const { geometries, textures } = this.view.renderer.info.memory;
     this.canvas.dataset.held = geometries + textures;
+    this.canvas.dataset.distance = this.eye.distance.toFixed(3);
     this.canvas.dataset.drawn = Number(this.canvas.dataset.drawn || 0) + 1;
   }
 
