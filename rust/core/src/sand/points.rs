@@ -7,7 +7,8 @@
 
 use nalgebra::Vector3;
 
-use super::soil::{Law, Resistive, Soil};
+use super::bekker::FADE;
+use super::soil::{Law, Soil};
 use super::wheel::{Gauss, Ring, Rules, SandWheel, Skin};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 
@@ -30,10 +31,11 @@ pub(super) struct Immersed<'a> {
     pub dry: f64,
 }
 
-/// Sizes of what the sand remembers: of the shift and of the turn, and of the shift in the wheel's
+/// Sizes of what the sand remembers: of all, of the shift and of the turn, and of the shift in the wheel's
 /// plane and the turn out of it.
 #[derive(Clone, Copy)]
 pub(super) struct Motion {
+    stirred: f64,
     size: f64,
     spin: f64,
     speed: f64,
@@ -87,10 +89,23 @@ pub(super) struct Feed<'a> {
     taken: usize,
 }
 
+/// Part of the size of a memory that counts as speed where the wheel spins without travel: the
+/// direction of its motion has no jump there.
+const SPINNING: f64 = 0.1;
+
 impl Motion {
-    /// Of a shift and a turn.
-    pub fn of(shift: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
+    /// Speed in the wheel's plane with a part of the size of the memory ([`Setting::pace`]).
+    ///
+    /// [`Setting::pace`]: super::piece::Setting::pace
+    pub fn pace(&self) -> f64 {
+        let spin = SPINNING * self.stirred;
+        (self.speed * self.speed + spin * spin).sqrt()
+    }
+
+    /// Of a shift and a turn, which make a memory of a size.
+    pub fn of(shift: &Vector3<f64>, turn: &Vector3<f64>, stirred: f64) -> Self {
         Self {
+            stirred,
             size: shift.norm(),
             spin: turn.norm(),
             speed: (shift.x * shift.x + shift.y * shift.y).sqrt(),
@@ -249,8 +264,14 @@ impl Arcs {
         let end = quarter(cos, one);
         let whole = [-end, end];
         let [from, to] = match &wheel.soil.law {
-            Law::Resistive(sand) => rings.pushing(wheel, sand, whole),
-            Law::Bekker(_) => whole,
+            Law::Resistive(sand) => {
+                let most = sand.flow.grip * sand.flow.width;
+                rings.pushing(wheel, |largest| largest * radius.like(most), whole)
+            }
+            Law::Bekker(_) => {
+                let most = radius.like(0.5 * FADE * wheel.motion.pace());
+                rings.pushing(wheel, |_| most, whole)
+            }
         };
         T::select(is_clear, zero, from).store(&mut self.from[lanes.clone()]);
         T::select(is_clear, zero, to).store(&mut self.to[lanes.clone()]);
@@ -268,9 +289,9 @@ struct LaneRings<T> {
 
 impl<T: Lane> LaneRings<T> {
     /// The part of an arc up to `tan(θ/4) = end` on both sides of its lowest point on which the
-    /// surface may push: `x·n > −B`, where B is the most that leaves a stress.
+    /// surface may push: `x·n > −B`, where B is the most that leaves a stress; by the largest |x|.
     #[inline(always)]
-    fn pushing(&self, wheel: &Immersed<'_>, sand: &Resistive, whole: [T; 2]) -> [T; 2] {
+    fn pushing(&self, wheel: &Immersed<'_>, most: impl Fn(T) -> T, whole: [T; 2]) -> [T; 2] {
         let number = |value: f64| self.radius.like(value);
         let (zero, one) = (number(0.0), number(1.0));
         let Motion {
@@ -278,13 +299,13 @@ impl<T: Lane> LaneRings<T> {
             spin,
             speed,
             tilt,
+            ..
         } = wheel.motion;
         let reach = self.radius + self.offset.abs();
         let largest = number(size) + number(spin) * reach;
         let sideways = number(wheel.shift.z.abs()) + number(tilt) * self.radius;
-        let bound = number(sand.flow.grip * sand.flow.width) * largest
-            + self.n_a.abs() * sideways
-            + self.n_r * number(tilt) * self.offset.abs();
+        let bound =
+            most(largest) + self.n_a.abs() * sideways + self.n_r * number(tilt) * self.offset.abs();
         let normal = self.n_r * number(speed);
         let all_push = bound.ge(normal);
         if all_push.all() {
