@@ -41,7 +41,9 @@ def test_a_cost_is_read_off_at_or_below_the_error_and_straight_in_the_logarithms
     assert min(costs) * 0.5 < float(value("cost flat_drive 10mm rover-gym, linearised")) <= min(costs)
 
 
-@pytest.mark.parametrize("key", ["cost flat_drive 10mm ODE, 1", "cost flat_drive 1mm MuJoCo, defaults", "cell sand; x; y"])
+@pytest.mark.parametrize(
+    "key", ["cost flat_drive 10mm ODE, 1", "cost flat_drive 1mm MuJoCo, defaults", "cell sand; x; y"]
+)
 def test_a_number_that_no_file_has_is_refused(key: str) -> None:
     with pytest.raises(LookupError):
         value(key)
