@@ -12,7 +12,8 @@ A page marks a number with the key that says where it is from, and a table with 
 | `rollout ENGINE ROW` | us a step of `rollout.json` |
 | `cell PAGE; ROW; COLUMN` | first number of a cell of a table that a command writes; ROW: its first cells, by slashes |
 
-A cost at an error is read off as `comparison.tables.cost_of` says. `--check` changes nothing and fails if a page differs.
+A cost at an error is read off as `comparison.tables.cost_of` says. `--check` changes nothing, and fails if a page
+differs.
 """
 
 import argparse
@@ -99,9 +100,23 @@ def table(key: str) -> str:
         return short_reach(data("chart.json"))
     if key == "presets":
         return short_table(data("presets.json"))
+    if key == "rollout":
+        return rollout_table()
     if key == "sand":
         return sand_table()
     raise LookupError(f"no table {key}")
+
+
+def rollout_table() -> str:
+    """Microseconds a step of rovers on grounds, a line a rover and a kind of ground."""
+    engines = ("alone", "batch", "MuJoCo", "elliptic")
+    lines = [
+        "| µs a step of 5 ms | alone | in a batch | MuJoCo, defaults | MuJoCo, elliptic cone |",
+        "|---" * (1 + len(engines)) + "|",
+    ]
+    rows = data("rollout.json")["rows"]
+    lines += [f"| {row['row']} | {' | '.join(number(row[engine]) for engine in engines)} |" for row in rows]
+    return "\n".join(lines)
 
 
 def sand_table() -> str:

@@ -1,4 +1,4 @@
-"""Any rover on any ground beside MuJoCo: `python -m comparison.rollout [--row TEXT] [--robot FILE] [--seed N] [--save]`.
+"""Any rover on any ground beside MuJoCo: `python -m comparison.rollout [--row TEXT] [--robot FILE] [--save]`.
 
 The first table of `make bench`: microseconds of a step of 5 ms, of one rover alone, of one rover of a batch, and of
 MuJoCo's `rollout` of the same rovers, with the same commands, in the same round. Torques and set-points are drawn anew
@@ -281,8 +281,8 @@ def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list
 def rim(wheel: Mapping[str, Any], radius: float, *, is_flat: bool) -> tuple[str, str]:
     """Type and size of a wheel in MuJoCo: the cheapest shape that moves as the wheel does.
 
-    A thin disc and a wheel whose edges are fully rounded touch a plane at the lowest point of their middle, as long as the
-    axle is parallel to it: so does a sphere, in one contact and in half the time. Elsewhere a disc is a cylinder 4 mm wide.
+    A thin disc and a wheel with fully rounded edges touch a plane at the lowest point of their middle, as long as the
+    axle is parallel to it: so does a sphere, in one contact and half the time. Elsewhere a disc is a cylinder 4 mm wide.
     """
     half = 0.5 * (wheel.get("width") or 0.0)
     is_round = (wheel.get("rounding") or 0.0) >= half

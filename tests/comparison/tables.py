@@ -20,8 +20,8 @@ SHORT = {
 SHORT_TARGETS = (0.03, 0.01, 0.003, 0.001)
 #: How a cost at an error is read off, for readers.
 READ_OFF = (
-    "The cost at an error is the least at which the measured curve is at or below that error; between two measured steps"
-    " the curve is straight in the logarithms of cost and error."
+    "The cost at an error is the least at which the measured curve is at or below that error;\nbetween two measured"
+    " steps the curve is straight in the logarithms of cost and error."
 )
 
 
