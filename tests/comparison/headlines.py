@@ -24,12 +24,21 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from comparison import gpu_chart
 from comparison.presets import short_table
 from comparison.tables import cost_of, curve, number, short_reach
 
 ROOT = Path(__file__).parents[2]
 FILES = ROOT / "docs" / "comparison"
-PAGES = ("README.md", "docs/comparison.md", "docs/sand.md", "docs/validation.md", "docs/vector.md", "paper/paper.md")
+PAGES = (
+    "README.md",
+    "docs/comparison.md",
+    "docs/many-rovers.md",
+    "docs/sand.md",
+    "docs/validation.md",
+    "docs/vector.md",
+    "paper/paper.md",
+)
 #: Pages of tables, by their names in keys.
 TABLES = {
     "comparison": "docs/tables/comparison.md",
@@ -100,6 +109,8 @@ def table(key: str) -> str:
         return short_reach(data("chart.json"))
     if key == "presets":
         return short_table(data("presets.json"))
+    if key == "gpu":
+        return gpu_chart.table(data("gpu.json"))
     if key == "rollout":
         return rollout_table()
     if key == "sand":
