@@ -50,9 +50,8 @@ def measure(hardware: str) -> list[dict[str, Any]]:
         for rovers in BATCHES:
             rate = warp_peer.throughput(scene, rovers, options, limits)
             rows.append(row("MuJoCo Warp", settings, hardware, rovers, rate, error, source))
-    ours = {
-        p["step"]: p for p in json.loads((CHART / "chart.json").read_text(encoding="utf-8"))["points"] if is_ours(p)
-    }
+    points = json.loads((CHART / "chart.json").read_text(encoding="utf-8"))["points"]
+    ours = {p["step"]: p for p in points if is_ours(p)}
     threads = os.cpu_count() or 1
     for rovers in BATCHES[:2]:
         rate = measure_exploring(rovers, threads, torque=TORQUE).steps_per_second

@@ -282,7 +282,7 @@ def rim(wheel: Mapping[str, Any], radius: float, *, is_flat: bool) -> tuple[str,
     """Type and size of a wheel in MuJoCo: the cheapest shape that moves as the wheel does.
 
     A thin disc and a wheel with fully rounded edges touch a plane at the lowest point of their middle, as long as the
-    axle is parallel to it: so does a sphere, in one contact and half the time. Elsewhere a disc is a cylinder 4 mm wide.
+    axle is parallel to it: so does a sphere, in half the time. Elsewhere a disc is a cylinder 4 mm wide.
     """
     half = 0.5 * (wheel.get("width") or 0.0)
     is_round = (wheel.get("rounding") or 0.0) >= half

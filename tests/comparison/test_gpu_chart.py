@@ -13,8 +13,9 @@ def test_every_row_names_engine_hardware_error_and_source() -> None:
     rows = json.loads(gpu_chart.FILE.read_text(encoding="utf-8"))["rows"]
     assert {row["engine"] for row in rows} == set(gpu_chart.COLOURS)
     for row in rows:
-        assert row["hardware"] and row["settings"] and row["source"]
-        assert row["rovers"] >= 1 and row["rover_steps_per_s"] > 1e3 and 0.0 < row["rms_error_m"] < 1.0
+        assert all(row[name] for name in ("hardware", "settings", "source"))
+        assert min(row["rovers"], row["rover_steps_per_s"] / 1e3) >= 1.0
+        assert 0.0 < row["rms_error_m"] < 1.0
 
 
 def test_our_error_is_that_of_the_chart() -> None:
@@ -22,7 +23,7 @@ def test_our_error_is_that_of_the_chart() -> None:
     points = json.loads((gpu_chart.CHART / "chart.json").read_text(encoding="utf-8"))["points"]
     (point,) = (p for p in points if gpu_chart.is_ours(p) and p["step"] == gpu_chart.TIME_STEP)
     ours = {row["rms_error_m"] for row in data["rows"] if row["engine"] == "rover-gym"}
-    assert ours == {pytest.approx(point["error"], rel=0.01)}
+    assert max(ours) == min(ours) == pytest.approx(point["error"], rel=0.01)
 
 
 def test_without_a_graphics_card_it_says_so_and_draws(
