@@ -136,7 +136,7 @@ impl Bekker {
         for (k, tangent) in slid.tangents.into_iter().enumerate() {
             let slope = direction * (unit[k] * excess) + tangent * turning;
             found.by_way[k] = -(slope * share);
-            found.by_depth = found.by_depth + found.by_way[k] * slid.by_depth[k];
+            found.by_depth += found.by_way[k] * slid.by_depth[k];
         }
         let by_gate = T::select(is_partial & is_felt, per_fade, zero);
         found.by_x = [n.x, n.y, n.z].map(|part| value * (part * by_gate));

@@ -30,8 +30,8 @@ pub(super) struct Immersed<'a> {
     pub dry: f64,
 }
 
-/// Sizes of what the sand remembers: of all, of the shift and of the turn, and of the shift in the wheel's
-/// plane and the turn out of it.
+/// Sizes of what the sand remembers: of all, of the shift and of the turn, and of the shift in the
+/// wheel's plane and the turn out of it.
 #[derive(Clone, Copy)]
 pub(super) struct Motion {
     stirred: f64,

@@ -152,16 +152,6 @@ impl Rolling {
         let d_cos = entry * (at.end - cos);
         let per = number(self.per_turn);
         let (ways, radius) = ([d_theta * per, d_sin * per, d_cos * per], at.radius);
-        let by_memory = by_memory(ways, at);
-        let six = [self.shift.x, self.shift.y, self.shift.z]
-            .into_iter()
-            .chain([self.turn.x, self.turn.y, self.turn.z]);
-        let mut way = [zero; 2];
-        for (column, x) in by_memory.iter().zip(six) {
-            for (own, slope) in way.iter_mut().zip(column) {
-                *own += *slope * number(x);
-            }
-        }
         let combined = |[d_theta, d_sin, d_cos]: [T; 3]| {
             let A = number(self.shift.x) + number(self.turn.y) * o;
             let B = number(self.shift.y) - number(self.turn.x) * o;
@@ -170,13 +160,14 @@ impl Rolling {
             let along = number(self.turn.z) * radius * d_theta + B * d_sin + A * d_cos;
             [along, c * across - a * (A * d_sin - B * d_cos)]
         };
+        let way = combined(ways);
         let turning = number(self.entry_by_turn) * per;
         let by_entry = combined([-theta * turning, -sin * turning, (at.end - cos) * turning]);
         let mut slid = Slid {
             tangents: [Vec3::new(-sin, cos, zero), Vec3::new(-a * cos, -a * sin, c)],
             way,
             by_depth: [zero; 2],
-            by_memory,
+            by_memory: by_memory(ways, at),
             deeper: self.deeper(at, theta, theta_end),
         };
         for k in 0..2 {
@@ -186,9 +177,7 @@ impl Rolling {
         slid.by_depth = combined([turned, at.end * turned, -(entry * sin_end * turned)]);
         slid
     }
-}
 
-impl Rolling {
     /// How much deeper than points the places are whose pressure acts on them: behind the angle of
     /// greatest stress, those as far before it, relative to both ends.
     #[inline(always)]
