@@ -20,7 +20,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart chart-gpu stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -150,6 +150,11 @@ chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against
 	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
 	$(COMPARE).exploring_chart $(filter --quick,$(CHART))
 	$(COMPARE).surface_scenes $(filter --quick,$(CHART))
+	$(if $(filter --quick,$(CHART)),,$(COMPARE).headlines)
+
+chart-gpu: $(STAMPS)/test $(MODULE) ## rovers a second and error on a graphics card, where there is one: docs/comparison/gpu.json, docs/many-rovers.md
+	PYTHONPATH=tests $(BIN)/python -m comparison.gpu_chart
+	$(COMPARE).headlines
 
 stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/tables/stability.md (5 minutes)
 	$(COMPARE).stability

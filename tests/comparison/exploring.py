@@ -76,7 +76,7 @@ def scene(drive: Drive, ground: str, torque: float, periods: int = PERIODS) -> R
     """A drive with torques of up to `torque` (N m) on one of the `GROUNDS`, cut after so many commands."""
     has_rocks, radius, width, rounding = GROUNDS[ground]
     model = RoverModel() if radius is None else RoverModel().replace(contact_radius=radius)
-    machine = model.replace(motor=None).to_dict()
+    machine = model.replace(wheel_stiffness=0.0, motor=None).to_dict()  # the references are rigid
     if width > 0.0:
         machine["wheels"] = [wheel | {"width": width, "rounding": rounding} for wheel in machine["wheels"]]
     limit = model.steering_limit

@@ -93,6 +93,22 @@ def table(data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def short_table(data: dict[str, Any]) -> str:
+    """Markdown: the medians of errors and costs alone, for the manual."""
+    lines = ["| scene | " + " | ".join(f"`{name}`" for name in NAMES) + " |", "|---" * (1 + len(NAMES)) + "|"]
+    for ensemble in ensembles():
+        for window in ensemble.windows:
+            own = {r["accuracy"]: r for r in data["rows"] if (r["scene"], r["window"]) == (ensemble.name, window)}
+            cells = []
+            for name in NAMES:
+                median, cost = own[name]["median"], own[name]["cpu_ms_per_s"]
+                creep = f"{median:.1e} m/s" if median > ROUNDING else f"below {ROUNDING:g} m/s"
+                error = f"{1e3 * median:.2g} mm" if ensemble.has_reference else creep
+                cells.append(f"{error}, {cost:.2g} ms/s")
+            lines.append(f"| {ensemble.title}: {window} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Measures and fills the table."""
     parser = argparse.ArgumentParser(description="The named accuracies over ensembles of drives.")

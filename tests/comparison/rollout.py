@@ -1,19 +1,24 @@
-"""Any rover on any ground beside MuJoCo: `python -m comparison.rollout [--row TEXT] [--robot FILE] [--seed N]`.
+"""Any rover on any ground beside MuJoCo: `python -m comparison.rollout [--row TEXT] [--robot FILE] [--save]`.
 
 The first table of `make bench`: microseconds of a step of 5 ms, of one rover alone, of one rover of a batch, and of
 MuJoCo's `rollout` of the same rovers, with the same commands, in the same round. Torques and set-points are drawn anew
 in every run, from a seed that is printed. Every rover of a batch has its own rocks, or its own place on a map. MuJoCo
 gets the model as `RoverModel.to_mjcf` writes it, with position servos on the steered joints; the times that it needs
-are those of its C code, as ours are those of the core.
+are those of its C code, as ours are those of the core. Each wheel has the cheapest shape in MuJoCo that moves the same:
+on a plane a sphere, where the wheel touches it at one point.
+
+`--save` writes `docs/comparison/rollout.json`, from which the manual's table and the paper's figures are made.
 """
 
 import argparse
+import json
 import math
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -25,6 +30,8 @@ from mujoco import rollout
 from rich.console import Console
 
 from comparison.machine import processor
+from comparison.mujoco_rover import HALF_WIDTH
+from comparison.output import CHART
 from comparison.scene import Array
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField
 from rover_gym.mechanics import SimulationBatch
@@ -70,14 +77,18 @@ class Row:
     bodies: bool = False
 
 
-def wide(width: float, rounding: float, **more: float) -> RoverModel:
-    """The built-in rover on wheels of 0.20 m with a width and a rounding, m, 0 for thin discs."""
+def wide(width: float, rounding: float, *, rigid: bool = False) -> RoverModel:
+    """The built-in rover on wheels of 0.20 m with a width and a rounding, m, 0 for thin discs.
+
+    They yield as those of the package do, unless they are rigid.
+    """
     model = RoverModel().replace(contact_radius=0.20, motor=None)
+    if rigid:
+        model = model.replace(wheel_stiffness=0.0)
     if width == 0.0:
         return model
     machine = model.to_dict()
-    tread = {"width": width, "rounding": rounding}
-    machine["wheels"] = [wheel | tread | more for wheel in machine["wheels"]]
+    machine["wheels"] = [wheel | {"width": width, "rounding": rounding} for wheel in machine["wheels"]]
     return RoverModel.from_dict(machine)
 
 
@@ -118,7 +129,7 @@ def rows(robots: list[Path]) -> Iterator[Row]:
     wheels = {
         "thin discs": wide(0.0, 0.0),
         "cylinders": wide(0.15, 0.0),
-        "rigid cylinders": wide(0.15, 0.0, stiffness=0.0),
+        "rigid cylinders": wide(0.15, 0.0, rigid=True),
         "tori": wide(0.15, 0.075),
     }
     for ground, make in grounds.items():
@@ -219,7 +230,7 @@ def in_mujoco(
 
 
 def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list[str]:
-    """The rovers and their grounds as MJCF, z up. Only wheels touch the ground, thin discs as cylinders 4 mm wide.
+    """The rovers and their grounds as MJCF, z up. Only wheels touch the ground, in the shapes of `rim`.
 
     With `bodies` boxes do so, too. A rollout wants equally large models: fields of fewer rocks get some far below.
     """
@@ -245,12 +256,10 @@ def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list
                     body.remove(geom)
                     continue
                 wheel = wheels[str(body.get("name"))]
-                radius, half = float(str(geom.get("size")).split()[0]), 0.5 * (wheel.get("width") or 0.004)
-                geom.set("size", f"{radius!r} {half!r}")
-                if (wheel.get("rounding") or 0.0) >= half:
-                    geom.set("type", "ellipsoid")
-                    geom.set("size", f"{radius!r} {radius!r} {half!r}")
-                geom.attrib |= masks
+                radius = float(str(geom.get("size")).split()[0])
+                is_flat = not isinstance(simulation.terrain, HeightField | SphereField)
+                kind, size = rim(wheel, radius, is_flat=is_flat)
+                geom.attrib |= masks | {"type": kind, "size": size}
         for motor in root.iter("motor"):
             motor.attrib.pop("ctrlrange", None)
         for name, solid in limits.items():
@@ -267,6 +276,21 @@ def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list
         _add_ground(root, simulation.terrain)
         texts.append(ElementTree.tostring(root, encoding="unicode"))
     return texts
+
+
+def rim(wheel: Mapping[str, Any], radius: float, *, is_flat: bool) -> tuple[str, str]:
+    """Type and size of a wheel in MuJoCo: the cheapest shape that moves as the wheel does.
+
+    A thin disc and a wheel with fully rounded edges touch a plane at the lowest point of their middle, as long as the
+    axle is parallel to it: so does a sphere, in half the time. Elsewhere a disc is a cylinder 4 mm wide.
+    """
+    half = 0.5 * (wheel.get("width") or 0.0)
+    is_round = (wheel.get("rounding") or 0.0) >= half
+    if is_flat and is_round:
+        return "sphere", repr(radius)
+    if half > 0.0 and is_round:
+        return "ellipsoid", f"{radius!r} {radius!r} {half!r}"
+    return "cylinder", f"{radius!r} {half or HALF_WIDTH!r}"
 
 
 def _add_ground(root: ElementTree.Element, terrain: Any) -> None:
@@ -345,6 +369,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, help="of commands and grounds; drawn, where not given")
     parser.add_argument("--row", default="", help="only rows with this text in their name")
     parser.add_argument("--robot", type=Path, action="append", default=[], help="a URDF or MJCF, in rows of its own")
+    parser.add_argument("--save", action="store_true", help="write docs/comparison/rollout.json; other rows are kept")
     given = parser.parse_args()
     seed = int(np.random.SeedSequence().entropy % (1 << 32)) if given.seed is None else given.seed
     console = Console(width=160, highlight=False)
@@ -358,6 +383,19 @@ def main() -> None:
             found = measure(row, given.rovers, given.threads, seed)
             times = f"{found['alone']:9.1f}{found['batch']:9.1f}{found['MuJoCo']:9.1f}{found['elliptic']:9.1f}"
             console.print(f"{row.name:<32}{times}{found['general']:9.2%}{found['unsolved']:9.2%}")
+            if given.save:
+                save(row.name, found, {"seed": seed, "rovers": given.rovers, "threads": given.threads})
+
+
+def save(row: str, found: dict[str, float], meta: dict[str, Any]) -> None:
+    """Writes a row of `rollout.json`, with when and where it was measured."""
+    path = CHART / "rollout.json"
+    data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"rows": []}
+    meta |= {"processor": processor(), "date": datetime.now(tz=UTC).date().isoformat(), "mujoco": mujoco.__version__}
+    line = {"row": row, **{name: found[name] for name in ("alone", "batch", *MUJOCO)}, **meta}
+    kept = [other for other in data["rows"] if other["row"] != row]
+    data["rows"] = sorted([*kept, line], key=lambda one: str(one["row"]))
+    path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,21 @@ import numpy as np
 
 MARK = "<!-- tables: made by `make chart`, not by hand -->"
 TARGETS = (0.1, 0.03, 0.01, 0.003, 0.001)  # m
+#: Curves of the short table of the manual, as it names them, and its errors, m.
+SHORT = {
+    "rover-gym": "rover-gym, linearised",
+    "Drake": "Drake, lagged, stiff",
+    "Bullet": "Bullet, 50 iterations",
+    "Pinocchio": "Pinocchio, ADMM in a Python loop",
+    "Siconos": "Siconos, NSGS in a Python loop",
+    "MuJoCo": "MuJoCo, discrete, elliptic",
+}
+SHORT_TARGETS = (0.03, 0.01, 0.003, 0.001)
+#: How a cost at an error is read off, for readers.
+READ_OFF = (
+    "The cost at an error is the least at which the measured curve is at or below that error;\nbetween two measured"
+    " steps the curve is straight in the logarithms of cost and error."
+)
 
 
 def cost_of(points: list[tuple[float, float]], target: float) -> float | None:
@@ -23,6 +38,37 @@ def cost_of(points: list[tuple[float, float]], target: float) -> float | None:
 def number(value: float) -> str:
     """Two digits, or a whole number."""
     return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
+
+
+def curve(data: dict[str, Any], scene: str, name: str) -> list[tuple[float, float]]:
+    """Costs, CPU ms per simulated second, and errors of a curve "engine, variant", from the coarsest step on.
+
+    Raises:
+        LookupError: There is no such curve.
+    """
+    engine, variant = name.split(", ", 1)
+    rows = [p for p in data["points"] if (p["scene"], p["engine"], p["variant"]) == (scene, engine, variant)]
+    rows = sorted((p for p in rows if "error" in p), key=lambda p: -float(p["step"]))
+    if not rows:
+        raise LookupError(f"no curve {name!r} in the scene {scene!r}")
+    return [(p["cpu_ms_per_s"], p["error"]) for p in rows]
+
+
+def short_reach(data: dict[str, Any], scene: str = "flat_drive") -> str:
+    """Cost to reach errors, by the curves of the manual."""
+    lines = [
+        "| CPU ms per simulated second for an error of | "
+        + " | ".join(f"{100 * t:g} cm" for t in SHORT_TARGETS)
+        + " | smallest error |",
+        "|---" * (len(SHORT_TARGETS) + 2) + "|",
+    ]
+    for name in SHORT.values():
+        points = curve(data, scene, name)
+        costs = [cost_of(points, target) for target in SHORT_TARGETS]
+        cells = ["" if cost is None else number(cost) for cost in costs]
+        lines.append(f"| {name} | {' | '.join(cells)} | {number(100.0 * min(error for _, error in points))} cm |")
+    lines.append(f"\n{READ_OFF}")
+    return "\n".join(lines)
 
 
 def reach(data: dict[str, Any], scene: str) -> str:
@@ -70,6 +116,7 @@ def fill(page: Path, data: dict[str, Any]) -> None:
         f"\nMeasured with `make chart` on {meta['processor']}, shared with other work;"
         f" {packages}; Python {meta['python']}.",
     ]
+    parts += [f"\n{READ_OFF}"]
     parts += [f"Left out, not installed: {engine}." for engine in data["missing"]]
     parts += ["\n## Settings\n", settings(data)]
     head = page.read_text(encoding="utf-8").split(MARK)[0]

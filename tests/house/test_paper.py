@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 
 ROOT = Path(__file__).parents[2]
-PAPER = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+PAPER = re.sub(r"<!--.*?-->", "", (ROOT / "paper" / "paper.md").read_text(encoding="utf-8"), flags=re.DOTALL)
 ROWS = re.findall(r"^\| (.+?) \| .+? \| `(.+?)` \| `(.+?)` \|$", PAPER, flags=re.MULTILINE)
 BODY = PAPER.partition("# Reproducing the numbers")[0]
 

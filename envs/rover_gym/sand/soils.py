@@ -41,6 +41,9 @@ RESISTIVE = (
     "mobilisation",
 )
 
+#: Options of Bekker's law, 0 where a soil does not state them.
+BEKKER_OPTIONS = ("stress_angle", "stress_angle_slip", "slip_sinkage")
+
 _OF_LAW = {"resistive": RESISTIVE, "bekker": BEKKER}
 
 
@@ -51,7 +54,8 @@ class Soil:
     Args:
         name: Its name.
         law: `resistive` or `bekker`.
-        numbers: Its numbers by name, in SI units.
+        numbers: Its numbers by name, in SI units. `stress_angle`, `stress_angle_slip` and `slip_sinkage` of the law
+            `bekker` may be missing and are 0 then.
         source: Where they are from.
     """
 
@@ -63,7 +67,9 @@ class Soil:
     def __post_init__(self) -> None:
         if self.law not in _OF_LAW:
             raise OptionError(f"law: must be resistive or bekker, is {self.law!r}")
-        known = (*_OF_LAW[self.law], *SHARED)
+        options = BEKKER_OPTIONS if self.law == "bekker" else ()
+        object.__setattr__(self, "numbers", {**dict.fromkeys(options, 0.0), **self.numbers})
+        known = (*_OF_LAW[self.law], *options, *SHARED)
         for name in self.numbers:
             if name not in known:
                 raise OptionError(f"{name}: no number of the law {self.law}; they are {', '.join(known)}")

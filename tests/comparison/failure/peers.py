@@ -68,7 +68,7 @@ def mass_ratios(variant: Variant) -> Iterator[Finding]:
         ("trunk 100 times heavier", "trunk", 100.0),
         ("wheels 1000 times lighter", "wheel", 1e-3),
     ):
-        machine = RoverModel().replace(motor=None).to_dict()
+        machine = RoverModel().replace(wheel_stiffness=0.0, motor=None).to_dict()
         for solid in machine["solids"]:
             if solid["name"].startswith(part):
                 solid["mass"] *= factor
@@ -96,7 +96,7 @@ def mass_ratios(variant: Variant) -> Iterator[Finding]:
 
 def wheel_spin(variant: Variant) -> Iterator[Finding]:
     """260 N m a wheel for 2.3 s: all slip, v = mu g t = 15.79 m/s."""
-    machine = RoverModel().replace(wheel_torque_limit=1e3, motor=None).to_dict()
+    machine = RoverModel().replace(wheel_torque_limit=1e3, wheel_stiffness=0.0, motor=None).to_dict()
     scene = _flat("spin", machine, 0.35, Phase(2.3, torques=(260.0,) * 6), brake=False)
     runner = _build(variant, scene)
     runner.advance(steps_in(2.3, STEP))
@@ -117,7 +117,10 @@ def drop(variant: Variant) -> Iterator[Finding]:
     """From 2 m: how far the trunk goes below its height at rest, which is how deep the wheels go."""
     depth = 0.0
     for extra in (0.0, 0.004, 0.008):  # the impact falls elsewhere in its step
-        runner = _build(variant, _flat("drop", RoverModel().replace(motor=None).to_dict(), 2.35 + extra, Phase(1.0)))
+        runner = _build(
+            variant,
+            _flat("drop", RoverModel().replace(wheel_stiffness=0.0, motor=None).to_dict(), 2.35 + extra, Phase(1.0)),
+        )
         for _ in range(steps_in(1.0, STEP)):
             runner.advance(1)
             depth = max(depth, 0.35 - float(runner.position()[1]))

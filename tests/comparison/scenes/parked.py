@@ -18,7 +18,7 @@ def scene(degrees: float = 30.0, duration: float = 10.0) -> RoverScene:
     return RoverScene(
         name="parked",
         title=f"parked on {degrees:g} degrees",
-        machine=RoverModel().replace(motor=None).to_dict(),
+        machine=RoverModel().replace(wheel_stiffness=0.0, motor=None).to_dict(),
         q=q,
         phases=(Phase(duration),),
         normal=(-math.sin(a), math.cos(a), 0.0),

@@ -23,7 +23,7 @@ def scene() -> RoverScene:
     return RoverScene(
         name="rocks",
         title="7 s over small rocks",
-        machine=RoverModel().replace(contact_radius=0.20, motor=None).to_dict(),
+        machine=RoverModel().replace(contact_radius=0.20, wheel_stiffness=0.0, motor=None).to_dict(),
         q=q,
         phases=(Phase(1.0), Phase(6.0, torques=(20.0,) * 6)),
         spheres=np.column_stack([field.centres, field.radii]),

@@ -1,0 +1,168 @@
+"""The numbers of README, results and paper, from the files that commands write: `python -m comparison.headlines`.
+
+A page marks a number with the key that says where it is from, and a table with a pair of marks:
+
+    rover-gym needs 0.17<!-- cost flat_drive 10mm rover-gym, linearised --> ms
+    <!-- table reach --> ... <!-- end of table -->
+
+| key | what |
+|---|---|
+| `cost SCENE ERROR CURVE` | CPU ms per simulated second at which a curve of `chart.json` reaches an error |
+| `least SCENE CURVE` | smallest error of the curve, cm |
+| `rollout ENGINE ROW` | us a step of `rollout.json` |
+| `cell PAGE; ROW; COLUMN` | first number of a cell of a table that a command writes; ROW: its first cells, by slashes |
+
+A cost at an error is read off as `comparison.tables.cost_of` says. `--check` changes nothing, and fails if a page
+differs.
+"""
+
+import argparse
+import json
+import re
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from comparison import gpu_chart
+from comparison.presets import short_table
+from comparison.tables import cost_of, curve, number, short_reach
+
+ROOT = Path(__file__).parents[2]
+FILES = ROOT / "docs" / "comparison"
+PAGES = (
+    "README.md",
+    "docs/comparison.md",
+    "docs/many-rovers.md",
+    "docs/sand.md",
+    "docs/validation.md",
+    "docs/vector.md",
+    "paper/paper.md",
+)
+#: Pages of tables, by their names in keys.
+TABLES = {
+    "comparison": "docs/tables/comparison.md",
+    "stability": "docs/tables/stability.md",
+    "validation": "docs/tables/validation.md",
+    "sand": "docs/validation/sand.md",
+}
+VALUE = re.compile(r"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:cost|least|rollout|cell) [^>]*?) -->)")
+TABLE = re.compile(r"(?P<begin><!-- table (?P<key>\w+) -->\n\n).*?(?P<end>\n\n<!-- end of table -->)", flags=re.DOTALL)
+
+
+@cache
+def data(name: str) -> dict[str, Any]:
+    """A JSON file of `docs/comparison/`."""
+    found: dict[str, Any] = json.loads((FILES / name).read_text(encoding="utf-8"))
+    return found
+
+
+def cell(page: str, row: str, column: str) -> str:
+    """The first number of a cell.
+
+    Raises:
+        LookupError: No table of the page has that row and column, or several have.
+    """
+    first = row.split(" / ")
+    found: list[str] = []
+    heads: list[str] = []
+    for line in (ROOT / TABLES[page]).read_text(encoding="utf-8").splitlines():
+        cells = [part.strip() for part in line.strip("|").split("|")] if line.startswith("|") else []
+        if not cells:
+            heads = []
+        elif not heads:
+            heads = cells
+        elif column in heads and cells[: len(first)] == first:
+            found += re.findall(r"-?\d[\d.]*(?:e-?\d+)?", cells[heads.index(column)])[:1]
+    if len(found) != 1:
+        raise LookupError(f"{TABLES[page]}: {len(found)} cells of the row {row!r} and the column {column!r}")
+    return found[0]
+
+
+def value(key: str) -> str:
+    """The number of a key, as a page prints it.
+
+    Raises:
+        LookupError: The files have no such number.
+    """
+    kind, rest = key.split(" ", 1)
+    if kind == "cell":
+        page, row, column = (part.strip() for part in rest.split(";"))
+        return cell(page, row, column)
+    if kind == "rollout":
+        engine, row = rest.split(" ", 1)
+        times = {line["row"]: line for line in data("rollout.json")["rows"]}
+        return number(times[row][engine])
+    scene, *error, name = rest.split(" ", 2 if kind == "cost" else 1)
+    points = curve(data("chart.json"), scene, name)
+    if kind == "least":
+        return number(100.0 * min(error for _, error in points))
+    cost = cost_of(points, float(error[0].removesuffix("mm")) * 1e-3)
+    if cost is None:
+        raise LookupError(f"{key}: the curve does not reach the error")
+    return number(cost)
+
+
+def table(key: str) -> str:
+    """A table of a page."""
+    if key == "reach":
+        return short_reach(data("chart.json"))
+    if key == "presets":
+        return short_table(data("presets.json"))
+    if key == "gpu":
+        return gpu_chart.table(data("gpu.json"))
+    if key == "rollout":
+        return rollout_table()
+    if key == "sand":
+        return sand_table()
+    raise LookupError(f"no table {key}")
+
+
+def rollout_table() -> str:
+    """Microseconds a step of rovers on grounds, a line a rover and a kind of ground."""
+    engines = ("alone", "batch", "MuJoCo", "elliptic")
+    lines = [
+        "| µs a step of 5 ms | alone | in a batch | MuJoCo, defaults | MuJoCo, elliptic cone |",
+        "|---" * (1 + len(engines)) + "|",
+    ]
+    rows = data("rollout.json")["rows"]
+    lines += [f"| {row['row']} | {' | '.join(number(row[engine]) for engine in engines)} |" for row in rows]
+    return "\n".join(lines)
+
+
+def sand_table() -> str:
+    """Errors of the soil of both wheels, of the page that `make validate-sand` writes."""
+    columns = ("pull, N", "across, N", "sinkage, mm")
+    lines = [f"| root mean square error | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|"]
+    for wheel in ("smooth", "grousered"):
+        for angles in ("below 90°", "all", "all, published model"):
+            cells = [cell("sand", f"{wheel} / {angles}", column) for column in columns]
+            lines.append(f"| {wheel} wheel, {angles} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def filled(text: str) -> str:
+    """A page with the numbers and the tables that the files have."""
+    text = VALUE.sub(lambda found: value(found["key"]) + found["mark"], text)
+    return TABLE.sub(lambda found: found["begin"] + table(found["key"]) + found["end"], text)
+
+
+def main() -> None:
+    """Fills the pages, or says which differ."""
+    parser = argparse.ArgumentParser(description="Numbers of README, results and paper from the files of the commands.")
+    parser.add_argument("--check", action="store_true", help="change nothing, and fail if a page differs")
+    is_check = parser.parse_args().check
+    stale = []
+    for name in PAGES:
+        page = ROOT / name
+        text = page.read_text(encoding="utf-8")
+        if (new := filled(text)) != text:
+            stale.append(name)
+            if not is_check:
+                page.write_text(new, encoding="utf-8")
+    sys.stdout.write(f"{'differ' if is_check else 'filled'}: {', '.join(stale) or 'none'}\n")
+    sys.exit(is_check and bool(stale))
+
+
+if __name__ == "__main__":
+    main()
