@@ -303,7 +303,6 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
     ) {
         let still = self.still(lane, tolerances);
         let n = problem.n_contacts;
-        let mut p = problem.p;
         let answered = Answered {
             d: 3,
             block: |i, j| problem.block_at(i, j),
@@ -312,9 +311,18 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             q: &problem.q[..3 * n],
             still,
         };
+        let creeps = answered.creeps(0..n);
+        if settled && !creeps {
+            return;
+        }
+        let mut p = problem.p;
         let own = &mut p[..3 * n];
         let is_changed = !settled && self.redundancy.settle(&answered, 0..n, own);
-        if self.redundancy.rest(&answered, 0..n, own) && Self::stay(lane, problem, &p, tolerances) {
+        let mut rest = p;
+        if creeps
+            && self.redundancy.rest(&answered, 0..n, &mut rest[..3 * n])
+            && Self::stay(lane, problem, &rest, tolerances)
+        {
             return;
         }
         if is_changed {

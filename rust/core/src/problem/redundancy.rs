@@ -149,18 +149,8 @@ impl Redundancy {
     /// Replaces impulses under which contacts creep by the least ones under which all that touch
     /// rest. True if there are some and their norm is not larger; what parts may violate the law
     /// then.
-    #[inline(always)]
-    pub(crate) fn rest<B: Fn(usize, usize) -> [f64; 9]>(
-        &mut self,
-        answered: &Answered<'_, B>,
-        contacts: impl Iterator<Item = usize> + Clone,
-        p: &mut [f64],
-    ) -> bool {
-        answered.creeps(contacts.clone()) && self.find_rest(answered, contacts, p)
-    }
-
     #[cold]
-    fn find_rest<B: Fn(usize, usize) -> [f64; 9]>(
+    pub(crate) fn rest<B: Fn(usize, usize) -> [f64; 9]>(
         &mut self,
         answered: &Answered<'_, B>,
         contacts: impl Iterator<Item = usize> + Clone,
@@ -579,7 +569,7 @@ enum Sliding {
 impl<B: Fn(usize, usize) -> [f64; 9]> Answered<'_, B> {
     /// Whether contacts slide, and slowly.
     #[inline(always)]
-    fn creeps(&self, contacts: impl Iterator<Item = usize>) -> bool {
+    pub(crate) fn creeps(&self, contacts: impl Iterator<Item = usize>) -> bool {
         let (mut slides, mut square, mut free) = (false, 0.0, 0.0);
         for i in contacts {
             let own = &self.u[self.d * i..][..self.d];
@@ -750,7 +740,7 @@ impl Redundancy {
             judge(&mut start, p, u);
         }
         for own in (0..groups.len()).filter_map(members) {
-            if self.rest(&answered, own, p) {
+            if answered.creeps(own.clone()) && self.rest(&answered, own, p) {
                 judge(&mut start, p, u);
             }
         }
