@@ -1367,7 +1367,7 @@ class Linearisation:
 
         None without `check`. A column is valid if two perturbed steps, one in each direction, have
         the same closed contacts in the same modes, the same projection and energy correction, the
-        same wheels in sand, and agree with the column within 1%.
+        same wheels in sand, and agree with the column within 0.1%.
         """
     @property
     def errors(self) -> _Array | None:

@@ -76,7 +76,7 @@ def test_wheels_feel_grains(env):
             break
     values = layout.to_si(observation) if hasattr(layout, "to_si") else observation
     assert on_grains
-    assert np.median(overlaps) < 0.02 * 0.032  # a ball that a wheel flings overlaps another for a step
+    assert max(overlaps) < 0.02 * 0.032  # balls that a wheel flings within a step ended it 6.8 mm inside others
     contact = np.asarray(observation)[layout["wheel_contact"]]
     force = np.asarray(observation)[layout["normal_force"]]
     assert contact.sum() >= 3

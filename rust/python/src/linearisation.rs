@@ -54,7 +54,7 @@ pub struct Linearisation {
     ///
     /// None without `check`. A column is valid if two perturbed steps, one in each direction, have
     /// the same closed contacts in the same modes, the same projection and energy correction, the
-    /// same wheels in sand, and agree with the column within 1%.
+    /// same wheels in sand, and agree with the column within 0.1%.
     holds: Option<Array<bool>>,
     /// Difference of each column of (a, b) from that of its two perturbed steps, (nx + nu,).
     ///

@@ -2,7 +2,9 @@
 //!
 //! A contact on the ground depends on the six coordinates of one body's pose, one between two
 //! bodies on twelve. Whatever the shapes and the ground, its derivatives are central differences of
-//! [`super::relocation`] to fourth order, with an error of about 1e-12.
+//! [`super::relocation`] to fourth order, with an error of about 1e-12. Where two second-order
+//! differences disagree, because a facet of the ground ends between their points, smaller steps
+//! follow.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -28,8 +30,18 @@ pub(crate) struct ContactSlope {
     pub other: Option<SlopeOfBody>,
 }
 
-/// Step of the differences, m and rad.
-const STEP: f64 = 1e-4;
+/// Steps of the differences, m and rad: the first over which the contact changes smoothly. With
+/// 1e-4 alone one column in 400 of rovers on rough maps was wrong by 0.03 to 6%: a wheel was that
+/// close to the end of an edge, or its contact moved along an edge 800 times as fast.
+const STEPS: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
+
+/// Difference of two second-order derivatives, relative to the largest entry, that smoothness
+/// explains: (step / radius)² for a wheel on an edge, so wheels from 3 cm on take the first step.
+const SMOOTH: f64 = 1e-5;
+
+/// Size below which entries are rounding where they are not zero: a turn about an axle moves
+/// nothing.
+const NOTHING: f64 = 1e-3;
 
 impl ContactSlope {
     /// Of a contact that is placed at the poses of `kinematics`.
@@ -42,15 +54,12 @@ impl ContactSlope {
         let slope = |body: usize| {
             [0, 1, 2, 3, 4, 5].map(|k| {
                 let at = |amount: f64| {
-                    let moved = Moved::new((model, kinematics), body, k, amount * STEP);
+                    let moved = Moved::new((model, kinematics), body, k, amount);
                     let mut contact = *contact;
                     relocate_to(model, &moved, terrain, &mut contact);
                     numbers(&contact)
                 };
-                let (near, far) = ([at(1.0), at(-1.0)], [at(2.0), at(-2.0)]);
-                std::array::from_fn(|i| {
-                    (8.0 * (near[0][i] - near[1][i]) - (far[0][i] - far[1][i])) / (12.0 * STEP)
-                })
+                derivative(at)
             })
         };
         Self {
@@ -58,6 +67,26 @@ impl ContactSlope {
             other: contact.other.map(|other| slope(other.body)),
         }
     }
+}
+
+/// Derivative at 0.
+fn derivative(at: impl Fn(f64) -> ContactNumbers) -> ContactNumbers {
+    let mut found = [0.0; 13];
+    for step in STEPS {
+        let of = |reach: f64| {
+            let [ahead, back] = [at(reach), at(-reach)];
+            let slope = |i: usize| (ahead[i] - back[i]) / (2.0 * reach);
+            std::array::from_fn::<f64, 13, _>(slope)
+        };
+        let (near, far) = (of(step), of(2.0 * step));
+        found = std::array::from_fn(|i| (4.0 * near[i] - far[i]) / 3.0);
+        let largest = found.iter().fold(NOTHING, |most, x| most.max(x.abs()));
+        let mut apart = near.iter().zip(&far).map(|(a, b)| (a - b).abs());
+        if apart.all(|apart| apart <= SMOOTH * largest) {
+            break;
+        }
+    }
+    found
 }
 
 fn numbers(contact: &Contact) -> ContactNumbers {

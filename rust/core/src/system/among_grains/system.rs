@@ -262,12 +262,13 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     }
 
     fn choose_branches(&mut self, start: Start<'_, Both>) {
-        let (_, start) = self.starts(start);
-        self.tree.choose_branches(start);
+        let (start_a, start_b) = self.starts(start);
+        self.bed.choose_branches(start_a);
+        self.tree.choose_branches(start_b);
     }
 
     fn most_revisions(&self) -> usize {
-        self.tree.most_revisions()
+        self.bed.most_revisions().max(self.tree.most_revisions())
     }
 
     fn is_settled(&mut self, v_end: &[f64]) -> bool {
@@ -276,9 +277,10 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     }
 
     fn revise(&mut self, start: Start<'_, Both>, v_end: &[f64]) -> bool {
-        let (_, start) = self.starts(start);
-        let (_, v_end) = self.halves(v_end);
-        self.tree.revise(start, v_end)
+        let (start_a, start_b) = self.starts(start);
+        let (end_a, end_b) = self.halves(v_end);
+        let has_struck = self.bed.revise(start_a, end_a);
+        self.tree.revise(start_b, end_b) || has_struck
     }
 
     fn turning(&self, v: &[f64]) -> f64 {

@@ -6,6 +6,7 @@ use super::bodies::COORDINATES;
 use super::contact::{GROUND, GrainContact, WALL};
 use super::scene::embedded;
 use super::search::{Neighbour, Search, Seeker, gather};
+use super::struck::Struck;
 use super::system::{Driven, GrainParts, GrainSystem};
 use crate::contact::Activation;
 use crate::problem::BodyPairs;
@@ -14,7 +15,7 @@ use crate::spatial::space::{axis, body_velocities, length};
 
 /// Unit vector along `x`; up where there is no direction.
 #[inline]
-fn direction<const D: usize>(x: &[f64; D]) -> SVector<f64, D> {
+pub(super) fn direction<const D: usize>(x: &[f64; D]) -> SVector<f64, D> {
     let length = length(x);
     if length > 0.0 {
         SVector::from_fn(|k, _| x[k] / length)
@@ -75,6 +76,7 @@ where
             rule.skin = rule.skin.max(cohesion.range);
             rule.reach = rule.reach.max(cohesion.range);
         }
+        rule.reach = rule.reach.max(self.parts.struck.reach);
         let reach = rule.reach;
         self.parts.driven.clear();
         self.parts.search = rule;
@@ -93,14 +95,14 @@ where
             let met = found
                 .iter()
                 .filter(|other| !(sleeps && self.asleep[other.index as usize]));
-            meet_grains(&seeker, met, v, &rule, out);
+            meet_grains(&seeker, met, v, (&rule, &self.parts.struck), out);
             if !sleeps {
                 self.meet_fixed(&seeker, &rule, out);
             }
         }
         for seeker in &wheels {
             gather(&grid, seeker, reach, largest, None, &mut found);
-            meet_grains(seeker, found.iter(), v, &rule, out);
+            meet_grains(seeker, found.iter(), v, (&rule, &self.parts.struck), out);
             self.meet_fixed(seeker, &rule, out);
         }
         self.parts.middle = q;
@@ -114,12 +116,15 @@ where
             facing,
             driven,
             wall_time,
+            struck,
             ..
         } = &mut *self.parts;
+        let is_struck = struck.has(seeker.a, WALL);
         let still = [0.0; 3];
         let mut push = |b: u32, n: SVector<f64, D>, gap: f64, motion| {
             let (velocity, spin): (SVector<f64, D>, [f64; 3]) = motion;
-            if rule.admits(gap, n.dot(&(seeker.velocity - velocity))) {
+            let is_near = is_struck && gap <= struck.reach;
+            if is_near || rule.admits(gap, n.dot(&(seeker.velocity - velocity))) {
                 let contact = seeker.contact(b, n, gap);
                 if velocity.iter().chain(&spin).any(|x| *x != 0.0) {
                     driven.push(Driven {
@@ -192,14 +197,14 @@ fn meet_grains<'a, const D: usize>(
     seeker: &Seeker<D>,
     found: impl Iterator<Item = &'a Neighbour<D>>,
     v: &[f64],
-    rule: &Search,
+    (rule, struck): (&Search, &Struck),
     out: &mut Vec<GrainContact<D>>,
 ) {
     for other in found {
         let n = direction(&other.between);
         let theirs = head::<D>(&v[body_velocities(D) * other.index as usize..]);
         let u_N = n.dot(&(seeker.velocity - theirs));
-        if rule.admits(other.gap, u_N) {
+        if rule.admits(other.gap, u_N) || struck.has(seeker.a, other.index) {
             out.push(seeker.contact(other.index, n, other.gap));
         }
     }

@@ -12,6 +12,7 @@ use super::rolling::{Moments, RollingParts};
 use super::scene::{GrainScene, flat};
 use super::search::{Neighbour, Search};
 use super::slabs::Slabs;
+use super::struck::{MOST_REPETITIONS, Struck};
 use crate::contact::Activation;
 use crate::geometry::Facing;
 use crate::integrator::{MechanicalSystem, Stabilisation, Start, StepOptions};
@@ -47,6 +48,8 @@ pub struct GrainParts<const D: usize> {
     pub(in crate::system) grid: Grid<D>,
     /// How far detection looked in the last step.
     pub(in crate::system) search: Search,
+    /// Pairs that only an impact of this step brings together.
+    pub(super) struck: Struck,
     pub(super) found: Vec<Neighbour<D>>,
     pub(super) facing: Vec<Facing<D>>,
     /// Contacts with surfaces that move, in the order of the keys.
@@ -341,6 +344,18 @@ where
     fn place_end(&mut self, q: &Vec<f64>) {
         self.parts.end.clone_from(q);
         self.place_machine(q, 1);
+    }
+
+    fn choose_branches(&mut self, _start: Start<'_, Vec<f64>>) {
+        self.parts.struck.clear();
+    }
+
+    fn most_revisions(&self) -> usize {
+        MOST_REPETITIONS
+    }
+
+    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
+        self.find_struck(start.v, v_end)
     }
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<GrainContact<D>>) {
