@@ -2,10 +2,10 @@ r"""Energy audit of a rover's steps, from what the public interface shows: it be
 
     gained = T + V + S (after) - T + V + S (before) - sum_j tau_j dphi_j
 
-T and V are kinetic and potential energy, S = sum k (phi - set-point)^2 / 2 is stored by the held steering joints, before
-the step at its own set-points. The energy of a simulation contains all three. tau_j is the commanded torque about joint j
-and dphi_j the angle turned. A motor whose torque falls with its speed does less work than the commanded torque would, so
-the difference bounds what the step gained from nowhere. Dampers only take energy away.
+T and V are kinetic and potential energy, S = sum k (phi - set-point)^2 / 2 is stored by the held steering joints,
+before the step at its own set-points. The energy of a simulation contains all three. tau_j is the commanded torque
+about joint j and dphi_j the angle turned. A motor whose torque falls with its speed does less work than the commanded
+torque would, so the difference bounds what the step gained from nowhere. Dampers only take energy away.
 
 The projection of positions lifts what overlaps, and so adds energy of its own. Where more was gained than rounding, the
 step is taken again from its start without projection, and what differs is entered as `lifted`.
