@@ -46,7 +46,7 @@ const DEPENDENT: f64 = 1e-12;
 const CONCERNED: f64 = 1e-6;
 
 /// Slip relative to the free velocities up to which contacts creep, so that rest is tried. Six
-/// rigid cylinders dropped on a slope crept with 0.02.
+/// rigid cylinders dropped on a slope crept at 0.3 to 3 mm/s, of 50 mm/s that a step's fall adds.
 const CREEPS: f64 = 0.1;
 
 /// Most contacts of a group whose impulses are settled. Those of a heap, which takes many
