@@ -19,6 +19,8 @@
 //! - [`Redundancy::settle`] replaces an answer by the least one: an elimination with the largest
 //!   pivots finds N, a projection the least y. Only if that leaves a cone, Newton's method on the
 //!   dual problem follows (Qi and Sun 1993).
+//! - [`Redundancy::rest`] tries rest where contacts creep: on redundant contacts Coulomb's law may
+//!   have several motions.
 //! - [`Redundancy::settle_problem`] does so for all groups of contacts of a problem.
 //! - [`undetermined_loads`] counts the contacts concerned.
 //!
@@ -43,7 +45,8 @@ const DEPENDENT: f64 = 1e-12;
 /// Share of a null vector below which it does not concern a contact.
 const CONCERNED: f64 = 1e-6;
 
-/// Slip relative to the free velocities up to which contacts creep, so that rest is tried.
+/// Slip relative to the free velocities up to which contacts creep, so that rest is tried. Six
+/// rigid cylinders dropped on a slope crept at 0.3 to 3 mm/s, of 50 mm/s that a step's fall adds.
 const CREEPS: f64 = 0.1;
 
 /// Most contacts of a group whose impulses are settled. Those of a heap, which takes many
