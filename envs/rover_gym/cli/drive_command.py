@@ -181,10 +181,17 @@ def drive(
         "arguments": as_given | options,
         "episodes": [asdict(episode) for episode in drives.results],
     }
+    _tell(drives, summary, folder, film, episodes, as_json=as_json)
+
+
+def _tell(
+    drives: "_Drives", summary: dict[str, Any], folder: Path | None, film: Path | None, episodes: int, *, as_json: bool
+) -> None:
+    """Says how the drives went, and writes the summary into their folder."""
     with Results(as_json=as_json) as said:
         said.add(**summary)
         if drives.results:
-            said.show(_table(drives.results, title))
+            said.show(_table(drives.results, drives.title))
         if folder is not None:
             drives.paths.append(folder / "summary.json")
             write_whole(drives.paths[-1], json.dumps(summary, indent=2) + "\n")

@@ -134,15 +134,7 @@ def evaluate(
         report = comparison_report(evaluation.rows, arguments, place)
         results.add(**report)
         if evaluation.rows:
-            table = comparison_table(evaluation.rows)
-            for level, short in short_tables(evaluation.rows):
-                here = place if level is None else replace(place, difficulties=(level,))
-                results.show(Text(here.words, overflow="fold"))
-                results.show(plain_table(short))
-            for line in other_ends(evaluation.rows):
-                results.show(Text(line))
-            for path in _write(evaluation.rows, table, report, output, place.words):
-                results.path("written", path)
+            _show_rows(results, evaluation.rows, report, output, place)
         if interrupted:
             done, wanted = len(evaluation.drives), len(contenders) * len(scenes)
             typer.echo(f"interrupted: {done} of {wanted} rows are done", err=True)
@@ -150,6 +142,21 @@ def evaluate(
         for level, scene in scenes:
             for path in evaluation.film(scene, level, films):
                 results.path("written", path)
+
+
+def _show_rows(
+    results: Results, rows: Sequence[PolicySummary], report: Mapping[str, Any], output: Path, place: ComparedScene
+) -> None:
+    """Prints the tables, and writes table, data and plot."""
+    table = comparison_table(rows)
+    for level, short in short_tables(rows):
+        here = place if level is None else replace(place, difficulties=(level,))
+        results.show(Text(here.words, overflow="fold"))
+        results.show(plain_table(short))
+    for line in other_ends(rows):
+        results.show(Text(line))
+    for path in _write(rows, table, report, output, place.words):
+        results.path("written", path)
 
 
 @dataclass
