@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from torture.hostile import hostile_values
@@ -94,6 +95,7 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "read_trajectory": {"path": w.folder / "run.h5"},
         "row_count": {"duration": 1.0, "time_step": 0.005},
         "draw_overview": {"run": w.run, "path": out / "overview.png"},
+        "RecordEpisodes": {"env": gym.make("Rover-v0"), "folder": out / "episodes"},
         "write_gltf": {"run": w.run, "path": out / "a.glb"},
         "write_page": {"run": w.run, "path": out / "a.html"},
         "write_vrml": {"run": w.run, "path": out / "a.wrl"},

@@ -242,25 +242,6 @@ def on_cylinders(solver: str, height: float, **options: Any) -> Simulation:
     return sim
 
 
-@pytest.mark.parametrize("height", [0.0, 0.01])
-def test_cylinders_on_a_slope_come_to_rest_whatever_finds_it(height: float) -> None:
-    """From the impulses of the impact, or by sweeps, wheels crept against each other; the loads differed by 0.17."""
-    weight = 9.81 * RoverModel().mass
-    first = on_cylinders("newton", height)
-    assert first.step(20).undetermined_loads == 12
-    assert np.abs(first.v).max() < 1e-9
-    for solver in SOLVERS:
-        sim = on_cylinders(solver, height)
-        report = sim.step(20)
-        if solver == "nsgs" and not report.is_converged:
-            continue  # sweeps do not always find the impact's impulses, and say so
-        assert report.is_converged, solver
-        assert np.abs(sim.wheel_forces - first.wheel_forces).max() < 1e-6 * weight, solver
-        sim.set_state(sim.q, np.zeros_like(sim.v))
-        sim.step()
-        assert np.abs(sim.wheel_forces - first.wheel_forces).max() < 1e-6 * weight, f"{solver}, cold"
-
-
 def test_contacts_that_yield_are_determined() -> None:
     model = RoverModel.named("skid-steered")
     sim = Simulation(model)

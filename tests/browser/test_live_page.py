@@ -194,7 +194,7 @@ def test_text_of_the_drive_is_shown_as_text(live: Live) -> None:
     live.loop.tell("<img src=x onerror='document.title=1'><b id=bold>")
     await_that(lambda: "<b id=bold>" in text(live.browser, "message"), "the notice")
     assert live.browser.find_elements(By.ID, "bold") == []
-    assert live.browser.title == "rover live"
+    assert live.browser.title == "rover, driven by hand"
 
 
 def test_the_scene_shows_the_ground_and_the_curves_are_drawn(live: Live) -> None:

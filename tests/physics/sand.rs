@@ -7,5 +7,4 @@ pub(crate) mod sand_scenes;
 mod derivatives;
 mod driving;
 mod forces;
-mod published_law;
 mod resting;

@@ -13,7 +13,7 @@ from rover_gym.env.spec_json import as_json
 from rover_gym.mechanics import OptionError
 from rover_gym.replay.sights import SENSORS
 from rover_gym.replay.tape import Tape, Watched
-from rover_gym.validation import known_keys, refuse
+from rover_gym.validation import checked, known_keys, refuse
 
 
 class RecordEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -34,6 +34,7 @@ class RecordEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         OptionError: The environment is another one, a sensor is unknown, or the folder has recorded episodes.
     """
 
+    @checked(folder=Path, sensors=[str])
     def __init__(self, env: gym.Env[Any, Any], folder: str | Path, *, sensors: tuple[str, ...] = ()) -> None:
         rover: object = getattr(env, "unwrapped", None)
         if not isinstance(rover, RoverEnv):

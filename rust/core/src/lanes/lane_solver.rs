@@ -6,13 +6,10 @@
 use super::dry_equations::{DrySystem, PLACES};
 use super::equations::DenseSystem;
 use super::large_equations::LargeSystem;
-use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_LARGE, MAX_UNKNOWNS};
+use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_LARGE};
 use super::system::Loaded;
 use super::velocity_equations::VelocitySystem;
-use crate::law::coulomb::Coulomb;
-use crate::problem::{
-    Answered, ContactScales, Magnitudes, Redundancy, Violations, evaluate_contact,
-};
+use crate::problem::{Answered, ContactScales, Magnitudes, Redundancy};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 
@@ -292,82 +289,22 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         done
     }
 
-    /// Takes the least of the impulses that cause the same motion, unless they are `settled`, and
-    /// rest rather than creeping.
+    /// Takes the least of the impulses that cause the same motion.
     #[inline(always)]
-    fn settle(
-        &mut self,
-        (lane, settled): (usize, bool),
-        problem: &mut ContactProblem,
-        tolerances: [T; 2],
-    ) {
+    fn settle(&mut self, lane: usize, problem: &mut ContactProblem, tolerances: [T; 2]) {
         let still = self.still(lane, tolerances);
         let n = problem.n_contacts;
+        let mut p = problem.p;
         let answered = Answered {
             d: 3,
             block: |i, j| problem.block_at(i, j),
             mu: &problem.mu[..n],
             u: &problem.u[..3 * n],
-            q: &problem.q[..3 * n],
             still,
         };
-        let creeps = answered.creeps(0..n);
-        if settled && !creeps {
-            return;
-        }
-        let mut p = problem.p;
-        let own = &mut p[..3 * n];
-        let is_changed = !settled && self.redundancy.settle(&answered, 0..n, own);
-        let mut rest = p;
-        if creeps
-            && self.redundancy.rest(&answered, 0..n, &mut rest[..3 * n])
-            && Self::stay(lane, problem, &rest, tolerances)
-        {
-            return;
-        }
-        if is_changed {
+        if self.redundancy.settle(&answered, 0..n, &mut p[..3 * n]) {
             problem.p[..3 * n].copy_from_slice(&p[..3 * n]);
         }
-    }
-
-    /// Takes impulses `p` that cause another motion, if they are an answer within the tolerances.
-    #[cold]
-    fn stay(
-        lane: usize,
-        problem: &mut ContactProblem,
-        p: &[f64; MAX_UNKNOWNS],
-        tolerances: [T; 2],
-    ) -> bool {
-        let n = problem.n_contacts;
-        let mut u = problem.q;
-        let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
-        for i in 0..n {
-            for j in 0..n {
-                let w = problem.block_at(i.max(j), i.min(j));
-                for k in 0..9 {
-                    let (r, c) = if j <= i {
-                        (k / 3, k % 3)
-                    } else {
-                        (k % 3, k / 3)
-                    };
-                    u[3 * i + r] += w[k] * p[3 * j + c];
-                }
-            }
-            let w = S::block_of(problem, i);
-            let scales = ContactScales::new::<3>(w[0], w[4] + w[8]);
-            let law = Coulomb(problem.mu[i]);
-            let square = evaluate_contact::<3>(p, &u, 3 * i, &law, scales.modes);
-            violations.add(square, scales.mass);
-            data.add(&problem.q[3 * i..3 * i + 3], scales.mass);
-        }
-        let [speed, impulse] = data.inverses();
-        let residual = violations.residual(speed, impulse);
-        let [relative, velocity] = tolerances.map(|square| square.get(lane).sqrt());
-        let is_answer = residual.relative <= relative && residual.velocity <= velocity;
-        if is_answer {
-            (problem.p, problem.u, problem.residual) = (*p, u, residual);
-        }
-        is_answer
     }
 
     /// A step of all lanes that have a problem.
@@ -447,9 +384,8 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
                     self.again |= 1 << lane;
                 } else {
                     self.store(lane, problem, is_solved);
-                    if is_solved && problem.asks_least && !self.pivoting.definite.get(lane) {
-                        let is_settled = settled >> lane & 1 == 1;
-                        self.settle((lane, is_settled), problem, tolerances);
+                    if is_solved && settled >> lane & 1 == 0 {
+                        self.settle(lane, problem, tolerances);
                     }
                     line.end(index);
                 }

@@ -63,13 +63,12 @@ pub(super) struct Cones {
 }
 
 impl Cones {
-    /// Moves `y`, the least impulses without cones, to the least within; false if not all the way,
-    /// or if the square of their norm is larger than `most`.
+    /// Moves `y`, the least impulses without cones, to the least within; false if not all the way.
     pub(super) fn minimise(
         &mut self,
         touching: &[Touching],
         (d, n, open): (usize, usize, usize),
-        (size, most): (f64, f64),
+        size: f64,
         y: &mut [f64],
     ) -> bool {
         let scale = self.roots.iter().fold(0.0_f64, |most, x| most.max(*x)) * size;
@@ -81,8 +80,7 @@ impl Cones {
         let mut is_found = false;
         for _ in 0..MAX_STEPS {
             is_found = size_of_gradient <= ON_THE_CONE * scale;
-            // −θ is a lower bound of the least ½ |y|², and has none where there are no impulses.
-            if is_found || -2.0 * value > most {
+            if is_found {
                 break;
             }
             let epsilon = (1e-2 * size_of_gradient / scale).clamp(1e-14, 1e-4);

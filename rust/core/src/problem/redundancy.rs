@@ -19,8 +19,6 @@
 //! - [`Redundancy::settle`] replaces an answer by the least one: an elimination with the largest
 //!   pivots finds N, a projection the least y. Only if that leaves a cone, Newton's method on the
 //!   dual problem follows (Qi and Sun 1993).
-//! - [`Redundancy::rest`] tries rest where contacts creep: on redundant contacts Coulomb's law may
-//!   have several motions.
 //! - [`Redundancy::settle_problem`] does so for all groups of contacts of a problem.
 //! - [`undetermined_loads`] counts the contacts concerned.
 //!
@@ -45,10 +43,6 @@ const DEPENDENT: f64 = 1e-12;
 /// Share of a null vector below which it does not concern a contact.
 const CONCERNED: f64 = 1e-6;
 
-/// Slip relative to the free velocities up to which contacts creep, so that rest is tried. Six
-/// rigid cylinders dropped on a slope crept at 0.3 to 3 mm/s, of 50 mm/s that a step's fall adds.
-const CREEPS: f64 = 0.1;
-
 /// Most contacts of a group whose impulses are settled. Those of a heap, which takes many
 /// factorisations anyway, stay as the solver finds them.
 pub(crate) const MOST_SETTLED: usize = 32;
@@ -64,8 +58,6 @@ pub(crate) struct Answered<'a, B: Fn(usize, usize) -> [f64; 9]> {
     pub u: &'a [f64],
     /// Speed up to which a contact is at rest: what the tolerance leaves, m/s.
     pub still: f64,
-    /// Free velocities, m/s.
-    pub q: &'a [f64],
 }
 
 /// Finds impulses that the motion leaves open; memory for it.
@@ -87,8 +79,6 @@ pub(crate) struct Redundancy {
     Y: Vec<f64>,
     /// Cholesky's factor of the null vectors' products.
     gram: Vec<f64>,
-    /// Velocity that each unknown is to have less; by pivots, once these are eliminated.
-    asked: Vec<f64>,
     /// Impulses by unknown; before and after.
     start: Vec<f64>,
     y: Vec<f64>,
@@ -135,59 +125,17 @@ impl Redundancy {
         contacts: impl Iterator<Item = usize> + Clone,
         p: &mut [f64],
     ) -> bool {
-        self.find(answered, contacts, p, Sliding::Slides);
+        self.find(answered, contacts, p);
         if self.open.is_empty() {
             return false;
         }
         self.read(answered.d, p);
         self.project();
-        if !self.is_within(answered.d) && !self.stay_within(answered.d, f64::INFINITY) {
-            // The cones leave no room: as far from the answer as they allow.
-            self.go_as_far_as_they_allow(answered.d);
+        if !self.is_within(answered.d) {
+            self.stay_within(answered.d);
         }
         self.write(answered.d, p);
         true
-    }
-
-    /// Replaces impulses under which contacts creep by the least ones under which all that touch
-    /// rest. True if there are some and their norm is not larger; what parts may violate the law
-    /// then.
-    #[cold]
-    pub(crate) fn rest<B: Fn(usize, usize) -> [f64; 9]>(
-        &mut self,
-        answered: &Answered<'_, B>,
-        contacts: impl Iterator<Item = usize> + Clone,
-        p: &mut [f64],
-    ) -> bool {
-        self.find(answered, contacts, p, Sliding::Stops);
-        if self.open.is_empty()
-            || self
-                .open
-                .iter()
-                .any(|i| self.asked[*i].abs() > answered.still)
-        {
-            return false;
-        }
-        self.read(answered.d, p);
-        let before = self.weighted(&self.start);
-        for pivot in &self.pivots {
-            self.start[*pivot] -= self.asked[*pivot];
-        }
-        self.project();
-        if !self.is_within(answered.d) && !self.stay_within(answered.d, before) {
-            return false;
-        }
-        let is_less = self.weighted(&self.y) <= before;
-        if is_less {
-            self.write(answered.d, p);
-        }
-        is_less
-    }
-
-    /// Square of the norm of impulses by unknown.
-    fn weighted(&self, y: &[f64]) -> f64 {
-        let squares = y.iter().zip(&self.weights).map(|(y, w)| w * y * y);
-        squares.sum()
     }
 
     /// Number of the contacts whose impulses are open.
@@ -197,7 +145,7 @@ impl Redundancy {
         contacts: impl Iterator<Item = usize> + Clone,
         p: &[f64],
     ) -> usize {
-        self.find(answered, contacts, p, Sliding::Slides);
+        self.find(answered, contacts, p);
         let (n, rank) = (self.n, self.pivots.len());
         let mut is_open = vec![false; n];
         for (f, &open) in self.open.iter().enumerate() {
@@ -219,13 +167,11 @@ impl Redundancy {
         answered: &Answered<'_, B>,
         contacts: impl Iterator<Item = usize> + Clone,
         p: &[f64],
-        sliding: Sliding,
     ) {
         let Answered {
             d, mu, u, still, ..
         } = *answered;
         self.touching.clear();
-        self.asked.clear();
         self.inverse.clear();
         self.n = 0;
         for i in contacts.clone() {
@@ -247,7 +193,7 @@ impl Redundancy {
             let slip = (own[1..].iter().map(|u| u * u).sum::<f64>()).sqrt();
             let kind = if mu[i] == 0.0 {
                 Kind::Slides([1.0, 0.0, 0.0])
-            } else if slip > still && sliding == Sliding::Slides {
+            } else if slip > still {
                 if is_joint {
                     continue;
                 }
@@ -265,14 +211,6 @@ impl Redundancy {
                 is_joint,
             });
             let count = if kind == Kind::Rests { d } else { 1 };
-            match sliding {
-                Sliding::Slides => self.asked.resize(self.n + count, 0.0),
-                Sliding::Stops if kind == Kind::Rests => self.asked.extend_from_slice(own),
-                Sliding::Stops => {
-                    let is_friction = matches!(kind, Kind::Rubs(_));
-                    self.asked.push(own[usize::from(is_friction)]);
-                }
-            }
             let largest = block[0].max(block[4]).max(block[8]);
             let inverse = if largest > 0.0 { 1.0 / largest } else { 0.0 };
             self.inverse.resize(self.n + count, inverse);
@@ -364,7 +302,6 @@ impl Redundancy {
         self.open.extend(0..self.n);
         self.row.resize(stride, 0.0);
         let (A, open) = (&mut self.A[..], &mut self.open);
-        let asked = &mut self.asked[..];
         let (row, inverses) = (&mut self.row[..], &self.inverse[..]);
         while !open.is_empty() {
             let (mut at, mut most) = (0, 0.0);
@@ -386,12 +323,10 @@ impl Redundancy {
                 *x *= inverse;
                 *kept = *x;
             }
-            asked[pivot] *= inverse;
             for &i in &*open {
                 let own = &mut A[i * stride..][..stride];
                 let factor = own[pivot];
                 subtract(own, factor, row);
-                asked[i] -= factor * asked[pivot];
             }
         }
     }
@@ -400,7 +335,7 @@ impl Redundancy {
     #[inline(always)]
     fn find_null_vectors(&mut self) {
         let (stride, rank, n_open) = (stride(self.n), self.pivots.len(), self.open.len());
-        if n_open == 0 && !self.asked.iter().any(|asked| *asked != 0.0) {
+        if n_open == 0 {
             return;
         }
         for k in (1..rank).rev() {
@@ -411,7 +346,6 @@ impl Redundancy {
                 let own = &mut A[above * stride..][..stride];
                 let factor = own[pivot];
                 subtract(own, factor, row);
-                self.asked[above] -= factor * self.asked[pivot];
             }
         }
         self.Y.clear();
@@ -501,10 +435,9 @@ impl Redundancy {
         (self.touching.iter()).all(|own| own.excess(d, &self.y[own.first..]) <= slack)
     }
 
-    /// The least impulses within the cones, from those without regard to them. False if there are
-    /// none, or if the square of their norm is larger than `most`.
+    /// The least impulses within the cones, from those without regard to them.
     #[cold]
-    fn stay_within(&mut self, d: usize, most: f64) -> bool {
+    fn stay_within(&mut self, d: usize) {
         let (n, rank, n_open) = (self.n, self.pivots.len(), self.open.len());
         let size = self.size();
         let cones = &mut self.cones;
@@ -528,7 +461,11 @@ impl Redundancy {
             let inverse = 1.0 / self.gram[f * (n_open + 1)];
             own[..n].iter_mut().for_each(|x| *x *= inverse);
         }
-        cones.minimise(&self.touching, (d, n, n_open), (size, most), &mut self.y)
+        let found = cones.minimise(&self.touching, (d, n, n_open), size, &mut self.y);
+        if !found {
+            // The cones leave no room: as far from the answer as they allow.
+            self.go_as_far_as_they_allow(d);
+        }
     }
 
     /// Goes from the answer towards the impulses found as far as the cones allow.
@@ -559,33 +496,6 @@ impl Redundancy {
         for ((y, start), end) in self.y.iter_mut().zip(&self.start).zip(&self.t) {
             *y = start + inside * (end - start);
         }
-    }
-}
-
-/// What becomes of contacts that slide.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Sliding {
-    Slides,
-    Stops,
-}
-
-impl<B: Fn(usize, usize) -> [f64; 9]> Answered<'_, B> {
-    /// Whether contacts slide, and slowly.
-    #[inline(always)]
-    pub(crate) fn creeps(&self, contacts: impl Iterator<Item = usize>) -> bool {
-        let (mut slides, mut square, mut free) = (false, 0.0, 0.0);
-        for i in contacts {
-            let own = &self.u[self.d * i..][..self.d];
-            free += (self.q[self.d * i..][..self.d].iter())
-                .map(|q| q * q)
-                .sum::<f64>();
-            if own[0] <= self.still && self.mu[i] > 0.0 {
-                let slip: f64 = own[1..].iter().map(|u| u * u).sum();
-                slides |= slip > self.still * self.still;
-                square += slip;
-            }
-        }
-        slides && square <= CREEPS * CREEPS * free
     }
 }
 
@@ -715,42 +625,23 @@ impl Redundancy {
             mu: problem.friction_coefficients(),
             u: &velocities,
             still: tolerance * norm(problem.free_velocity()),
-            q: problem.free_velocity(),
-        };
-        let of = &groups[..];
-        let members = |group: usize| {
-            let own = (group..of.len()).filter(move |i| of[*i] == group);
-            let is_small = (1..=MOST_SETTLED).contains(&own.clone().count());
-            is_small.then_some(own)
-        };
-        let limit = 2.0 * residual.max(tolerance);
-        let (mut found, mut is_stale) = (None, false);
-        let mut judge = |start: &mut [f64], p: &mut [f64], u: &mut [f64]| {
-            let after = evaluate_into(problem, p, u);
-            is_stale = !(after.is_finite() && after.relative <= limit);
-            if is_stale {
-                p.copy_from_slice(start);
-            } else {
-                start.copy_from_slice(p);
-                found = Some(after);
-            }
         };
         let mut is_changed = false;
-        for own in (0..groups.len()).filter_map(members) {
-            is_changed |= self.settle(&answered, own, p);
-        }
-        if is_changed {
-            judge(&mut start, p, u);
-        }
-        for own in (0..groups.len()).filter_map(members) {
-            if answered.creeps(own.clone()) && self.rest(&answered, own, p) {
-                judge(&mut start, p, u);
+        for group in 0..groups.len() {
+            let members = (group..groups.len()).filter(|i| groups[*i] == group);
+            if (1..=MOST_SETTLED).contains(&members.clone().count()) {
+                is_changed |= self.settle(&answered, members, p);
             }
         }
-        if is_stale && found.is_some() {
-            found = Some(evaluate_into(problem, p, u));
-        } else if is_stale {
-            u.copy_from_slice(&velocities);
+        let mut found = None;
+        if is_changed {
+            let after = evaluate_into(problem, p, u);
+            if after.is_finite() && after.relative <= 2.0 * residual.max(tolerance) {
+                found = Some(after);
+            } else {
+                p.copy_from_slice(&start);
+                u.copy_from_slice(&velocities);
+            }
         }
         (self.groups, self.kept) = (groups, [start, velocities]);
         found
@@ -786,7 +677,6 @@ pub fn undetermined_loads(
         mu: problem.friction_coefficients(),
         u: &u,
         still: tolerance * norm(problem.free_velocity()),
-        q: problem.free_velocity(),
     };
     let mut redundancy = Redundancy::default();
     let mut count = |own: usize| {

@@ -30,11 +30,10 @@ pub(super) struct Immersed<'a> {
     pub dry: f64,
 }
 
-/// Sizes of what the sand remembers: of all, of the shift and of the turn, and of the shift in the
-/// wheel's plane and the turn out of it.
+/// Sizes of what the sand remembers: of the shift and of the turn, and of the shift in the wheel's
+/// plane and the turn out of it.
 #[derive(Clone, Copy)]
 pub(super) struct Motion {
-    stirred: f64,
     size: f64,
     spin: f64,
     speed: f64,
@@ -86,29 +85,12 @@ pub(super) struct Feed<'a> {
     now: Option<(Arc, &'a Gauss)>,
     /// Number of its points that were taken.
     taken: usize,
-    /// The half of the last arc behind its lowest point. Bekker's stress ends there in steady
-    /// motion, and a rule over both halves has an error of a point.
-    behind: Option<(Arc, &'a Gauss)>,
 }
 
-/// Part of the size of a memory that counts as speed where the wheel spins without travel: the
-/// direction of its motion has no jump there. Up to a slip of 0.9 it moves the pull by less than
-/// 0.1%.
-const SPINNING: f64 = 0.1;
-
 impl Motion {
-    /// Speed in the wheel's plane with a part of the size of the memory ([`Setting::pace`]).
-    ///
-    /// [`Setting::pace`]: super::piece::Setting::pace
-    pub fn pace(&self) -> f64 {
-        let spin = SPINNING * self.stirred;
-        (self.speed * self.speed + spin * spin).sqrt()
-    }
-
-    /// Of a shift and a turn, which make a memory of a size.
-    pub fn of(shift: &Vector3<f64>, turn: &Vector3<f64>, stirred: f64) -> Self {
+    /// Of a shift and a turn.
+    pub fn of(shift: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
         Self {
-            stirred,
             size: shift.norm(),
             spin: turn.norm(),
             speed: (shift.x * shift.x + shift.y * shift.y).sqrt(),
@@ -147,7 +129,6 @@ impl<'a> Feed<'a> {
             },
             now: None,
             taken: 0,
-            behind: None,
         }
     }
 
@@ -187,10 +168,6 @@ impl<'a> Feed<'a> {
             wheel, rules, dry, ..
         } = *self.wheel;
         let n_rings = rules.n_rings();
-        let soil = self.wheel.soil;
-        if let Some(behind) = self.behind.take() {
-            return Some(behind);
-        }
         while self.ring < n_rings {
             let at = self.ring % MAX_LANES;
             if at == 0 {
@@ -207,18 +184,13 @@ impl<'a> Feed<'a> {
             self.ring += 1;
             if let Some(ring) = self.arcs.rings[at].filter(|_| from < to) {
                 let cos = self.arcs.cos[at];
-                let mut arc = Arc {
+                let arc = Arc {
                     ring,
                     from,
                     to,
                     cos,
                 };
-                let rule = rules.along(self.ring - 1);
-                if let Law::Bekker(_) = soil.law {
-                    self.behind = Some((Arc { to: 0.0, ..arc }, rule));
-                    arc.from = 0.0;
-                }
-                return Some((arc, rule));
+                return Some((arc, rules.along(self.ring - 1)));
             }
         }
         None
@@ -306,7 +278,6 @@ impl<T: Lane> LaneRings<T> {
             spin,
             speed,
             tilt,
-            ..
         } = wheel.motion;
         let reach = self.radius + self.offset.abs();
         let largest = number(size) + number(spin) * reach;

@@ -121,7 +121,7 @@ impl Gauss {
 /// Numbers of points of a wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Points {
-    /// Along an arc of the drum, and across the drum. In Bekker's law, along each half of an arc.
+    /// Along an arc of the drum, and across the drum.
     pub drum: [usize; 2],
     /// Along an arc of an edge.
     pub edge: usize,
