@@ -18,9 +18,8 @@ from commands import error_of, output_of, rover
 from typer.main import get_command
 from typer.testing import Result
 
-import rover_gym.policy.comparison
 from rover_gym import OptionError
-from rover_gym.cli import app, drive_command
+from rover_gym.cli import app, drive_command, evaluate_command
 from rover_gym.cli.console import FIRST_STEPS
 from rover_gym.policy.network_files import ANYWHERE, FOLDER
 from rover_gym.record import read_trajectory
@@ -145,17 +144,19 @@ def test_a_replay_is_not_made_for_a_place_that_cannot_be_written(option: str, tm
 def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drive, started = drive_command.run_episode, []
 
-    def interrupted(*args: Any, on_step: Callable[..., None], **kwargs: Any) -> Any:
+    def interrupted(env: Any, *args: Any, **kwargs: Any) -> Any:
         started.append(1)
-        steps = []
+        step, steps = env.step, []
 
-        def step(*given: Any) -> None:
-            on_step(*given)
+        def counted(action: Any) -> Any:
+            stepped = step(action)
             steps.append(1)
-            if len(started) == 2 and len(steps) == 5:
+            if len(started) == 2 and len(steps) == 4:
                 raise KeyboardInterrupt
+            return stepped
 
-        return drive(*args, on_step=step, **kwargs)
+        monkeypatch.setattr(env, "step", counted)
+        return drive(env, *args, **kwargs)
 
     monkeypatch.setattr(drive_command, "run_episode", interrupted)
     video = tmp_path / "film.mp4"
@@ -172,7 +173,7 @@ def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monk
 
 
 def test_an_interrupted_evaluation_prints_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drive, driven = rover_gym.policy.comparison.drive_all, []
+    drive, driven = evaluate_command.drive_all, []
 
     def interrupted(*args: Any, **kwargs: Any) -> Any:
         if len(driven) == 2:
@@ -180,7 +181,7 @@ def test_an_interrupted_evaluation_prints_what_is_done(tmp_path: Path, monkeypat
         driven.append(1)
         return drive(*args, **kwargs)
 
-    monkeypatch.setattr(rover_gym.policy.comparison, "drive_all", interrupted)
+    monkeypatch.setattr(evaluate_command, "drive_all", interrupted)
     options = ["--episodes", "2", "--difficulty", "0", "--difficulty", "0.25", "--difficulty", "0.5"]
     result = rover("evaluate", *options, "--output", str(tmp_path), "--json")
     assert one_line(result, 130) == "interrupted: 2 of 3 rows are done\n"
@@ -338,10 +339,10 @@ def test_a_difficulty_means_rocks_and_no_plane() -> None:
 
 def test_a_policy_is_a_runs_folder_or_a_shipped_name(tmp_path: Path) -> None:
     (tmp_path / "run").symlink_to(FOLDER / ANYWHERE)
-    told = [
-        rover("drive", "--policy", policy, "--difficulty", "1", *SHORT, "--json").stdout.replace(policy, "POLICY")
-        for policy in (str(tmp_path / "run"), ANYWHERE)
-    ]
+    told = []
+    for policy, folder in ((str(tmp_path / "run"), tmp_path / "a"), (ANYWHERE, tmp_path / "b")):
+        drive = ("drive", "--policy", policy, "--difficulty", "1", "--output", folder, *SHORT, "--json")
+        told.append(rover(*drive).stdout.replace(policy, "POLICY").replace(str(folder), "FOLDER"))
     speeds = r'"real_time_factor": .*'
     assert re.sub(speeds, "", told[0]) == re.sub(speeds, "", told[1])
     assert '"distance"' in told[0]
