@@ -26,7 +26,7 @@ def as_terrain(field: str, value: object) -> Terrain:
     """
     if isinstance(value, Terrain):
         return value
-    if value == "plane":
+    if isinstance(value, str) and value == "plane":
         return Plane()
     if isinstance(value, (list, tuple)):
         return Union([as_terrain(f"{field}[{i}]", one) for i, one in enumerate(value)])

@@ -55,6 +55,7 @@ class Trajectory:
         units: The units of the data sets, by name.
         attributes: Metadata of the run, with JSON values decoded.
         terrain: The ground; None if the file holds none.
+        thinned: Of a run with fewer samples than its file: the whole run, and the indices of these samples in it.
     """
 
     data: Mapping[str, npt.NDArray[np.float64]]
