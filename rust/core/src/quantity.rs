@@ -167,7 +167,7 @@ pub fn legible(message: &str) -> String {
         let (number, after) = from.split_at(from.find(|c: char| !is_part(c)).unwrap_or(from.len()));
         written.push_str(before);
         match number.parse::<f64>() {
-            Ok(value) if number.len() > MOST_DIGITS => written += &format!("{value:?}"),
+            Ok(value) if number.len() > MOST_DIGITS => written = format!("{written}{value:?}"),
             _ => written.push_str(number),
         }
         rest = after;

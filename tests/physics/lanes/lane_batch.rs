@@ -244,6 +244,7 @@ fn a_rover_restored_on_a_height_map_goes_on_to_the_bit() {
                 let fresh = own.clone();
                 for _ in 0..4 {
                     command(&mut own, 60.0, &mut numbers);
+                    own.step(1).unwrap();
                     for _ in 0..6 {
                         let mut other = fresh.clone();
                         other.restore(&own.snapshot()).unwrap();

@@ -127,7 +127,7 @@ impl Audit {
             mut work,
             released,
         } = if self.is_last {
-            shortened_balance(system, options, start, ws, (&before, self.gain))
+            shortened_balance(system, options, start, ws, &before)
         } else {
             balance(system, options, start, ws, &before)
         };
@@ -435,7 +435,7 @@ fn shortened_balance<S: MechanicalSystem>(
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
     ws: &mut ScratchOf<S>,
-    (before, gain): (&MechanicalEnergy, f64),
+    before: &MechanicalEnergy,
 ) -> Balance {
     let mut found = balance(system, options, start, ws, before);
     for _ in 0..MOST_SHORTENINGS {
@@ -447,13 +447,6 @@ fn shortened_balance<S: MechanicalSystem>(
         // together.
         let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
         shorten(ws, share);
-        if !excess.is_balanced(false, [gain; 2]) {
-            // Springs of treads would else store what no motion gave them, step after step.
-            let d = S::DIMENSION.components();
-            for (p, law) in ws.p.chunks_exact_mut(d).zip(&ws.yielding) {
-                law.shorten_deflection(share, &mut p[1..]);
-            }
-        }
         place(system, options, ws);
         system.normalise(&mut ws.end);
         found = balance(system, options, start, ws, before);

@@ -283,18 +283,6 @@ impl<T: Lane> Yielding<T> {
     }
 }
 
-impl Yielding<f64> {
-    /// Shortens what the tread deflects in a step to a `share`, in the impulse along the surface `p`,
-    /// N s: of a step whose motion is shortened after the solve.
-    pub(crate) fn shorten_deflection(&self, share: f64, p: &mut [f64]) {
-        if self.tangential > 0.0 {
-            for (p, before) in p.iter_mut().zip(self.friction) {
-                *p = before + share * (*p - before);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,7 +6,7 @@ use super::bodies::COORDINATES;
 use super::contact::{GROUND, GrainContact, WALL};
 use super::scene::embedded;
 use super::search::{Neighbour, Search, Seeker, gather};
-use super::struck::Struck;
+use super::struck_pairs::Struck;
 use super::system::{Driven, GrainParts, GrainSystem};
 use crate::contact::Activation;
 use crate::problem::BodyPairs;

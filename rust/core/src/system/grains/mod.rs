@@ -37,6 +37,7 @@ pub(in crate::system) mod search;
 mod slabs;
 pub mod sleep;
 mod struck;
+mod struck_pairs;
 pub mod system;
 pub mod wall;
 

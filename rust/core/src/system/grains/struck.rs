@@ -5,55 +5,19 @@
 //! velocities after the step, which is then repeated with them among its contacts.
 
 use super::bodies::COORDINATES;
-use super::contact::{GrainKey, WALL};
+use super::contact::WALL;
 use super::detection::direction;
 use super::grid::Item;
+use super::struck_pairs::Struck;
 use super::system::GrainSystem;
 use crate::problem::BodyPairs;
 use crate::solver::Swept;
 use crate::spatial::space::{body_velocities, dot, length};
 use nalgebra::SVector;
 
-/// Most repetitions of a step for such pairs: what strikes may throw in turn.
-pub(super) const MOST_REPETITIONS: usize = 4;
-
 /// Overlap at the end of the step that counts, as a fraction of the smallest radius. Contacts that
 /// were found end with a thousandth of that.
 const OVERLAPS: f64 = 0.01;
-
-/// Pairs that a step has to look at beside those that it forecasts.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Struck {
-    /// In the order of the keys. For walls and ground together `b` is [`WALL`].
-    pairs: Vec<GrainKey>,
-    /// Their largest gap at the start of the step, m.
-    pub reach: f64,
-}
-
-impl Struck {
-    pub fn clear(&mut self) {
-        self.pairs.clear();
-        self.reach = 0.0;
-    }
-
-    /// Whether a pair is one of them.
-    #[inline]
-    pub fn has(&self, a: u32, b: u32) -> bool {
-        let key = GrainKey { a, b: b.min(WALL) };
-        !self.pairs.is_empty() && self.pairs.binary_search(&key).is_ok()
-    }
-
-    #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
-    fn add(&mut self, a: usize, b: usize, gap: f64) {
-        let [a, b] = [a, b].map(|i| i as u32);
-        let key = GrainKey { a, b };
-        if let Err(place) = self.pairs.binary_search(&key) {
-            self.pairs.insert(place, key);
-        }
-        // The search compares with a sum in another order.
-        self.reach = self.reach.max(gap * (1.0 + 1e-9));
-    }
-}
 
 impl<const D: usize> GrainSystem<'_, D>
 where
@@ -72,7 +36,7 @@ where
             return false;
         }
         let mut struck = std::mem::take(&mut self.parts.struck);
-        let n_before = struck.pairs.len();
+        let n_before = struck.n();
         let is_fast = |i: &usize| search.lead * speed(*i) > search.skin;
         for i in (0..radius.len()).filter(is_fast) {
             let centre = self.centre(i);
@@ -103,7 +67,7 @@ where
         for i in (0..radius.len()).filter(is_fast) {
             self.find_struck_fixed(i, (before, after), limit, &mut struck);
         }
-        let is_new = struck.pairs.len() > n_before;
+        let is_new = struck.n() > n_before;
         self.parts.struck = struck;
         is_new
     }

@@ -12,7 +12,7 @@ use super::rolling::{Moments, RollingParts};
 use super::scene::{GrainScene, flat};
 use super::search::{Neighbour, Search};
 use super::slabs::Slabs;
-use super::struck::{MOST_REPETITIONS, Struck};
+use super::struck_pairs::{MOST_REPETITIONS, Struck};
 use crate::contact::Activation;
 use crate::geometry::Facing;
 use crate::integrator::{MechanicalSystem, Stabilisation, Start, StepOptions};
