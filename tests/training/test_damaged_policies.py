@@ -103,6 +103,6 @@ def test_pipes_and_names_that_no_file_has_are_refused(folder: Path, env: RoverEn
         ScanPolicy(env, forecast=folder)
     for name in ("x" * 5000, "a\0b"):
         with pytest.raises(
-            PolicyError, match="must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'guided' or the folder"
+            PolicyError, match="must be 'pd', 'sand', 'scan', 'foresight', 'anywhere', 'guided', the folder"
         ):
             named_policy(name)

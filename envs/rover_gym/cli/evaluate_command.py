@@ -107,8 +107,7 @@ def evaluate(
     if slope is not None:
         warn_of_slope(number("slope", slope, at_least=0.0, at_most=MAX_SLOPE_DEG))
     levels = [number("difficulty", level, at_least=0.0, at_most=MAX_DIFFICULTY) for level in difficulty or ()]
-    arguments |= {} if model == BUILT_IN else {"model": model}
-    arguments |= {} if slope is None else {"slope_deg": slope}
+    arguments |= ({} if model == BUILT_IN else {"model": model}) | ({} if slope is None else {"slope_deg": slope})
     scenes: list[tuple[float | None, dict[str, Any]]] = [(None, arguments)]
     if len(levels) == 1:
         arguments["difficulty"] = levels[0]
@@ -136,8 +135,9 @@ def evaluate(
         if evaluation.rows:
             _show_rows(results, evaluation.rows, report, output, place)
         if interrupted:
-            done, wanted = len(evaluation.drives), len(contenders) * len(scenes)
-            typer.echo(f"interrupted: {done} of {wanted} rows are done", err=True)
+            typer.echo(
+                f"interrupted: {len(evaluation.drives)} of {len(contenders) * len(scenes)} rows are done", err=True
+            )
             raise typer.Exit(INTERRUPTED)
         for level, scene in scenes:
             for path in evaluation.film(scene, level, films):

@@ -115,9 +115,7 @@ def train(
     network = None if begin is None else _network(begin)
     folders = _run_folders(list(dict.fromkeys(seeds or [1])), output, path.stem)
     if not resume:
-        _check_unused(folders.values())
-        for folder in folders.values():
-            check_paths({"the configuration": path, "the network": begin}, output=Into(folder, WRITTEN))
+        _check_unused(folders.values(), {"the configuration": path, "the network": begin})
     with Results(as_json=as_json) as results:
         for seed, folder in folders.items():
             train_arcs(
@@ -132,17 +130,22 @@ def train(
             )
             results.path("policy", folder)
             results.path("best policy in the evaluations", folder / "best")
-        rows = [_last_row(folder) for folder in folders.values()]
-        results.add(seeds=[{"seed": seed, **row} for seed, row in zip(folders, rows, strict=True)])
-        if len(folders) > 1:
-            results.show(plain_table(_seed_table(list(folders), rows)))
+        _show_seeds(results, folders)
 
 
-def _check_unused(folders: Iterable[Path]) -> None:
-    """Refuses folders that have a run, before the first training begins.
+def _show_seeds(results: Results, folders: Mapping[int, Path]) -> None:
+    """The last row of every seed's curve, of several seeds as a table."""
+    rows = [_last_row(folder) for folder in folders.values()]
+    results.add(seeds=[{"seed": seed, **row} for seed, row in zip(folders, rows, strict=True)])
+    if len(folders) > 1:
+        results.show(plain_table(_seed_table(list(folders), rows)))
+
+
+def _check_unused(folders: Iterable[Path], reads: Mapping[str, object]) -> None:
+    """Refuses folders that have a run, and those whose files the training `reads`, before it begins.
 
     Raises:
-        OptionError: One has a run.
+        OptionError: One has a run, or a file that is read.
     """
     from rover_gym.learning.arc_recipe import RUN_FILES  # noqa: PLC0415 - needs the extra
 
@@ -150,6 +153,7 @@ def _check_unused(folders: Iterable[Path]) -> None:
         if any((folder / name).exists() for name in RUN_FILES):
             reason = "has a run, which is never overwritten: go on with it by --resume, or name another --output"
             refuse(OptionError, "output", str(folder), reason)
+        check_paths(reads, output=Into(folder, WRITTEN))
 
 
 def _network(policy: str) -> ArcNetwork:

@@ -7,8 +7,8 @@
 //! - [`bodies`], [`wall`], [`scene`]: the description; [`packing`]: initial positions without
 //!   overlap, from a seed;
 //! - [`crate::law::cohesion`]: an attraction of contacts;
-//! - [`grid`]: the search for neighbours; [`contact`]: a contact and its key; `struck`: pairs that an
-//!   impact of the same step brings together;
+//! - [`grid`]: the search for neighbours; [`contact`]: a contact and its key; `struck` and
+//!   `struck_pairs`: pairs that an impact of the same step brings together;
 //! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `search` and `detection`:
 //!   its contacts; `measures`: energy, momentum, overlap;
 //! - [`sleep`]: leaves out grains that rest far from anything that moves; [`removal`]: takes grains
