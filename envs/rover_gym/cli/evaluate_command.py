@@ -123,12 +123,7 @@ def evaluate(
     check_paths(reads, output=Into(output, evaluation.names([level for level, _ in scenes], films)))
     output.mkdir(parents=True, exist_ok=True)
     with Results(as_json=as_json) as results:
-        interrupted = False
-        try:
-            for level, scene in scenes:
-                evaluation.drive(scene, level)
-        except KeyboardInterrupt:
-            interrupted = True
+        interrupted = not evaluation.drive_through(scenes)
         place = _scene(arguments, environment, model, seeds, levels)
         report = comparison_report(evaluation.rows, arguments, place)
         results.add(**report)
@@ -185,6 +180,15 @@ class _Evaluation:
         of_films = [f"films/{stem}-seed{seed}.mp4" for stem in stems for seed in self.seeds[:films]]
         tables = [f"evaluation.{ending}" for ending in ("md", "json", "png")]
         return [*tables, *(f"episodes-{stem}.json" for stem in stems), *of_films]
+
+    def drive_through(self, scenes: Sequence[tuple[float | None, dict[str, Any]]]) -> bool:
+        """Drives in all scenes, until Ctrl-C; whether it was not interrupted."""
+        try:
+            for level, scene in scenes:
+                self.drive(scene, level)
+        except KeyboardInterrupt:
+            return False
+        return True
 
     def drive(self, arguments: Mapping[str, Any], difficulty: float | None) -> None:
         """Adds a row for each contender on one ground, and one for all seeds of a trained policy together."""
