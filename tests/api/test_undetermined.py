@@ -229,19 +229,6 @@ def test_both_ends_of_a_rigid_cylinder_share_its_load() -> None:
     assert np.abs(sim.wheel_forces - other.wheel_forces).max() < 1e-6 * weight
 
 
-def on_cylinders(solver: str, height: float, **options: Any) -> Simulation:
-    """The rover on rigid cylinders, put down or dropped across a slope."""
-    description = RoverModel().replace(wheel_stiffness=0.0).to_dict()
-    for wheel in description["wheels"]:
-        wheel.update(width=0.08, stiffness=0.0)
-    model, ground = RoverModel.from_dict(description), slope(0.1, 0.25)
-    sim = Simulation(model, ground, **({"friction": 0.8, "solver": solver} | options))
-    q = model.resting_pose(ground, (0.0, 0.0), 0.3)
-    q[1] += height
-    sim.set_state(q)
-    return sim
-
-
 def test_contacts_that_yield_are_determined() -> None:
     model = RoverModel.named("skid-steered")
     sim = Simulation(model)

@@ -205,7 +205,8 @@ fn a_flat_shape_rests_half_over_an_edge_and_on_two_walls() {
     flat_shapes_rest(&[Support::Edge, Support::Walls], 1, 4);
 }
 
-/// Ignored because it takes minutes; the test above has the supports where bodies fell through.
+/// Ignored because it takes minutes: `make test-all` runs it, and the test above, which always
+/// runs, has the supports where bodies fell through. It has not been seen to pass yet.
 #[test]
 #[ignore = "tests/physics/surfaces/supports.rs::a_flat_shape_rests_half_over_an_edge_and_on_two_walls"]
 fn every_flat_shape_rests_on_an_edge_two_walls_a_slot_a_corner_and_spikes() {
