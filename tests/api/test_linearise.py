@@ -167,7 +167,7 @@ def test_dry_friction_in_joints_is_a_contact_that_sticks_or_slips():
 
 
 def test_a_projection_is_differentiated():
-    sim = on_rocks("projection", 142)
+    sim = on_rocks("projection", 69)
     linear = sim.linearise(check=True)
     assert linear.is_projected
     assert linear.holds.sum() >= 40

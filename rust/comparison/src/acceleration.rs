@@ -7,6 +7,13 @@ use rover_core::contact::Activation;
 use rover_core::integrator::{MechanicalSystem, Start, StepError, StepOptions};
 use rover_core::solver::{SolveReport, SolverWorkspace, solve};
 
+/// Largest displacement of any cluster, m, that `y` (nv) causes away from the contact points.
+pub(crate) fn largest_displacement<S: MechanicalSystem>(system: &S, y: &[f64]) -> f64 {
+    let clusters = 0..system.n_clusters();
+    let own = clusters.map(|cluster| system.displacement(y, cluster));
+    own.fold(0.0, f64::max)
+}
+
 /// Half width of the difference quotient of Hᵀ(q(t)) v, s. Its error is a 30th of the fifth
 /// derivative times δ⁴. At a few metres per second over curves of metres this is 1e-10 of the
 /// value, and so is rounding.

@@ -31,7 +31,8 @@ use rover_core::problem::{Dimension, Operator};
 use rover_core::solver::SolverWorkspace;
 
 use crate::acceleration::{
-    convective_acceleration, find, free_acceleration, friction, response, solve_law,
+    convective_acceleration, find, free_acceleration, friction, largest_displacement, response,
+    solve_law,
 };
 
 /// Speed below which a contact neither approaches nor parts nor slides, m/s.
@@ -478,7 +479,9 @@ impl<S: MechanicalSystem> Integrator<S> for EventDriven {
         let mut q = state.configuration.clone();
         let mut v = state.v.to_vec();
         // No further than what moves in the step and a little: what lies beyond cannot close.
-        let reach = 4.0 * h * system.displacement(&v) + 2.0 * options.gravity.norm() * h * h + 1e-6;
+        let reach = 4.0 * h * largest_displacement(system, &v)
+            + 2.0 * options.gravity.norm() * h * h
+            + 1e-6;
         let solver = &mut *self.solver.borrow_mut();
         let mut run = Run {
             system,

@@ -506,7 +506,7 @@ impl MechanicalSystem for SphereSystem<'_> {
         FrictionContactProblem::from_assembled_sparse(&self.parts.W, q, mu)
     }
 
-    fn displacement(&self, y: &[f64]) -> f64 {
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
         (0..self.bodies.count()).fold(0.0, |m, i| self.bodies.speed(y, i).max(m))
     }
 }

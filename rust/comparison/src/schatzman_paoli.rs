@@ -26,7 +26,9 @@ use rover_core::integrator::{
 };
 use rover_core::solver::{SolveReport, SolverWorkspace};
 
-use crate::acceleration::{find, free_acceleration, response, smooth_acceleration, solve_law};
+use crate::acceleration::{
+    find, free_acceleration, largest_displacement, response, smooth_acceleration, solve_law,
+};
 
 /// Change of the velocity, relative to 1 m/s and to the largest, below
 /// which the iteration has settled.
@@ -192,7 +194,7 @@ impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
         }
         let before = &memory.v_half;
         // All that the step could reach: a contact that it does not reach has no impulse.
-        let reach = 3.0 * h * system.displacement(before) + 2.0 * g * h * h;
+        let reach = 3.0 * h * largest_displacement(system, before) + 2.0 * g * h * h;
         find(system, q, before, reach, f64::INFINITY, &mut contacts);
         system.place_middle(q);
         system.update_mass_matrix(options);

@@ -176,7 +176,7 @@ pub fn step_options<const D: usize>(
     options.solver.velocity_tolerance =
         usual.speed * options.solver.tolerance * speed_scale(options.gravity.norm(), usual_weight);
     if let Some(depth) = given.maybe("penetration_tolerance")? {
-        options.penetration_tolerance = depth;
+        options.penetration_tolerance = Some(depth);
     }
     Ok(options)
 }
@@ -219,6 +219,9 @@ pub fn settings<'py>(
     settings.set_item("max_iterations", options.solver.max_sweeps)?;
     let stabilisation = name_of(options.stabilisation, &GRAIN_STABILISATIONS);
     settings.set_item("stabilisation", stabilisation)?;
-    settings.set_item("penetration_tolerance", options.penetration_tolerance)?;
+    settings.set_item(
+        "penetration_tolerance",
+        options.penetration_tolerance.unwrap_or_default(),
+    )?;
     Ok(settings)
 }

@@ -111,7 +111,7 @@ fn a_stop_that_is_foreseen_is_never_passed() {
             forecast: 1.0,
             ..options(5e-3, variant)
         };
-        let depth = options.penetration_tolerance;
+        let depth = 1e-8; // of a machine of a metre
         let mut run = simulation(model(vec![pendulum(-0.2, 0.9)]), options);
         start(&mut run, &[0.8], &[2.0]);
         let mut reached = [false; 2];

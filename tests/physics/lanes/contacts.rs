@@ -676,12 +676,15 @@ fn impulses_are_remembered_by_contact() {
     problems[0].p[..18].copy_from_slice(&p);
     block.contacts.remember(0, &problems, &mut memory);
     problems[0].p.fill(f64::NAN);
-    assert!(block.contacts.recall(0, &memory, &mut problems));
+    let (own, mut is_same) = ((0, None), [false]);
+    (block.contacts).recall(own, &memory, &mut problems, &mut is_same);
+    assert_eq!(is_same, [true]);
     assert_eq!(problems[0].p[..18], p[..]);
     // The third was not there, the first two were in another order.
     memory.impulses.remove(2);
     memory.impulses.swap(0, 1);
-    assert!(!block.contacts.recall(0, &memory, &mut problems));
+    (block.contacts).recall(own, &memory, &mut problems, &mut is_same);
+    assert_eq!(is_same, [false]);
     let recalled = &problems[0].p[..18];
     assert_eq!(recalled[..6], p[..6]);
     assert_eq!(recalled[6..9], [0.0; 3]);

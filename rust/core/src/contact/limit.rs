@@ -65,10 +65,11 @@ pub fn detect_limits(
     out: &mut Vec<Contact>,
 ) {
     for &joint in model.limited_joints() {
+        let arm = model.mechanism().joints[joint].arm;
         for side in [Side::Lower, Side::Upper] {
             let gap = gap(model, joints, joint, side);
-            let rate = || side.sign() * v[model.joint_velocity(joint)];
-            if activation.admits(gap, rate) {
+            let rate = || arm * side.sign() * v[model.joint_velocity(joint)];
+            if activation.admits(arm * gap, rate) {
                 out.push(contact(model, kinematics, joint, side, gap));
             }
         }

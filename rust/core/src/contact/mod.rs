@@ -61,6 +61,7 @@ pub use frame::ContactFrame;
 pub use jacobian::generalized_impulse;
 pub use joint_friction::list_friction;
 pub use limit::{detect_limits, relocate_limit};
+pub(crate) use pair::clusters_of;
 pub use pair::{Contact, ContactKey, Opposite, OtherSide};
 pub use pair_detection::{PairSearch, detect_pairs};
 pub use part::{Part, Side};

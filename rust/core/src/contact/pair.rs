@@ -116,6 +116,17 @@ impl ContactKey {
     }
 }
 
+/// The clusters of a model that a contact touches, by its key: the same one twice where it touches
+/// no other.
+pub(crate) fn clusters_of(model: &Model, key: &ContactKey) -> [usize; 2] {
+    let of = |code| (model.mechanism()).cluster_of_body(Part::body_of_code(code, model));
+    let own = of(key.part);
+    match key.opposite {
+        Opposite::Part(other) => [own, of(other)],
+        Opposite::Ground(_) | Opposite::Grain(_) | Opposite::Stop => [own, own],
+    }
+}
+
 #[inline]
 fn narrow(feature: usize) -> u32 {
     u32::try_from(feature).unwrap_or_else(|_| panic!("invariant: feature {feature} fits 32 bits"))

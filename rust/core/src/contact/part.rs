@@ -62,6 +62,19 @@ impl Part {
         }
     }
 
+    /// The body of the part with a [code](Self::code).
+    #[must_use]
+    pub(crate) fn body_of_code(code: u16, model: &Model) -> usize {
+        let of = |first: u16| usize::from(code - first);
+        match code {
+            LIMITS.. => model.joints()[of(LIMITS)].body,
+            BOXES.. => model.boxes()[of(BOXES)].body,
+            COLLIDERS.. => model.colliders()[of(COLLIDERS)].body,
+            SPHERES.. => model.spheres()[of(SPHERES)].body,
+            _ => model.wheels()[of(0)].body,
+        }
+    }
+
     /// All parts of a model that have a shape: wheels, boxes, balls, colliders.
     pub fn all(model: &Model) -> impl Iterator<Item = Self> {
         let wheels = (0..model.wheels().len()).map(Self::Wheel);

@@ -43,6 +43,8 @@ pub(crate) struct Projection {
     pub answer: Answer,
     /// Whether each contact's gap counts as it is, or as 0 since it is separating (n_c).
     pub counts: Vec<bool>,
+    /// Whether its group was moved (n_c).
+    pub moved: Vec<bool>,
 }
 
 /// Relative violation of the modes' equations up to which they count as those of the step.
@@ -97,7 +99,7 @@ impl Projection {
         let mut displacement: Vec<f64> = (W.chunks_exact(size.max(1)))
             .map(|row| row.iter().zip(&lambda).map(|(w, p)| w * p).sum())
             .collect();
-        let mut counts = Vec::with_capacity(n);
+        let (mut counts, mut moved) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for (i, contact) in ws.contacts.iter().enumerate() {
             let given = shift(system, options, ws, i)[0] + softness(ws, i)[0] * ws.p[d * i];
             let u = solved.u[d * i] - given;
@@ -105,7 +107,10 @@ impl Projection {
                 Some(law) if law.is_soft() => law.unexplained,
                 _ => contact.gap() + options.theta * h * (u - ws.u_before[d * i]),
             };
-            let is_counted = !system.is_immovable(i) && (gap >= 0.0 || gap + h * u < 0.0);
+            let is_moved = ws.groups.group(ws.groups.of_contact(i)).is_moved;
+            let may_move = is_moved && !system.is_immovable(i);
+            let is_counted = may_move && (gap >= 0.0 || gap + h * u < 0.0);
+            moved.push(is_moved);
             displacement[d * i] += if is_counted { gap } else { 0.0 };
             counts.push(is_counted);
         }
@@ -120,6 +125,7 @@ impl Projection {
             law,
             answer,
             counts,
+            moved,
         })
     }
 }
@@ -144,8 +150,7 @@ fn response<S: MechanicalSystem>(system: &S, size: usize) -> Vec<f64> {
 
 /// Whether the step that was just taken with `ws` projected the position.
 pub(crate) fn is_projected<S: MechanicalSystem>(options: &StepOptions, ws: &ScratchOf<S>) -> bool {
-    options.stabilisation == Stabilisation::Projection
-        && (ws.gap_end.iter()).any(|gap| *gap < -options.penetration_tolerance)
+    options.stabilisation == Stabilisation::Projection && ws.groups.all().any(|own| own.is_moved)
 }
 
 /// The law of the step that was just taken with `ws`, whose matrices the system still holds; none

@@ -36,6 +36,9 @@ use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 /// its torque–speed line needs one, a single wheel at most four.
 pub(crate) const MOST_REVISIONS: usize = 6;
 
+/// Penetration that is tolerated by default, m, of a system without a size of its own.
+const TOLERATED: f64 = 1e-8;
+
 /// A contact as time stepping sees it: a key and a gap.
 pub trait UnilateralContact {
     /// Identifies a contact from one step to the next.
@@ -85,6 +88,23 @@ pub struct MechanicalEnergy {
     pub momentum: Vector3<f64>,
     /// kg.
     pub mass: f64,
+    /// Whether a base or a loop passes the momentum on to the world; the momentum is zero then.
+    pub is_held: bool,
+}
+
+impl MechanicalEnergy {
+    /// Those of two clusters together.
+    pub(crate) fn with(self, other: Self) -> Self {
+        let is_held = self.is_held || other.is_held;
+        let momentum = self.momentum + other.momentum;
+        Self {
+            kinetic: self.kinetic + other.kinetic,
+            potential: self.potential + other.potential,
+            momentum: if is_held { Vector3::zeros() } else { momentum },
+            mass: self.mass + other.mass,
+            is_held,
+        }
+    }
 }
 
 impl MechanicalEnergy {
@@ -117,6 +137,34 @@ pub trait MechanicalSystem {
 
     /// Current number of velocities.
     fn nv(&self) -> usize;
+
+    /// Number of clusters, see [`super::groups`]; by default the system is one.
+    fn n_clusters(&self) -> usize {
+        1
+    }
+
+    /// The cluster of a velocity.
+    fn cluster_of_velocity(&self, _k: usize) -> usize {
+        0
+    }
+
+    /// The two clusters that a contact touches, the same one twice where it touches no other.
+    fn clusters_of(&self, _key: &KeyOf<Self>) -> [usize; 2]
+    where
+        Self: Sized,
+    {
+        [0, 0]
+    }
+
+    /// Takes the coordinates of some clusters from another configuration. Called only for a system
+    /// of several clusters.
+    fn take_clusters(
+        &self,
+        _from: &Self::Configuration,
+        _is_taken: &dyn Fn(usize) -> bool,
+        _to: &mut Self::Configuration,
+    ) {
+    }
 
     /// `to = from ⊕ h v`, without allocating.
     fn set_moved(
@@ -193,8 +241,9 @@ pub trait MechanicalSystem {
     /// default nothing.
     fn add_given(&self, _options: &StepOptions, _impulse: &mut [f64]) {}
 
-    /// Whether the gyroscopic terms are too stiff to be explicit in this step. By default never.
-    fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64]) -> bool {
+    /// Whether the gyroscopic terms of a cluster are too stiff to be explicit in this step. By
+    /// default never.
+    fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64], _cluster: usize) -> bool {
         false
     }
 
@@ -241,15 +290,16 @@ pub trait MechanicalSystem {
         MOST_REVISIONS
     }
 
-    /// Kinetic and potential energy of a state, J, and its overall momentum; none if the system is
-    /// not audited.
-    fn energy(
+    /// Kinetic and potential energy of each cluster in a state, J, and its momentum; `out` is
+    /// cleared first, and stays empty if the system is not audited.
+    fn energies(
         &mut self,
         _options: &StepOptions,
         _q: &Self::Configuration,
         _v: &[f64],
-    ) -> Option<MechanicalEnergy> {
-        None
+        out: &mut Vec<MechanicalEnergy>,
+    ) {
+        out.clear();
     }
 
     /// Largest angular speed of a frame whose pose matters, rad/s. By default 0.
@@ -269,20 +319,22 @@ pub trait MechanicalSystem {
         false
     }
 
-    /// Work of its own forces but gravity over a step that ends with `v_end`.
+    /// Work of the own forces of each cluster (n_clusters) but gravity over a step that ends with
+    /// `v_end`.
     fn work(
         &mut self,
         _options: &StepOptions,
         _start: Start<'_, Self::Configuration>,
         _v_end: &[f64],
-    ) -> Work {
-        Work::default()
+        out: &mut [Work],
+    ) {
+        out.fill(Work::default());
     }
 
-    /// Energy that springs and position controls store in a configuration, J, but for a constant.
-    /// By default there are none.
-    fn stored(&self, _q: &Self::Configuration) -> f64 {
-        0.0
+    /// Energy that springs and position controls of each cluster (n_clusters) store in a
+    /// configuration, J, but for a constant. By default there are none.
+    fn stored(&self, _q: &Self::Configuration, out: &mut [f64]) {
+        out.fill(0.0);
     }
 
     /// Work that the torques, motors and wrenches of such a step, as they are at its end, supply
@@ -407,8 +459,8 @@ pub trait MechanicalSystem {
         rebound(options.restitution, u_N_before)
     }
 
-    /// Total mass, kg, of a machine of which any contact yields. By default none does.
-    fn compliant_mass(&self) -> Option<f64> {
+    /// Mass of a cluster, kg, of a machine of which any contact yields. By default none does.
+    fn compliant_mass(&self, _cluster: usize) -> Option<f64> {
         None
     }
 
@@ -474,7 +526,18 @@ pub trait MechanicalSystem {
     /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.
     fn add_moments(&self, _y: &mut [f64]) {}
 
-    /// Largest displacement, m, that `y` (nv) causes away from the contact points; it limits the
-    /// projection.
-    fn displacement(&self, y: &[f64]) -> f64;
+    /// What a unit of a contact's gap counts as where it is compared with lengths, m: of a stop, in
+    /// rad, the arm of its joint. By default 1.
+    fn lever(&self, _contact: &Self::Contact) -> f64 {
+        1.0
+    }
+
+    /// Penetration of a cluster that is tolerated, m.
+    fn tolerated(&self, options: &StepOptions, _cluster: usize) -> f64 {
+        options.penetration_tolerance.unwrap_or(TOLERATED)
+    }
+
+    /// Largest displacement of a cluster, m, that `y` (nv) causes away from the contact points; it
+    /// limits the projection.
+    fn displacement(&self, y: &[f64], cluster: usize) -> f64;
 }

@@ -13,7 +13,8 @@
 //! Each scheme is an [`Integrator`], written once, for any [`MechanicalSystem`]: the multibody tree
 //! and the planar systems ([`crate::system`], [`crate::planar`]) step through the same code. The
 //! schemes share the treatment of contacts (`step_contacts`), and `variant` chooses one of them by
-//! the options.
+//! the options. Clusters that do not touch each other decide for themselves (`groups`), and have
+//! their contacts solved for themselves (`island`).
 //!
 //! # One call
 //!
@@ -44,7 +45,9 @@ pub(crate) mod carried_velocity;
 pub mod contact_modes;
 pub mod energy_audit;
 pub mod error;
+mod groups;
 pub(crate) mod held_step;
+mod island;
 pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;

@@ -30,8 +30,9 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use super::energy_audit::{Audit, GAIN, Verdict, carry_velocity, energy_before};
+use super::energy_audit::{Audit, GAIN, Verdict, carry_velocity, note_energy_before};
 use super::error::StepError;
+use super::groups::{Group, return_ends};
 use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::position_projection;
@@ -40,8 +41,8 @@ use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::{Scratch, ScratchOf};
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, close_end, find_impacts, is_persistent, place,
-    solve_contacts,
+    activation, add_correction, assemble_contacts, close_end, find_impacts, place, solve_contacts,
+    take_persistent,
 };
 use super::warm_start::WarmStart;
 
@@ -59,8 +60,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        scratch.fit(system.nv());
-        scratch.work_spent = 0;
+        scratch.fit(system.nv(), system.n_clusters());
         let mut attempts = MOST_ATTEMPTS;
         let whole = Part {
             options,
@@ -115,9 +115,11 @@ impl Part<'_> {
             let n = (turn / MOST_TURN).min(MOST_PARTS).ceil();
             return self.divide(n, system, state, warm_start, ws, probe);
         }
-        let before = energy_before(system, options, start, ws);
+        note_energy_before(system, options, start, ws);
         system.choose_branches(start);
-        let mut is_gyroscopic = system.is_gyroscopic(options, start.v);
+        ws.gyroscopic.clear();
+        let clusters = 0..system.n_clusters();
+        (ws.gyroscopic).extend(clusters.map(|own| system.is_gyroscopic(options, start.v, own)));
         let mut retaken = 0;
         let mut report = loop {
             *self.attempts = self.attempts.saturating_sub(1);
@@ -126,7 +128,7 @@ impl Part<'_> {
                 && *self.attempts > 1
                 && ws.has_work_left(&options.solver)
                 && system.solves_to_the_end();
-            let attempted = attempt(system, options, start, warm_start, ws, is_gyroscopic, probe);
+            let attempted = attempt(system, options, start, warm_start, ws, probe);
             let Some(mut report) = attempted else {
                 if can_halve {
                     return self.divide(2.0, system, state, warm_start, ws, probe);
@@ -144,23 +146,25 @@ impl Part<'_> {
                 report.status = StepStatus::NotConverged;
             }
             let is_solved = report.is_converged();
-            if before.is_some() || warm_start.is_of(&ws.contacts) {
+            if !ws.before.is_empty() || ws.groups.all().any(|own| own.is_same) {
                 find_impacts(system, options, warm_start, ws);
             }
             let audit = Audit {
-                before,
-                is_last: is_gyroscopic && !can_halve,
+                // With implicit terms there is no other way than halves.
+                is_last: |own: &Group| own.is_gyroscopic && !can_halve,
                 gain: GAIN * self.share,
                 drift: 0.0,
             };
             let verdict = audit.judge(system, options, start, warm_start, ws, &mut report);
-            if verdict == Verdict::Coarse && !is_gyroscopic {
-                is_gyroscopic = true;
-            } else if can_halve && (verdict == Verdict::Coarse || !is_solved) {
-                return self.divide(2.0, system, state, warm_start, ws, probe);
-            } else {
-                break report;
+            let turns_implicit =
+                verdict == Verdict::Coarse && ws.groups.make_coarse_implicit(&mut ws.gyroscopic);
+            if turns_implicit {
+                continue;
             }
+            if can_halve && (verdict == Verdict::Coarse || !is_solved) {
+                return self.divide(2.0, system, state, warm_start, ws, probe);
+            }
+            break report;
         };
         probe.end(Phase::Update);
         report.steps = 1;
@@ -241,7 +245,6 @@ fn attempt<S: MechanicalSystem>(
     start: Start<'_, S::Configuration>,
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
-    is_gyroscopic: bool,
     probe: &mut dyn Probe,
 ) -> Option<StepReport> {
     let (h, theta) = (options.time_step, options.theta);
@@ -258,6 +261,7 @@ fn attempt<S: MechanicalSystem>(
     let activation = activation(options, (1.0 - theta) * h);
     system.detect(start.v, activation, &mut ws.contacts);
     system.relocate(&mut ws.contacts);
+    (ws.groups).find(system, options, &ws.contacts, warm_start, &ws.gyroscopic);
     probe.end(Phase::Detection);
     system.update_mass_matrix(options);
     probe.end(Phase::MassMatrix);
@@ -268,11 +272,7 @@ fn attempt<S: MechanicalSystem>(
     ws.v.copy_from_slice(start.v);
     assemble_contacts(system, options, start.v, warm_start, ws);
     probe.end(Phase::Delassus);
-    if is_gyroscopic {
-        load_implicitly(system, options, start, warm_start, ws);
-    } else {
-        load_explicitly(system, options, start, warm_start, ws);
-    }
+    load(system, options, start, warm_start, ws);
     probe.end(Phase::Bias);
     let mut report = solve_contacts(system, options, start.v, ws, true, probe);
     place(system, options, ws);
@@ -280,13 +280,44 @@ fn attempt<S: MechanicalSystem>(
     Some(report)
 }
 
-/// The free change `ws.y` (factor coordinates): first from the forces at v, then from those at the
-/// resulting velocity.
-pub(super) fn load_explicitly<S: MechanicalSystem>(
+/// The free change `ws.y` (factor coordinates), with implicit gyroscopic terms in the groups that
+/// need them.
+fn load<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
     warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
+) {
+    take_persistent::<S>(ws);
+    let n_implicit = ws.groups.all().filter(|own| own.is_gyroscopic).count();
+    let is_mixed = n_implicit > 0 && n_implicit < ws.groups.all().count();
+    if n_implicit == 0 || is_mixed {
+        load_explicitly(system, options, start, ws);
+    }
+    if is_mixed {
+        ws.v_kept.copy_from_slice(&ws.y);
+    }
+    if n_implicit > 0 {
+        load_implicitly(system, options, start, ws);
+    }
+    if is_mixed {
+        for (k, (y, explicit)) in ws.y.iter_mut().zip(&ws.v_kept).enumerate() {
+            let group = ws.groups.of_cluster(system.cluster_of_velocity(k));
+            if !ws.groups.group(group).is_gyroscopic {
+                *y = *explicit;
+            }
+        }
+    }
+    add_correction(system, options, warm_start, ws);
+}
+
+/// The free change `ws.y` (factor coordinates): first from the forces at v, then from those at the
+/// resulting velocity.
+fn load_explicitly<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
     ws: &mut ScratchOf<S>,
 ) {
     ws.v_mean.copy_from_slice(start.v);
@@ -300,8 +331,8 @@ pub(super) fn load_explicitly<S: MechanicalSystem>(
             system.close_velocity(options, start.v, start.v, &mut ws.y);
             // Impulses of an impact do not predict those of this step: v_m would be far off, and
             // the bias is quadratic in it.
-            if is_persistent(warm_start, &ws.contacts) {
-                system.add_impulses(&ws.p, &mut ws.y);
+            if ws.groups.any_persists() {
+                system.add_impulses(&ws.p_position, &mut ws.y);
             }
             ws.half_solve_back(|y| system.half_solve_back(y));
             for (mean, change) in ws.v_mean.iter_mut().zip(&ws.dv) {
@@ -309,32 +340,34 @@ pub(super) fn load_explicitly<S: MechanicalSystem>(
             }
         }
     }
-    add_correction(system, options, warm_start, ws);
 }
 
 /// The free change `ws.y` (factor coordinates) with implicit gyroscopic
 /// terms; the correction r is part of the forecast impulse.
-pub(super) fn load_implicitly<S: MechanicalSystem>(
+fn load_implicitly<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
-    warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
 ) {
-    let is_persistent = is_persistent(warm_start, &ws.contacts);
+    let is_persistent = ws.groups.any_persists();
     ws.forecast.fill(0.0);
     if is_persistent {
-        system.generalized_impulse(&ws.contacts, &ws.p, &mut ws.forecast);
+        system.generalized_impulse(&ws.contacts, &ws.p_position, &mut ws.forecast);
     }
     ws.v_mean.copy_from_slice(start.v);
     for pass in 0..GYROSCOPIC_PASSES {
         system.load_gyroscopic(options, start, &ws.v_mean, &ws.forecast, &mut ws.y);
         if pass + 1 < GYROSCOPIC_PASSES {
             system.close_velocity(options, start.v, start.v, &mut ws.y);
-            let forecast = if is_persistent { &ws.p[..] } else { &[] };
+            let forecast = if is_persistent {
+                &ws.p_position[..]
+            } else {
+                &[]
+            };
             system.add_loop_impulse(forecast, &mut ws.forecast);
             if is_persistent {
-                system.add_impulses(&ws.p, &mut ws.y);
+                system.add_impulses(&ws.p_position, &mut ws.y);
             }
             ws.half_solve_back(|y| system.half_solve_back(y));
             for ((mean, change), v) in ws.v_mean.iter_mut().zip(&ws.dv).zip(start.v) {
@@ -342,7 +375,6 @@ pub(super) fn load_implicitly<S: MechanicalSystem>(
             }
         }
     }
-    add_correction(system, options, warm_start, ws);
 }
 
 /// Projects the position, checks that everything is finite, and only then changes state and warm
@@ -362,15 +394,16 @@ pub(super) fn finish<S: MechanicalSystem>(
         time,
     } = state;
     let d = S::DIMENSION.components();
-    let stored = system.stored(&ws.end);
+    system.stored(&ws.end, &mut ws.stored[1]);
     if position_projection::project(system, options, ws, &mut report) {
         close_end(system, ws, &mut report);
         system.normalise(&mut ws.end);
+        return_unmoved(system, ws);
         let start = Start {
             configuration: &*configuration,
             v: &*v,
         };
-        carry_velocity(system, options, start, stored, ws, &mut report);
+        carry_velocity(system, options, start, ws, &mut report);
     }
     probe.end(Phase::Projection);
     let is_finite = system.is_finite(&ws.end) && ws.v.iter().chain(&ws.p).all(|x| x.is_finite());
@@ -384,12 +417,36 @@ pub(super) fn finish<S: MechanicalSystem>(
     std::mem::swap(configuration, &mut ws.end);
     v.copy_from_slice(&ws.v);
     *time += options.time_step;
-    let is_persistent = warm_start.is_of(&ws.contacts) && !ws.impact.contains(&true);
+    let is_persistent = note_persistent::<S>(ws);
     warm_start.remember(&ws.contacts, d, &ws.p);
     warm_start.persistent.clear();
-    if is_persistent && !ws.contacts.is_empty() {
+    if is_persistent {
         warm_start.persistent.resize(system.nv(), 0.0);
         system.generalized_impulse(&ws.contacts, &ws.p, &mut warm_start.persistent);
+        for (k, x) in warm_start.persistent.iter_mut().enumerate() {
+            let group = ws.groups.of_cluster(system.cluster_of_velocity(k));
+            if !ws.groups.group(group).persists {
+                *x = 0.0;
+            }
+        }
     }
     Ok(report)
+}
+
+/// Returns to the groups that the projection did not move what they had before it.
+fn return_unmoved<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>) {
+    return_ends(system, ws, |_, own| !own.is_moved);
+}
+
+/// Notes whose contacts persisted in this step; whether any did.
+fn note_persistent<S: MechanicalSystem>(ws: &mut ScratchOf<S>) -> bool {
+    for number in 0..ws.groups.n() {
+        let own = ws.groups.group_mut(number);
+        own.persists = own.is_same && own.n_contacts > 0;
+    }
+    for i in 0..ws.contacts.len() {
+        let own = ws.groups.group_mut(ws.groups.of_contact(i));
+        own.persists = own.persists && !ws.impact[i];
+    }
+    ws.groups.any_persists()
 }

@@ -19,8 +19,9 @@
 //! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and
 //! the correction r as in [`super::moreau_jean`].
 
-use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
+use super::energy_audit::{Audit, GAIN, Verdict, note_energy_before};
 use super::error::StepError;
+use super::groups::Group;
 use super::mechanical_system::{KeyOf, MOST_REVISIONS, MechanicalSystem, Start, UnilateralContact};
 use super::moreau_jean::{MoreauJean, finish};
 use super::options::StepOptions;
@@ -59,13 +60,12 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         let ws = scratch;
-        ws.fit(system.nv());
-        ws.work_spent = 0;
+        ws.fit(system.nv(), system.n_clusters());
         let start = Start {
             configuration: &*state.configuration,
             v: &*state.v,
         };
-        let before = energy_before(system, options, start, ws);
+        note_energy_before(system, options, start, ws);
         system.choose_branches(start);
         system.begin_balance(start);
         ws.v.copy_from_slice(start.v);
@@ -74,13 +74,12 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             move_to_the_end(system, options, start, ws);
             close_end(system, ws, &mut report);
             let audit = Audit {
-                before,
-                is_last: false,
+                is_last: |_: &Group| false,
                 gain: GAIN,
                 drift: drift(system, options, start),
             };
             let is_solved = report.is_converged();
-            if before.is_some() || warm_start.is_of(&ws.contacts) {
+            if !ws.before.is_empty() || ws.groups.all().any(|own| own.is_same) {
                 find_impacts(system, options, warm_start, ws);
             }
             let verdict = audit.judge(system, options, start, warm_start, ws, &mut report);
@@ -222,6 +221,7 @@ fn iterate<S: MechanicalSystem>(
         // The set of contacts of a step is decided once, by the forecast.
         let activation = activation(options, theta * h);
         system.detect(start.v, activation, &mut ws.contacts);
+        (ws.groups).find(system, options, &ws.contacts, warm_start, &[]);
     }
     system.relocate(&mut ws.contacts);
     probe.end(Phase::Detection);

@@ -53,8 +53,9 @@ pub struct StepOptions {
     pub variant: Variant,
     /// Default projection.
     pub stabilisation: Stabilisation,
-    /// Penetration that is tolerated, m. Default 1e-8: one step of driving on a plane adds less.
-    pub penetration_tolerance: f64,
+    /// Penetration that is tolerated, m. Default `None`: 1e-8 of the size of a machine in three
+    /// dimensions, 5e-3 of the smallest grain, and 1e-8 m otherwise.
+    pub penetration_tolerance: Option<f64>,
     /// Whether the solver starts from the last step's impulses. Default true.
     pub warm_start: bool,
     /// Options of the contact solver. Default tolerance 1e-12: it costs 5% more than 1e-10 on a
@@ -79,7 +80,7 @@ impl Default for StepOptions {
             forecast: 0.5,
             variant: Variant::default(),
             stabilisation: Stabilisation::default(),
-            penetration_tolerance: 1e-8,
+            penetration_tolerance: None,
             warm_start: true,
             solver: SolverOptions::default(),
             newton_tolerance: 1e-12,
@@ -141,7 +142,7 @@ impl StepOptions {
         let threads = self.solver.threads;
         let is_count = (1..=1024).contains(&threads);
         demand("threads", threads as f64, is_count, "from 1 to 1024")?;
-        let depth = self.penetration_tolerance;
+        let depth = self.penetration_tolerance.unwrap_or(0.0);
         demand(
             "penetration_tolerance",
             depth,

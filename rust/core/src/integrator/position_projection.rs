@@ -10,6 +10,8 @@
 //! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical
 //! systems with unilateral contact and Coulomb's friction*, CMAME 256, 224–250.
 
+use super::groups::keep_ends;
+use super::island::{Level, soften, solve_group};
 use super::mechanical_system::MechanicalSystem;
 use super::options::{Stabilisation, StepOptions};
 use super::report::StepReport;
@@ -31,37 +33,72 @@ pub(super) fn project<S: MechanicalSystem>(
     }
     let d = S::DIMENSION.components();
     let stays = |gap: f64, u_N: f64| gap + options.time_step * u_N < 0.0;
-    let mut deepest = 0.0_f64;
     for (gap, u) in ws.gap_end.iter_mut().zip(ws.u.chunks_exact(d)) {
         if *gap < 0.0 && !stays(*gap, u[0]) {
             *gap = 0.0;
         }
-        deepest = deepest.min(*gap);
     }
-    if deepest >= -options.penetration_tolerance {
-        return false;
+    let mut has_moved = false;
+    for number in 0..ws.groups.n() {
+        let own = ws.gap_end.iter().enumerate();
+        let own = own.filter(|(i, _)| ws.groups.of_contact(*i) == number);
+        let own = own.map(|(i, gap)| gap * system.lever(&ws.contacts[i]));
+        let deepest = own.fold(0.0_f64, f64::min);
+        if deepest >= -ws.groups.group(number).tolerated {
+            continue;
+        }
+        if !has_moved {
+            ws.p_position.clear();
+            ws.p_position.resize(ws.p.len(), 0.0);
+        }
+        let share = project_group(system, options, ws, (number, deepest), report);
+        has_moved = true;
+        let own = ws.groups.group_mut(number);
+        (own.is_moved, own.share) = (true, share);
     }
+    if has_moved {
+        for (k, displacement) in ws.dv.iter_mut().enumerate() {
+            let group = ws.groups.of_cluster(system.cluster_of_velocity(k));
+            *displacement *= ws.groups.group(group).share;
+        }
+        keep_ends(system, ws);
+        system.advance(&mut ws.end, &ws.dv, 1.0);
+    }
+    has_moved
+}
+
+/// Adds the displacement of a group, whose deepest gap is `deepest`, to `ws.dv`; returns which share
+/// of it is to be made.
+fn project_group<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    ws: &mut ScratchOf<S>,
+    (number, deepest): (usize, f64),
+    report: &mut StepReport,
+) -> f64 {
+    let d = S::DIMENSION.components();
     // The step's own problem stays to be read.
     std::mem::swap(&mut ws.q_free, &mut ws.q_position);
     ws.q_free.clear();
     ws.q_free.resize(ws.p.len(), 0.0);
-    for (q, gap) in ws.q_free.chunks_exact_mut(d).zip(&ws.gap_end) {
-        q[0] = *gap;
+    for (i, (q, gap)) in ws.q_free.chunks_exact_mut(d).zip(&ws.gap_end).enumerate() {
+        if ws.groups.of_contact(i) == number {
+            q[0] = *gap;
+        }
     }
-    ws.p_position.resize(ws.p.len(), 0.0);
     ws.u_position.resize(ws.p.len(), 0.0);
     let limit = -FARTHEST * deepest;
-    let mut solved = displace(system, options, ws, 0.0);
+    let mut solved = displace(system, options, ws, number, 0.0);
     let is_finite = solved.status != SolveStatus::NonFinite;
-    if is_finite && (!solved.is_converged() || size(system, ws) > limit) {
+    if is_finite && (!solved.is_converged() || size(system, ws, number) > limit) {
         // Friction locks a wedge, or stalls over nanometres: retry without friction, along the
         // shortest way out.
         ws.mu.fill(0.0);
-        solved = displace(system, options, ws, 0.0);
+        solved = displace(system, options, ws, number, 0.0);
         if !solved.is_converged() {
             // A part wedged between opposed contacts cannot be freed. With slightly compliant
             // ground the problem has a solution, which opens each gap as far as the others allow.
-            solved = displace(system, options, ws, COMPLIANCE);
+            solved = displace(system, options, ws, number, COMPLIANCE);
         }
         set_friction(system, options, &ws.contacts, &mut ws.mu);
     }
@@ -71,13 +108,9 @@ pub(super) fn project<S: MechanicalSystem>(
         // The report's residual is that of the velocities, which are held to more.
         report.residual = residual;
     }
-    let share = (limit / size(system, ws)).min(1.0);
+    let share = (limit / size(system, ws, number)).min(1.0);
     std::mem::swap(&mut ws.q_free, &mut ws.q_position);
-    for displacement in &mut ws.dv {
-        *displacement *= share;
-    }
-    system.advance(&mut ws.end, &ws.dv, 1.0);
-    true
+    share
 }
 
 /// Share of the tolerated penetration that many contacts are projected to. Few are projected to the
@@ -85,13 +118,15 @@ pub(super) fn project<S: MechanicalSystem>(
 const EXACT: f64 = 1e-3;
 
 /// Relative residual asked of the displacement for the gaps `ws.gap_end`.
-fn tolerance<Q: Clone, C>(options: &StepOptions, ws: &Scratch<Q, C>) -> f64 {
+fn tolerance<Q: Clone, C>(options: &StepOptions, ws: &Scratch<Q, C>, number: usize) -> f64 {
     let own = options.solver.tolerance;
-    if ws.contacts.len() <= options.solver.direct_contacts {
+    if ws.groups.group(number).n_contacts <= options.solver.direct_contacts {
         return own;
     }
-    let size = ws.gap_end.iter().map(|gap| gap * gap).sum::<f64>().sqrt();
-    own.max((EXACT * options.penetration_tolerance / size).min(EXACT))
+    let gaps = ws.gap_end.iter().enumerate();
+    let gaps = gaps.filter(|(i, _)| ws.groups.of_contact(*i) == number);
+    let size = gaps.map(|(_, gap)| gap * gap).sum::<f64>().sqrt();
+    own.max((EXACT * ws.groups.group(number).tolerated / size).min(EXACT))
 }
 
 /// Compliance of the ground for a wedged machine that nothing else frees, relative to that of W.
@@ -103,21 +138,37 @@ fn displace<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
     ws: &mut ScratchOf<S>,
+    number: usize,
     compliance: f64,
 ) -> SolveReport {
-    ws.p_position.fill(0.0);
+    let d = S::DIMENSION.components();
+    for (i, p) in ws.p_position.chunks_exact_mut(d).enumerate() {
+        if ws.groups.of_contact(i) == number {
+            p.fill(0.0);
+        }
+    }
     let solver_options = SolverOptions {
-        tolerance: tolerance(options, ws),
+        tolerance: tolerance(options, ws, number),
         ..ws.solver_options(&options.solver)
     };
+    if ws.groups.are_several() {
+        let solver_options = SolverOptions {
+            budget: options.solver.budget,
+            ..solver_options
+        };
+        ws.u_position.copy_from_slice(&ws.q_free);
+        let level = Level::Position(compliance);
+        if let Some(solved) = solve_group(system, &solver_options, ws, number, level) {
+            ws.y.fill(0.0);
+            system.add_impulses(&ws.p_position, &mut ws.y);
+            ws.half_solve_back(|y| system.half_solve_back(y));
+            return solved;
+        }
+    }
     let operator = (compliance > 0.0).then(|| system.problem(&ws.q_free, &ws.mu).operator());
     let solved = if let Some(Operator::Dense(W)) = operator {
-        let n = ws.q_free.len();
         let mut W = W.to_vec();
-        let mean = (0..n).map(|i| W[i * (n + 1)]).sum::<f64>() / n as f64;
-        for i in 0..n {
-            W[i * (n + 1)] += compliance * mean;
-        }
+        soften(&mut W, compliance);
         solve(
             &FrictionContactProblem::from_assembled(S::DIMENSION, &W, &ws.q_free, &ws.mu),
             &solver_options,
@@ -144,10 +195,19 @@ fn displace<S: MechanicalSystem>(
 
 /// Size of a displacement, m: the largest at the contact points and at the points that the system
 /// adds.
-fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>) -> f64 {
+fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>, number: usize) -> f64 {
+    let d = S::DIMENSION.components();
+    let own = |i: &usize| ws.groups.of_contact(i / d) == number;
     // The answer is u = d + (gap, 0, 0) with d = W λ: subtract the gaps.
-    let points = ws.u_position.iter().zip(&ws.q_free).map(|(u, q)| u - q);
-    let elsewhere = system.displacement(&ws.dv);
+    let points = (0..ws.u_position.len()).filter(own);
+    let points = points.map(|i| {
+        let lever = system.lever(&ws.contacts[i / d]);
+        (ws.u_position[i] - ws.q_free[i]) * lever
+    });
+    let clusters = 0..ws.groups.n();
+    let clusters = clusters.filter(|own| ws.groups.of_cluster(*own) == number);
+    let elsewhere = clusters.map(|own| system.displacement(&ws.dv, own));
+    let elsewhere = elsewhere.fold(0.0, f64::max);
     points.fold(elsewhere, |m, d| m.max(d.abs()))
 }
 

@@ -1,6 +1,10 @@
 //! Scratch of a step, common to all systems: vectors over velocities and over contacts.
 
+use super::energy_audit::Balance;
+use super::groups::Groups;
+use super::island::Island;
 use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, UnilateralContact};
+use super::work::Work;
 use crate::law::compliance::Yielding;
 use crate::problem::Redundancy;
 use crate::solver::{SolverOptions, SolverWorkspace};
@@ -46,6 +50,23 @@ pub struct Scratch<Q, C> {
     pub(super) solver: SolverWorkspace,
     pub(super) redundancy: Redundancy,
     pub(super) audited: Audited<Q>,
+    /// Groups of touching clusters.
+    pub(super) groups: Groups,
+    /// Of each cluster, whether the gyroscopic terms of the step are implicit.
+    pub(super) gyroscopic: Vec<bool>,
+    /// Energies of the clusters before and after the step, the work of their own forces, and what
+    /// their springs store before and after it, J.
+    pub(super) before: Vec<MechanicalEnergy>,
+    pub(super) after: Vec<MechanicalEnergy>,
+    pub(super) work: Vec<Work>,
+    pub(super) stored: [Vec<f64>; 2],
+    /// Balances of the groups that the audit has judged.
+    pub(super) judged: Vec<(usize, Balance)>,
+    /// A configuration and a velocity (nv) of which other groups keep their part.
+    pub(super) kept: Q,
+    pub(super) v_kept: Vec<f64>,
+    /// The contacts of one group, and their problem.
+    pub(super) island: Island,
     /// Work of the step's solves so far, in the solver's unit.
     pub(super) work_spent: u64,
     pub(super) whole: Whole<C>,
@@ -105,7 +126,8 @@ pub type ScratchOf<S> =
 pub(super) struct Audited<Q> {
     pub(super) configuration: Q,
     pub(super) v: Vec<f64>,
-    pub(super) energy: Option<MechanicalEnergy>,
+    /// Of each cluster; empty if it is not known.
+    pub(super) energies: Vec<MechanicalEnergy>,
 }
 
 impl<Q> Audited<Q> {
@@ -113,24 +135,30 @@ impl<Q> Audited<Q> {
         Self {
             configuration,
             v: vec![f64::NAN; nv],
-            energy: None,
+            energies: Vec::new(),
         }
     }
 }
 
 impl<Q: Clone> Audited<Q> {
     /// Stores the energy of a state.
-    pub(super) fn is(&mut self, configuration: &Q, v: &[f64], energy: MechanicalEnergy) {
+    pub(super) fn is(&mut self, configuration: &Q, v: &[f64], energies: &[MechanicalEnergy]) {
         self.configuration.clone_from(configuration);
         self.v.clear();
         self.v.extend_from_slice(v);
-        self.energy = Some(energy);
+        self.energies.clear();
+        self.energies.extend_from_slice(energies);
     }
 }
 
 /// Divisor of the solver's budget for the least that each solve of a step gets, however much the
 /// ones before it have spent.
 const SOLVE_SHARE: u64 = 16;
+
+/// Budget of the next solve of a step.
+pub(super) fn left_of(budget: u64, spent: u64) -> u64 {
+    budget.saturating_sub(spent).max(budget / SOLVE_SHARE)
+}
 
 impl<Q: Clone, C> Scratch<Q, C> {
     /// Room for nv velocities and n contacts of d components; `q` is any
@@ -164,6 +192,16 @@ impl<Q: Clone, C> Scratch<Q, C> {
             solver: SolverWorkspace::default(),
             redundancy: Redundancy::default(),
             audited: Audited::new(q.clone(), nv),
+            groups: Groups::default(),
+            gyroscopic: Vec::new(),
+            before: Vec::new(),
+            after: Vec::new(),
+            work: Vec::new(),
+            stored: [Vec::new(), Vec::new()],
+            judged: Vec::new(),
+            kept: q.clone(),
+            v_kept: vec![0.0; nv],
+            island: Island::default(),
             work_spent: 0,
             whole: Whole::new(),
         }
@@ -171,7 +209,14 @@ impl<Q: Clone, C> Scratch<Q, C> {
 
     /// Begins a step: makes the velocities' vectors fit a system whose nv may have changed since
     /// the last one.
-    pub(super) fn fit(&mut self, nv: usize) {
+    /// `n`: clusters.
+    pub(super) fn fit(&mut self, nv: usize, n: usize) {
+        self.work_spent = 0;
+        self.island.begin(n);
+        self.work.resize(n, Work::default());
+        for stored in &mut self.stored {
+            stored.resize(n, 0.0);
+        }
         self.whole.clear();
         for vector in [
             &mut self.impulse,
@@ -181,6 +226,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             &mut self.forecast,
             &mut self.v,
             &mut self.v_mean,
+            &mut self.v_kept,
         ] {
             vector.resize(nv, 0.0);
         }
@@ -214,9 +260,8 @@ impl<Q: Clone, C> Scratch<Q, C> {
     /// The options of the step's next solve: all solves of a step share one budget.
     pub(super) fn solver_options(&self, options: &SolverOptions) -> SolverOptions {
         let whole = options.budget_of(self.contacts.len());
-        let left = whole.saturating_sub(self.work_spent);
         SolverOptions {
-            budget: Some(left.max(whole / SOLVE_SHARE)),
+            budget: Some(left_of(whole, self.work_spent)),
             ..*options
         }
     }

@@ -1,5 +1,7 @@
 //! The contacts of a step: forecast, assembly, solve, and the gaps at the end.
 
+use super::groups::Group;
+use super::island::{Level, settle, solve_group};
 use super::mechanical_system::{KeyOf, MechanicalSystem, UnilateralContact};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
@@ -7,7 +9,6 @@ use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
 use super::warm_start::WarmStart;
 use crate::contact::Activation;
-use crate::law::compliance::Yielding;
 use crate::solver::SolveReport;
 
 /// The contact forecast, measured from `q_m`, with the margin within which a resting contact stays
@@ -61,9 +62,10 @@ pub(super) fn find_impacts<S: MechanicalSystem>(
 ) {
     let d = S::DIMENSION.components();
     let slow = slow(options);
-    let is_fast = |u: &[f64]| u[0].abs() > slow;
+    let is_fast = |(u, contact): (&[f64], &S::Contact)| u[0].abs() * system.lever(contact) > slow;
     ws.impact.clear();
-    ws.impact.extend(ws.u_before.chunks_exact(d).map(is_fast));
+    let local = ws.u_before.chunks_exact(d).zip(&ws.contacts);
+    ws.impact.extend(local.map(is_fast));
     if !ws.impact.contains(&true) {
         return;
     }
@@ -92,31 +94,41 @@ pub(super) fn find_impacts<S: MechanicalSystem>(
 /// friction of the others counts with its value at the end. That of one that yields is the work of
 /// its slip, and of the deflection that leaves it with the tread.
 ///
-/// Call it after [`find_impacts`]; `ws.p_position` is overwritten.
+/// Call it after [`find_impacts`]; `ws.p_position` is overwritten. `group`: whose contacts.
 pub(super) fn contact_work<S: MechanicalSystem>(
+    system: &S,
     v_before: &[f64],
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
+    group: usize,
 ) -> f64 {
     let d = S::DIMENSION.components();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
-    let local = ws.p.chunks_exact(d).zip(local);
-    let is_rigid = !ws.yielding.iter().any(Yielding::is_soft);
-    if is_rigid && is_persistent(warm_start, &ws.contacts) && !ws.impact.contains(&true) {
-        ws.p_position.resize(ws.p.len(), 0.0);
+    ws.p_position.resize(ws.p.len(), 0.0);
+    let groups = &ws.groups;
+    let is_own = |i: &usize| groups.of_contact(*i) == group;
+    let own = || (0..ws.contacts.len()).filter(is_own);
+    let soft = |i: usize| ws.yielding.get(i).filter(|law| law.is_soft());
+    let is_smooth = |i: usize| !ws.impact[i] && soft(i).is_none();
+    if groups.group(group).persists && own().all(is_smooth) {
         warm_start.recall(&ws.contacts, d, &mut ws.p_position);
-        let friction = local.zip(ws.p_position.chunks_exact(d));
-        let friction = friction.map(|((p, (u, before)), last)| {
-            dot(&p[1..], &u[1..]) + dot(&p[1..], &before[1..]) - dot(&last[1..], &before[1..])
+        let friction = own().map(|i| {
+            let at = d * i + 1..d * (i + 1);
+            let (p, u) = (&ws.p[at.clone()], &ws.u[at.clone()]);
+            let (before, last) = (&ws.u_before[at.clone()], &ws.p_position[at]);
+            dot(p, u) + dot(p, before) - dot(last, before)
         });
-        0.5 * (friction.sum::<f64>() + dot(v_before, &warm_start.persistent))
+        let friction = friction.sum::<f64>();
+        let is_own = |k: &usize| groups.of_cluster(system.cluster_of_velocity(*k)) == group;
+        let start = (0..v_before.len()).filter(is_own);
+        let start = start.map(|k| v_before[k] * warm_start.persistent[k]);
+        0.5 * (friction + start.sum::<f64>())
     } else {
-        let works = local.zip(&ws.impact).enumerate();
-        let works = works.map(|(i, ((p, (u, before)), is_impact))| {
-            let law = ws.yielding.get(i).filter(|law| law.is_soft());
-            match law {
-                _ if *is_impact => 0.5 * (dot(p, u) + dot(p, before)),
+        let works = own().map(|i| {
+            let at = d * i..d * (i + 1);
+            let (p, u) = (&ws.p[at.clone()], &ws.u[at.clone()]);
+            match soft(i) {
+                _ if ws.impact[i] => 0.5 * (dot(p, u) + dot(p, &ws.u_before[at])),
                 Some(law) => law.slip_work([u[0], u[1], u[d - 1]], [p[0], p[1], p[d - 1]]),
                 None => dot(&p[1..], &u[1..]),
             }
@@ -143,27 +155,24 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
     }
     set_friction(system, options, &ws.contacts, &mut ws.mu);
     system.assemble(&ws.contacts, v_before, &mut ws.u_before);
-    let mass = system.compliant_mass();
+    let yields = system.compliant_mass(0).is_some();
     ws.yielding.clear();
     warm_start.recall(&ws.contacts, d, &mut ws.p);
-    if let Some(mass) = mass {
-        // Without a memory a contact may bear the weight.
-        let weight = mass * options.gravity.norm() * options.time_step;
-        let unknown = warm_start.impulses.is_empty().then_some(weight);
-        yield_under_load(system, options, unknown, ws);
+    if yields {
+        yield_under_load(system, options, warm_start, ws);
     }
 }
 
 /// Computes the yielding law of every contact and adds its part to W.
 ///
 /// `ws.p` holds the impulses of the last step, and `ws.v` the velocity that led to the end pose.
-/// Without a last step, `unknown` replaces the normal impulses.
+/// Where a cluster remembers no contact, each of its contacts may bear its weight.
 ///
 /// A contact with restitution is rigid in the step in which it closes, and Newton's law bounces it.
 fn yield_under_load<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
-    unknown: Option<f64>,
+    warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
 ) {
     let d = S::DIMENSION.components();
@@ -177,7 +186,11 @@ fn yield_under_load<S: MechanicalSystem>(
         let bounces = is_new && system.normal_shift(options, contact, 1.0) > 0.0;
         let compliance = system.compliance(contact, &ws.v).filter(|_| !bounces);
         let law = compliance.map(|compliance| {
-            let unknown = (unknown.is_some(), unknown.unwrap_or(0.0));
+            let [cluster, _] = system.clusters_of(&contact.key());
+            let mut known = warm_start.impulses.iter();
+            let is_known = known.any(|(key, _)| system.clusters_of(key).contains(&cluster));
+            let mass = system.compliant_mass(cluster).unwrap_or(0.0);
+            let unknown = (!is_known, mass * options.gravity.norm() * options.time_step);
             compliance.over(step, contact.gap(), ws.q_free[d * i], before, unknown)
         });
         ws.yielding.push(law.unwrap_or_default());
@@ -225,17 +238,8 @@ pub(super) fn set_friction<S: MechanicalSystem>(
     );
 }
 
-/// Whether the last step had the same contacts and none of them was new or in impact, so that its
-/// impulses equal those of this step up to O(h). That is so whatever the solver starts from.
-pub(super) fn is_persistent<C: UnilateralContact>(
-    warm_start: &WarmStart<C::Key>,
-    contacts: &[C],
-) -> bool {
-    !warm_start.persistent.is_empty() && warm_start.is_of(contacts)
-}
-
-/// Adds the deferred correction r to `ws.y` if the last step had the same contacts and all of them
-/// persisted.
+/// Adds the deferred correction r to `ws.y` in the groups whose contacts are those of the last step
+/// and persisted.
 ///
 /// `ws.p` must still hold the last step's impulses.
 pub(super) fn add_correction<S: MechanicalSystem>(
@@ -244,17 +248,33 @@ pub(super) fn add_correction<S: MechanicalSystem>(
     warm_start: &WarmStart<KeyOf<S>>,
     ws: &mut ScratchOf<S>,
 ) {
-    if !is_persistent(warm_start, &ws.contacts) {
+    if !ws.groups.any_persists() {
         return;
     }
     let share = 1.0 - options.theta;
     system.generalized_impulse(&ws.contacts, &ws.p, &mut ws.correction);
-    for (r, before) in ws.correction.iter_mut().zip(&warm_start.persistent) {
-        *r = share * (before - *r);
+    for (k, r) in ws.correction.iter_mut().enumerate() {
+        let group = ws.groups.of_cluster(system.cluster_of_velocity(k));
+        *r = if ws.groups.group(group).persists {
+            share * (warm_start.persistent[k] - *r)
+        } else {
+            0.0
+        };
     }
     system.half_solve(&mut ws.correction);
     for (y, r) in ws.y.iter_mut().zip(&ws.correction) {
         *y += r;
+    }
+}
+
+/// `ws.p_position`: the last step's impulses `ws.p` of the contacts that persist, 0 of the others.
+pub(super) fn take_persistent<S: MechanicalSystem>(ws: &mut ScratchOf<S>) {
+    let d = S::DIMENSION.components();
+    ws.p_position.clone_from(&ws.p);
+    for (i, p) in ws.p_position.chunks_exact_mut(d).enumerate() {
+        if !ws.groups.group(ws.groups.of_contact(i)).persists {
+            p.fill(0.0);
+        }
     }
 }
 
@@ -295,33 +315,44 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         } else {
             system.add_local_of_velocity(&ws.contacts, &ws.v, &mut ws.q_free);
         }
-        add_shifts(system, options, ws, 1.0);
-        let mut solved = solve_problem(system, options, ws);
-        let inelastic;
+        add_shifts(system, (options, 1.0), ws, |_| true);
+        ws.island.forget_answers();
+        solve_problems(system, options, ws, |_| true);
         let mut law = options;
-        if !solved.is_converged() && options.is_elastic() && system.solves_to_the_end() {
+        let inelastic;
+        let is_unsolved = ws.groups.all().any(|own| !own.is_solved);
+        if is_unsolved && options.is_elastic() && system.solves_to_the_end() {
             inelastic = StepOptions {
                 restitution: 0.0,
                 materials: options.materials.inelastic(),
                 ..options.clone()
             };
-            add_shifts(system, law, ws, -1.0);
             law = &inelastic;
-            add_shifts(system, law, ws, 1.0);
-            ws.p.fill(0.0);
-            solved = solve_problem(system, options, ws);
+            for number in 0..ws.groups.n() {
+                let own = ws.groups.group_mut(number);
+                own.is_inelastic = !own.is_solved;
+            }
+            add_shifts(system, (options, -1.0), ws, |own| own.is_inelastic);
+            add_shifts(system, (law, 1.0), ws, |own| own.is_inelastic);
+            for (i, p) in ws.p.chunks_exact_mut(d).enumerate() {
+                if ws.groups.group(ws.groups.of_contact(i)).is_inelastic {
+                    p.fill(0.0);
+                }
+            }
+            solve_problems(system, options, ws, |own| own.is_inelastic);
             report.retaken = 1;
         }
         // u contains the shift and what the contacts yield: remove both.
         for i in 0..n {
-            let shift = shift(system, law, ws, i);
+            let is_inelastic = ws.groups.group(ws.groups.of_contact(i)).is_inelastic;
+            let shift = shift(system, if is_inelastic { law } else { options }, ws, i);
             let softness = softness(ws, i);
             for (k, (shift, softness)) in (d * i..d * (i + 1)).zip(shift.into_iter().zip(softness))
             {
                 ws.u[k] -= shift + softness * ws.p[k];
             }
         }
-        report.enter(&solved);
+        ws.island.enter_answers(&mut report);
         system.add_impulses(&ws.p, &mut ws.y);
         system.add_moments(&mut ws.y);
         probe.end(Phase::Solve);
@@ -333,19 +364,47 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
     report
 }
 
-/// Adds `sign` times the impact law's shift to the normal free velocities `ws.q_free`.
+/// Adds the impact law's shift, times a sign, to the normal free velocities `ws.q_free` of some
+/// groups.
 fn add_shifts<S: MechanicalSystem>(
     system: &S,
-    options: &StepOptions,
+    (options, sign): (&StepOptions, f64),
     ws: &mut ScratchOf<S>,
-    sign: f64,
+    is_meant: impl Fn(&Group) -> bool,
 ) {
     let d = S::DIMENSION.components();
     for i in 0..ws.contacts.len() {
+        if !is_meant(ws.groups.group(ws.groups.of_contact(i))) {
+            continue;
+        }
         let shift = shift(system, options, ws, i);
         for (q, shift) in ws.q_free[d * i..][..d].iter_mut().zip(shift) {
             *q += sign * shift;
         }
+    }
+}
+
+/// Solves the assembled problems of some groups from `ws.p` and charges the step's budget.
+fn solve_problems<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    ws: &mut ScratchOf<S>,
+    is_meant: impl Fn(&Group) -> bool,
+) {
+    let are_several = ws.groups.are_several();
+    for number in 0..ws.groups.n() {
+        let own = ws.groups.group(number);
+        if !ws.groups.is_group(number) || own.n_contacts == 0 || !is_meant(own) {
+            continue;
+        }
+        let solved = if are_several {
+            solve_group(system, &options.solver, ws, number, Level::Velocity)
+        } else {
+            None
+        };
+        let solved = solved.unwrap_or_else(|| solve_problem(system, options, ws));
+        ws.groups.group_mut(number).is_solved = solved.is_converged();
+        ws.island.keep_answer(number, solved);
     }
 }
 
@@ -369,11 +428,15 @@ fn solve_problem<S: MechanicalSystem>(
     if solved.is_converged()
         && let Some(problem) = system.open_problem(&ws.q_free, &ws.mu)
     {
-        let residuals = (options.solver.tolerance, solved.residual);
-        let settled = (ws.redundancy).settle_problem(&problem, residuals, &mut ws.p, &mut ws.u);
-        if let Some(residual) = settled {
-            (solved.residual, solved.velocity_error) = (residual.relative, residual.velocity);
-        }
+        let tolerance = options.solver.tolerance;
+        let redundancy = &mut ws.redundancy;
+        settle(
+            redundancy,
+            &problem,
+            tolerance,
+            &mut solved,
+            (&mut ws.p, &mut ws.u),
+        );
     }
     solved
 }

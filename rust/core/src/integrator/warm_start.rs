@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::mechanical_system::UnilateralContact;
+use super::mechanical_system::{MechanicalSystem, UnilateralContact};
 use crate::contact::ContactKey;
 
 /// Number of remembered contacts from which bisection is tried before a linear search.
@@ -14,8 +14,9 @@ const MANY: usize = 64;
 pub struct WarmStart<K = ContactKey> {
     /// (key, impulse along n, t, b in N s; b is 0 in the plane), in the order of detection.
     pub impulses: Vec<(K, [f64; 3])>,
-    /// Generalized impulse of persistent contact in the last step (nv), N s and N m s; empty if a
-    /// contact was new, separated or in impact.
+    /// Generalized impulse of persistent contact in the last step (nv), N s and N m s: 0 for the
+    /// velocities of a group of clusters of which a contact was new, separated or in impact, and
+    /// empty if no group persisted.
     pub persistent: Vec<f64>,
 }
 
@@ -83,6 +84,16 @@ impl<K: Copy + Ord> WarmStart<K> {
                 || (n <= MANY && self.impulses.iter().any(|(key, _)| *key == wanted))
         };
         n == contacts.len() && contacts.iter().enumerate().all(is_known)
+    }
+
+    /// Whether the contacts of a cluster persisted in the last step. Of a system with several
+    /// clusters, the entries of [`Self::persistent`] are 0 where they did not.
+    pub(super) fn persists<S>(&self, system: &S, cluster: usize) -> bool
+    where
+        S: MechanicalSystem,
+    {
+        let mut own = self.persistent.iter().enumerate();
+        own.any(|(k, x)| *x != 0.0 && system.cluster_of_velocity(k) == cluster)
     }
 
     /// Remembers the impulses `p` (d n_c).

@@ -7,6 +7,8 @@
 //! ```
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+use std::ops::Add;
+
 use super::report::StepReport;
 use crate::scalar::Lane;
 
@@ -22,6 +24,16 @@ pub struct Work<T = f64> {
 }
 
 impl<T: Lane> Work<T> {
+    /// None. `zero`: 0 in every lane.
+    #[inline(always)]
+    pub(crate) fn none(zero: T) -> Self {
+        Self {
+            supplied: zero,
+            damped: zero,
+            of_springs: zero,
+        }
+    }
+
     /// Work of all forces.
     #[inline(always)]
     #[must_use]
@@ -36,6 +48,18 @@ impl<T: Lane> Work<T> {
             supplied: self.supplied * share,
             damped: self.damped * share,
             of_springs: self.of_springs * share,
+        }
+    }
+}
+
+impl<T: Lane> Add for Work<T> {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            supplied: self.supplied + other.supplied,
+            damped: self.damped + other.damped,
+            of_springs: self.of_springs + other.of_springs,
         }
     }
 }

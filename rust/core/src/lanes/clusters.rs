@@ -60,21 +60,8 @@ impl WidePatterns {
 impl Clusters {
     /// Those of a mechanism.
     pub(super) fn of(mechanism: &Mechanism, loops: &[Loop]) -> Self {
-        let mut of_tree: Vec<usize> = (0..mechanism.trees.len()).collect();
-        for closure in loops {
-            let tied: Vec<usize> = (closure.trees(mechanism))
-                .map(|tree| of_tree[tree])
-                .collect();
-            let first = tied.iter().copied().min();
-            for own in of_tree.iter_mut().filter(|own| tied.contains(own)) {
-                *own = first.unwrap_or(*own);
-            }
-        }
-        let names: BTreeSet<usize> = of_tree.iter().copied().collect();
-        for own in &mut of_tree {
-            *own = names.range(..*own).count();
-        }
-        let n = names.len();
+        let of_tree: Vec<usize> = mechanism.trees.iter().map(|tree| tree.cluster).collect();
+        let n = mechanism.n_clusters();
         let mut velocities = vec![Vec::new(); n];
         for (tree, own) in mechanism.trees.iter().zip(&of_tree) {
             velocities[*own].extend(tree.velocities.clone());

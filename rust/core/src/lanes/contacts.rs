@@ -30,7 +30,7 @@ use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
-use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
+use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers};
 use crate::geometry::query::disc_plane::{rolling, to_lowest};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
@@ -144,6 +144,8 @@ pub struct Contacts<T: Lane> {
     clusters: Vec<InCluster>,
     /// Lanes with a problem that has factors.
     factored: u32,
+    /// Lanes in which clusters touch each other.
+    joined: u32,
     /// Of each problem, at `cluster * T::LANES + lane`.
     lists: Vec<Listed>,
     /// Whether every slot in use is active in all lanes.
@@ -270,6 +272,7 @@ impl<T: Lane> Contacts<T> {
                 .map(|cluster| InCluster::new(machine, cluster))
                 .collect(),
             factored: 0,
+            joined: 0,
             lists: vec![Listed::NONE; machine.n_problems() * T::LANES],
             is_full: false,
             homes: vec![[0; MAX_LANES]; n_slots],
@@ -343,6 +346,27 @@ impl<T: Lane> Contacts<T> {
     #[inline(always)]
     pub(super) fn cluster_of(&self, slot: usize) -> Option<usize> {
         self.cluster_of[slot]
+    }
+
+    /// The first cluster of a cluster's group in a lane.
+    #[inline(always)]
+    pub(super) fn leader(&self, cluster: usize, lane: usize) -> usize {
+        self.clusters[cluster].leader[lane].into()
+    }
+
+    /// The cluster of the body that a slot's contact is on in a lane.
+    #[inline(always)]
+    pub(super) fn own_cluster(&self, slot: usize, lane: usize) -> usize {
+        self.cluster_of[slot].unwrap_or_else(|| {
+            let contact = self.by_lane.contact(slot, lane);
+            contact.map_or(0, |contact| self.cluster_of_body[contact.body])
+        })
+    }
+
+    /// Lanes in which clusters touch each other.
+    #[inline(always)]
+    pub(super) fn joined(&self) -> u32 {
+        self.joined
     }
 
     /// Number of the clusters.
@@ -507,27 +531,61 @@ impl<T: Lane> Contacts<T> {
     }
 
     /// Fills the problems' `p` with the impulses that a rover remembers of its contacts, N s, zero
-    /// for new ones. Returns whether the last step had exactly these contacts.
+    /// for new ones. Marks in `is_same` each cluster whose group had exactly these contacts in the
+    /// last step.
     #[inline(always)]
-    pub fn recall(&self, lane: usize, memory: &WarmStart, problems: &mut [ContactProblem]) -> bool {
-        let (mut is_same, mut n) = (true, 0);
-        for index in self.problems_of(lane) {
+    pub fn recall(
+        &self,
+        (lane, model): (usize, Option<&Arc<Model>>),
+        memory: &WarmStart,
+        problems: &mut [ContactProblem],
+        is_same: &mut [T::Mask],
+    ) {
+        let own = T::mask(self.token, 1 << lane);
+        let (mut n, mut n_known) = (0, 0);
+        for (index, is_same) in self.problems_of(lane).zip(&mut *is_same) {
             let (list, problem) = (&self.lists[index], &mut problems[index]);
+            let n_before = n_known;
             for (place, out) in problem.p.chunks_exact_mut(3).enumerate().take(list.n) {
                 let wanted = list.keys[place];
                 let same = memory.impulses.get(n + place);
                 let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
+                    n_known += 1;
                     *known
                 } else {
                     let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
-                    is_same &= found.is_some();
+                    n_known += usize::from(found.is_some());
                     found.map_or([0.0; 3], |(_, known)| *known)
                 };
                 out.copy_from_slice(&known);
             }
             n += list.n;
+            let has_new = n_known - n_before != list.n;
+            *is_same = (*is_same & !own) | (if has_new { own & !own } else { own });
         }
-        is_same && memory.impulses.len() == n
+        if n_known == memory.impulses.len() {
+            // Followers have no list: what their leaders say holds for them.
+        } else if let [only] = &mut *is_same {
+            *only = *only & !own;
+        } else if let Some(model) = model {
+            self.note_lost(lane, model, memory, is_same);
+        }
+        self.intersect(is_same);
+    }
+
+    /// Takes the mark from clusters that have lost a contact.
+    #[cold]
+    fn note_lost(&self, lane: usize, model: &Model, memory: &WarmStart, is_same: &mut [T::Mask]) {
+        let others = !T::mask(self.token, 1 << lane);
+        let has = |wanted: &ContactKey| {
+            let mut lists = self.problems_of(lane).map(|index| &self.lists[index]);
+            lists.any(|list| list.keys[..list.n].contains(wanted))
+        };
+        for (key, _) in memory.impulses.iter().filter(|(key, _)| !has(key)) {
+            for cluster in clusters_of(model, key) {
+                is_same[cluster] = is_same[cluster] & others;
+            }
+        }
     }
 
     /// Makes a rover remember the impulses of its contacts, the problems' `p`, N s.
@@ -643,6 +701,7 @@ impl<T: Lane> Contacts<T> {
             own.first_column = [0; MAX_LANES];
             own.touches = 0;
         }
+        self.joined = 0;
         let mut lanes = 0_u32;
         for (lane, bodies) in self.by_lane.pairs() {
             lanes |= 1 << lane;
@@ -652,6 +711,7 @@ impl<T: Lane> Contacts<T> {
                 own.leader[lane]
             });
             let first = both[0].min(both[1]);
+            self.joined |= u32::from(both[0] != both[1]) << lane;
             for own in &mut self.clusters {
                 if both.contains(&own.leader[lane]) {
                     own.leader[lane] = first;

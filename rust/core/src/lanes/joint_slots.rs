@@ -105,8 +105,9 @@ impl<T: Lane> Contacts<T> {
                     let gaps = |q: T| [q - q.like(limits.lower), q.like(limits.upper) - q];
                     let [lower, upper] = gaps(middle.joints[joint]);
                     let rate = v[own.velocity];
-                    let is_low = forecast.admits(lower, rate);
-                    let is_high = forecast.admits(upper, -rate);
+                    let arm = rate.like(own.arm);
+                    let is_low = forecast.admits(arm * lower, arm * rate);
+                    let is_high = forecast.admits(arm * upper, -(arm * rate));
                     let active = is_low | is_high;
                     let both = is_low & is_high;
                     too_many = too_many | both;

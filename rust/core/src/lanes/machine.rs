@@ -57,9 +57,8 @@ pub struct Machine {
     pub stops: Vec<Stop>,
     /// Joints with dry friction, ascending.
     pub rubbing: Vec<usize>,
-    /// Closed loops, and whether one of them ties the machine to the world.
+    /// Closed loops.
     pub loops: Vec<Loop>,
-    pub(super) holds_the_world: bool,
     /// Slots between those of the wheels and the joints: [`Self::find_free_slots`].
     pub(super) spares: Vec<Option<usize>>,
     /// Whether its bodies can touch each other, and whether those of one tree can.
@@ -155,7 +154,6 @@ impl Machine {
                 .collect(),
             rubbing: model.rubbing_joints().to_vec(),
             loops: model.loops().to_vec(),
-            holds_the_world: model.holds_the_world(),
             spares: Vec::new(),
             has_pairs: model.trees().len() > 1 || touches_itself,
             touches_itself,

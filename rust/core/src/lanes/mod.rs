@@ -60,6 +60,7 @@ mod equations;
 pub mod forecast;
 mod free_slots;
 pub mod ground;
+mod groups;
 mod joint_slots;
 mod lane_detection;
 pub mod lane_rover;

@@ -19,6 +19,7 @@ use crate::contact::rows::{Path, Place, add, add_scaled, product, square};
 use crate::contact::{Contact, rollers};
 use crate::multibody::loops::Placed;
 use crate::multibody::mechanism::{BASE, Mover};
+use crate::multibody::model::Loop;
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
@@ -162,7 +163,10 @@ impl<T: Lane> Rows<T> {
             swept: vec![zero; machine.nv()],
             swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
             loops,
-            spread: vec![[zero; 3]; usize::from(machine.holds_the_world) * n_slots * machine.nv()],
+            spread: {
+                let is_held = machine.loops.iter().any(Loop::holds_the_world);
+                vec![[zero; 3]; usize::from(is_held) * n_slots * machine.nv()]
+            },
             held: Vec::new(),
             immovable: vec![T::mask(token, 0); n_slots],
             closing: vec![zero; n_slots],

@@ -38,8 +38,8 @@ impl<T: Lane> Yields<T> {
     /// The laws over a `step`: its length (s) and the scheme's θ.
     ///
     /// `motion`: poses at the midpoint, and the velocity (nv). `u_before`: local velocities before
-    /// the step by slot, m/s. `last`: impulses of the last step by slot, N s. `unknown`: lanes
-    /// without a last step, and the normal impulse there, as [`Compliance::over`] takes them.
+    /// the step by slot, m/s. `last`: impulses of the last step by slot, N s. `unknown`: of a slot,
+    /// lanes without a last step and the normal impulse there, as [`Compliance::over`] takes them.
     #[inline(always)]
     pub fn update(
         &mut self,
@@ -48,14 +48,14 @@ impl<T: Lane> Yields<T> {
         step: (T, T),
         u_before: &[Triple<T>],
         last: &[Triple<T>],
-        unknown: (T::Mask, T),
+        unknown: impl Fn(usize) -> (T::Mask, T),
     ) {
         for &slot in contacts.used() {
             let (spring, is_soft) = self.spring((machine, contacts), motion, slot);
             self.laws[slot] = match spring {
                 Some(spring) if is_soft.any() => {
                     let (gap, u_N) = (contacts.slot(slot).gap, u_before[slot][0]);
-                    (spring.over(step, gap, u_N, last[slot], unknown)).only(is_soft)
+                    (spring.over(step, gap, u_N, last[slot], unknown(slot))).only(is_soft)
                 }
                 _ => Yielding::none(self.zero),
             };
@@ -120,10 +120,9 @@ impl<T: Lane> Yields<T> {
         }
     }
 
-    /// Energy that the contacts give off in a step of `h`, J; see
+    /// Energy that the contacts of each cluster give off in a step of `h`, J, added to `out`; see
     /// [`crate::integrator::energy_audit`].
     #[inline(always)]
-    #[must_use]
     pub fn supplied(
         &self,
         contacts: &Contacts<T>,
@@ -131,13 +130,13 @@ impl<T: Lane> Yields<T> {
         p: &[Triple<T>],
         u: &[Triple<T>],
         u_before: &[Triple<T>],
-    ) -> T {
-        let mut sum = self.zero;
+        out: &mut [T],
+    ) {
         for &slot in contacts.used().iter().filter(|_| !self.is_empty()) {
             let law = &self.laws[slot];
             let given = law.supplied(h, [u_before[slot][0], u[slot][0]], p[slot]);
-            sum += T::select(law.is_soft(), given, self.zero);
+            let given = T::select(law.is_soft(), given, self.zero);
+            contacts.add(slot, given, out);
         }
-        sum
     }
 }

@@ -38,6 +38,18 @@ pub struct EnergyScratch<T: Lane> {
     token: T::Token,
     bodies: Vec<Moving<T>>,
     angles: JointAngles<T>,
+    /// Of each cluster.
+    sums: Vec<Sums<T>>,
+    found: Vec<EnergyOfCluster<T>>,
+}
+
+/// Energy and linear momentum (kg m/s, world) of a cluster of trees.
+#[derive(Clone, Copy, Debug)]
+pub struct EnergyOfCluster<T> {
+    /// J.
+    pub energy: Energy<T>,
+    /// kg m/s, world.
+    pub momentum: Vec3<T>,
 }
 
 /// Pose and velocity of a body's frame.
@@ -51,6 +63,7 @@ struct Moving<T> {
 }
 
 /// Sums over the bodies so far.
+#[derive(Clone, Copy, Debug)]
 struct Sums<T> {
     twice_kinetic: T,
     momentum: Vec3<T>,
@@ -65,13 +78,36 @@ impl<T: Lane> EnergyScratch<T> {
             token,
             bodies: vec![Moving::of_world(token); mechanism.n_bodies()],
             angles: JointAngles::new(token, mechanism),
+            sums: vec![Sums::new(token); mechanism.n_clusters()],
+            found: Vec::with_capacity(mechanism.n_clusters()),
+        }
+    }
+}
+
+impl<T: Lane> Sums<T> {
+    #[inline(always)]
+    fn new(token: T::Token) -> Self {
+        let zero = T::splat(token, 0.0);
+        Self {
+            twice_kinetic: zero,
+            momentum: Vec3::new(zero, zero, zero),
+            fall: zero,
+        }
+    }
+
+    #[inline(always)]
+    fn energy(&self) -> EnergyOfCluster<T> {
+        EnergyOfCluster {
+            energy: Energy {
+                kinetic: self.twice_kinetic * self.fall.like(0.5),
+                potential: -self.fall,
+            },
+            momentum: self.momentum,
         }
     }
 }
 
 /// Energy and linear momentum (kg m/s, world) of a state.
-///
-/// `v`: (nv). `gravity`: m/s², world.
 ///
 /// # Panics
 /// If an argument is of another mechanism.
@@ -83,8 +119,36 @@ pub fn energy<T: Lane>(
     gravity: Vec3<T>,
     scratch: &mut EnergyScratch<T>,
 ) -> (Energy<T>, Vec3<T>) {
+    let of_clusters = energies(mechanism, inertias, q, v, gravity, scratch);
+    let ([first], rest) = of_clusters.split_at(1) else {
+        unreachable!("invariant: a mechanism has a cluster")
+    };
+    let (mut energy, mut momentum) = (first.energy, first.momentum);
+    for own in rest {
+        energy.kinetic += own.energy.kinetic;
+        energy.potential += own.energy.potential;
+        momentum += own.momentum;
+    }
+    (energy, momentum)
+}
+
+/// Energies and linear momenta of the clusters in a state.
+///
+/// `v`: (nv). `gravity`: m/s², world.
+///
+/// # Panics
+/// If an argument is of another mechanism.
+pub fn energies<'a, T: Lane>(
+    mechanism: &Mechanism,
+    inertias: &Inertias<T>,
+    q: &LaneConfiguration<T>,
+    v: &[T],
+    gravity: Vec3<T>,
+    scratch: &'a mut EnergyScratch<T>,
+) -> &'a [EnergyOfCluster<T>] {
+    let token = scratch.token;
     T::vectorize(
-        scratch.token,
+        token,
         #[inline(always)]
         || {
             let n = mechanism.links.len();
@@ -93,13 +157,10 @@ pub fn energy<T: Lane>(
             let world = Moving::of_world(scratch.token);
             let mut angles = scratch.angles.of(mechanism, q);
             let zero = T::splat(scratch.token, 0.0);
-            let mut sums = Sums {
-                twice_kinetic: zero,
-                momentum: Vec3::new(zero, zero, zero),
-                fall: zero,
-            };
+            scratch.sums.fill(Sums::new(scratch.token));
             for (tree, &mass) in mechanism.trees.iter().zip(&inertias.trees) {
                 let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
+                let mut sums = scratch.sums[tree.cluster];
                 bodies[root] = if tree.is_free {
                     let free = Free { pose: tree.pose };
                     sums.fall += gravity.dot(*q.pose(tree.pose).0) * mass;
@@ -130,18 +191,18 @@ pub fn energy<T: Lane>(
                         own[0] = body;
                     }
                 }
+                scratch.sums[tree.cluster] = sums;
             }
             for (&joint, &inertia) in mechanism.rotors.iter().zip(&inertias.rotors) {
-                let rate = v[mechanism.joints[joint].velocity];
-                sums.twice_kinetic += inertia * (rate * rate);
+                let own = &mechanism.joints[joint];
+                let rate = v[own.velocity];
+                scratch.sums[own.cluster].twice_kinetic += inertia * (rate * rate);
             }
-            let energy = Energy {
-                kinetic: sums.twice_kinetic * zero.like(0.5),
-                potential: -sums.fall,
-            };
-            (energy, sums.momentum)
+            scratch.found.clear();
+            scratch.found.extend(scratch.sums.iter().map(Sums::energy));
         },
-    )
+    );
+    &scratch.found
 }
 
 impl<T: Lane> Moving<T> {

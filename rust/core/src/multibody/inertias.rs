@@ -68,6 +68,19 @@ impl<T: Lane> Inertias<T> {
 }
 
 impl<T: Lane> Inertias<T> {
+    /// Mass of a cluster, kg.
+    #[inline(always)]
+    pub(crate) fn mass_of(&self, mechanism: &Mechanism, cluster: usize) -> T {
+        if mechanism.n_clusters() == 1 {
+            return self.mass;
+        }
+        let own = mechanism.trees.iter().zip(&self.trees);
+        let own = own.filter(|(tree, _)| tree.cluster == cluster);
+        own.map(|(_, mass)| *mass)
+            .reduce(|sum, mass| sum + mass)
+            .unwrap_or(self.mass)
+    }
+
     /// Multiplies mass and moments of a body.
     pub fn scale(&mut self, mechanism: &Mechanism, body: usize, factor: T) {
         let own = &mut self.bodies[body];

@@ -187,6 +187,39 @@ impl<T: Lane> LaneConfiguration<T> {
         }
     }
 
+    /// Takes the coordinates of each cluster from another configuration in the lanes of its mask.
+    #[inline(always)]
+    pub fn select_clusters_from(
+        &mut self,
+        mechanism: &Mechanism,
+        lanes: impl Fn(usize) -> T::Mask,
+        other: &Self,
+    ) {
+        let joints = self.joints.iter_mut().zip(&other.joints);
+        for ((own, other), joint) in joints.zip(&mechanism.joints) {
+            *own = T::select(lanes(joint.cluster), *other, *own);
+        }
+        let select = |lanes, own: [T; 4], other: [T; 4]| {
+            [0, 1, 2, 3].map(|k| T::select(lanes, other[k], own[k]))
+        };
+        for (joint, k) in &mechanism.rotating {
+            let lanes = lanes(mechanism.cluster_of_velocity(*k));
+            match joint {
+                Joint::Free(free) => {
+                    let (own, other) = (self.pose_at(free.pose), other.pose_at(free.pose));
+                    let position = Vec3::select(lanes, other.0, own.0);
+                    self.set_pose_at(free.pose, (position, select(lanes, own.1, other.1)));
+                }
+                Joint::Spherical(joint) => {
+                    let (own, other) = (&mut self.rotations, &other.rotations);
+                    let k = joint.rotation;
+                    own[k] = select(lanes, own[k], other[k]);
+                }
+                _ => {}
+            }
+        }
+    }
+
     /// Whether every entry is finite.
     #[inline(always)]
     pub fn is_finite(&self) -> T::Mask {

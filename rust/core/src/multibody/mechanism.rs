@@ -4,6 +4,7 @@
 //! velocities, motions and joints are numbered as in the model. A *row* is a velocity of a joint,
 //! counted over all trees without the velocities of their free roots. Lengths are in m.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::joint::{Coupling, Joint, Motion, free};
@@ -53,6 +54,13 @@ pub struct Mechanism {
     pub(super) tree_of: Vec<usize>,
     pub(super) up_to: Vec<(usize, usize)>,
     pub(super) longest_path: usize,
+    /// Of each cluster, a set of trees that closed loops tie together, whether a base or a loop
+    /// passes its momentum on to the world.
+    pub(super) clusters: Vec<bool>,
+    /// How far a unit of each velocity moves what it carries.
+    pub(crate) levers: Vec<Lever>,
+    /// Of each cluster, the largest distance of anything from the origin of its tree, m.
+    pub(super) sizes: Vec<f64>,
     pub(super) n_motions: usize,
     pub(super) paths: Vec<usize>,
     pub(super) movers: Vec<Mover>,
@@ -71,15 +79,36 @@ pub struct TreeSpan {
     pub is_free: bool,
     /// Of a free root, the index of its pose in a configuration.
     pub pose: usize,
+    /// Its cluster.
+    pub(crate) cluster: usize,
+}
+
+/// Velocities that move what they carry together: the components of a vector, or one alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lever {
+    /// The first of them.
+    pub first: usize,
+    /// Their number.
+    pub n: usize,
+    /// Farthest displacement by a unit: 1 for a translation, for a rotation the largest distance
+    /// from its axis, m.
+    pub arm: f64,
+    /// Their cluster.
+    pub cluster: usize,
 }
 
 /// A joint with a coordinate of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnJoint {
     /// The body that it carries.
     pub body: usize,
     /// Its velocity.
     pub velocity: usize,
+    /// The cluster of its tree.
+    pub(crate) cluster: usize,
+    /// Its [lever](Lever::arm): what a coordinate and a rate count as, m and m/s, where they are
+    /// compared with lengths and speeds.
+    pub(crate) arm: f64,
 }
 
 /// A velocity that moves a body, and the motion that a unit of it imparts to the body.
@@ -188,6 +217,67 @@ impl Mechanism {
     #[must_use]
     pub(crate) fn tree_of_velocity(&self, k: usize) -> usize {
         self.tree_of[k]
+    }
+
+    /// Number of clusters: sets of trees that closed loops tie together.
+    #[inline]
+    #[must_use]
+    pub(crate) fn n_clusters(&self) -> usize {
+        self.clusters.len()
+    }
+
+    /// Whether a base or a loop passes the momentum of a cluster on to the world.
+    #[inline]
+    #[must_use]
+    pub(crate) fn is_held(&self, cluster: usize) -> bool {
+        self.clusters[cluster]
+    }
+
+    /// Size of a cluster, m: the largest distance of anything from the origin of its tree.
+    #[inline]
+    #[must_use]
+    pub(crate) fn size(&self, cluster: usize) -> f64 {
+        self.sizes[cluster]
+    }
+
+    /// Index of a body's cluster.
+    #[inline]
+    #[must_use]
+    pub(crate) fn cluster_of_body(&self, b: usize) -> usize {
+        self.trees[self.links[b].tree].cluster
+    }
+
+    /// Index of a velocity's cluster.
+    #[inline]
+    #[must_use]
+    pub(crate) fn cluster_of_velocity(&self, k: usize) -> usize {
+        self.trees[self.tree_of[k]].cluster
+    }
+
+    /// Numbers the clusters in the order of their first trees. `loops`: the trees that each loop ties
+    /// together, and whether it ties them to the world.
+    pub(super) fn tie(&mut self, loops: &[(Vec<usize>, bool)]) {
+        let mut of_tree: Vec<usize> = (0..self.trees.len()).collect();
+        for (trees, _) in loops {
+            let tied: Vec<usize> = trees.iter().map(|tree| of_tree[*tree]).collect();
+            let first = tied.iter().copied().min();
+            for own in of_tree.iter_mut().filter(|own| tied.contains(own)) {
+                *own = first.unwrap_or(*own);
+            }
+        }
+        let names: BTreeSet<usize> = of_tree.iter().copied().collect();
+        self.clusters = vec![false; names.len()];
+        for (tree, own) in self.trees.iter_mut().zip(&of_tree) {
+            tree.cluster = names.range(..*own).count();
+            self.clusters[tree.cluster] |= !tree.is_free;
+        }
+        for tree in (loops.iter()).filter_map(|(trees, is_held)| trees.first().filter(|_| *is_held))
+        {
+            self.clusters[self.trees[*tree].cluster] = true;
+        }
+        for own in &mut self.joints {
+            own.cluster = self.trees[self.tree_of[own.velocity]].cluster;
+        }
     }
 
     /// The rows of the velocities that move body `b`, in order, counted from the first row of its

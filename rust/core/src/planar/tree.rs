@@ -377,6 +377,7 @@ impl PlanarTree {
             momentum: Vector3::new(momentum[0], momentum[1], 0.0),
             // A force along x acts on the whole mass.
             mass: M[0],
+            is_held: false,
         }
     }
 

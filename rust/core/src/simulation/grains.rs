@@ -35,7 +35,7 @@ pub fn soil_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
         forecast: 1.0,
         time_step: 1e-3,
         stabilisation: Stabilisation::None,
-        penetration_tolerance: 5e-3 * grains.smallest(),
+        penetration_tolerance: Some(5e-3 * grains.smallest()),
         solver: SolverOptions {
             tolerance: 1e-4,
             velocity_tolerance: 1e-3,

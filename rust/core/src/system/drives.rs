@@ -282,7 +282,8 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Work of all joints over a step from `v` to `v_end`; keeps impulse and work of each drive.
+    /// Work of the joints of each cluster over a step from `v` to `v_end`; keeps impulse and work of
+    /// each drive.
     #[inline(always)]
     pub fn work(
         &mut self,
@@ -290,13 +291,10 @@ impl<T: Lane> Drives<T> {
         step: (T, T),
         places: &[T],
         [v, v_end]: [&[T]; 2],
-    ) -> Work<T> {
+        out: &mut [Work<T>],
+    ) {
         let zero = step.0.like(0.0);
-        let mut total = Work {
-            supplied: zero,
-            damped: zero,
-            of_springs: zero,
-        };
+        out.fill(Work::none(zero));
         for (j, own) in mechanism.joints.iter().enumerate() {
             let k = own.velocity;
             let torque = self.actuation(j, step, places[j], [v[k], v_end[k]]);
@@ -305,25 +303,29 @@ impl<T: Lane> Drives<T> {
             self.tried[j] = [torque.drive * step.0, work];
             // A damper only dissipates. In a step that reverses the rate, torque and displacement
             // are evaluated at different times, and their product may be positive.
+            let total = &mut out[own.cluster];
             total.supplied += work + torque.other * turned;
             total.damped += (-torque.damper * turned).max(zero);
             total.of_springs += torque.spring * turned;
         }
-        total
     }
 
-    /// Energy that springs and position controls store at joint coordinates, J, but for a constant
-    /// where a joint has both. `zero`: 0 in every lane.
+    /// Energy that springs and position controls of each cluster store at joint coordinates, J, but
+    /// for a constant where a joint has both. `zero`: 0 in every lane.
     #[inline(always)]
-    pub fn stored(&self, zero: T, places: &[T]) -> T {
-        let mut twice = zero;
-        for ((joint, place), is_implicit) in self.joints.iter().zip(places).zip(&self.is_implicit) {
+    pub fn stored(&self, mechanism: &Mechanism, zero: T, places: &[T], out: &mut [T]) {
+        out.fill(zero);
+        let joints = self.joints.iter().zip(&mechanism.joints);
+        for ((joint, own), (place, is_implicit)) in joints.zip(places.iter().zip(&self.is_implicit))
+        {
             if *is_implicit {
                 let stretch = *place - joint.set_point;
-                twice += joint.stiffness * stretch * stretch;
+                out[own.cluster] += joint.stiffness * stretch * stretch;
             }
         }
-        zero.like(0.5) * twice
+        for twice in out {
+            *twice = zero.like(0.5) * *twice;
+        }
     }
 
     /// Work that drives and torques supply over a displacement that is added to such a step, J.

@@ -18,10 +18,6 @@ const MOST_JOINT_TURN: f64 = 0.5;
 /// would stay acceptable up to some twenty times more.
 const MOST_SPIN: f64 = 1.0;
 
-/// Arm that converts a joint rotation to a length, m. A freely steered wheel that is moved out of a
-/// penetration of 2 cm rotates by 0.4 rad.
-const JOINT_ARM: f64 = 0.05;
-
 /// Angular speeds, rad/s.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turning<T> {
@@ -34,19 +30,22 @@ pub(crate) struct Turning<T> {
 }
 
 impl<T: Lane> Turning<T> {
-    /// Those at a velocity (nv); `zero`: 0 in every lane.
+    /// Those of a cluster at a velocity (nv); `zero`: 0 in every lane.
     #[inline(always)]
-    pub(crate) fn of(zero: T, mechanism: &Mechanism, v: &[T]) -> Self {
+    pub(crate) fn of_cluster(zero: T, mechanism: &Mechanism, v: &[T], cluster: usize) -> Self {
+        let is_one = mechanism.n_clusters() == 1;
+        let is_own = |k: usize| is_one || mechanism.cluster_of_velocity(k) == cluster;
         let (mut base, mut joints, mut spin) = (zero, zero, zero);
-        for tree in mechanism.trees.iter().filter(|tree| tree.is_free) {
+        let trees = mechanism.trees.iter();
+        for tree in trees.filter(|tree| tree.is_free && tree.cluster == cluster) {
             let first = tree.velocities.start;
             let [x, y, z] = [v[first + 3], v[first + 4], v[first + 5]];
             base = (x * x + y * y + z * z).sqrt().max(base);
         }
-        for &(k, ratio) in &mechanism.turning {
+        for &(k, ratio) in mechanism.turning.iter().filter(|(k, _)| is_own(*k)) {
             joints = (v[k].abs() * zero.like(ratio)).max(joints);
         }
-        for &k in &mechanism.spinning {
+        for &k in mechanism.spinning.iter().filter(|k| is_own(**k)) {
             spin = v[k].abs().max(spin);
         }
         Self { base, joints, spin }
@@ -67,17 +66,30 @@ impl<T: Lane> Turning<T> {
     }
 }
 
-/// Size of a displacement (nv), m: the largest of the free bases, and of the joints at their arm;
-/// `zero`: 0 in every lane.
+/// Size of the displacement of a cluster (`y`, nv), m: the farthest that any joint, or any motion of
+/// a free base, moves what it carries; `zero`: 0 in every lane.
 #[inline(always)]
-pub(crate) fn displacement<T: Lane>(zero: T, mechanism: &Mechanism, y: &[T]) -> T {
+pub(crate) fn displacement<T: Lane>(zero: T, mechanism: &Mechanism, y: &[T], cluster: usize) -> T {
     let mut largest = zero;
-    for tree in &mechanism.trees {
-        let lead = tree.lead();
-        for (k, y) in y[tree.velocities.clone()].iter().enumerate() {
-            let arm = if k < lead { 1.0 } else { JOINT_ARM };
-            largest = (y.abs() * zero.like(arm)).max(largest);
-        }
+    for lever in (mechanism.levers.iter()).filter(|lever| lever.cluster == cluster) {
+        let own = &y[lever.first..][..lever.n];
+        let length = if let [x] = own {
+            x.abs()
+        } else {
+            let squares = own.iter().fold(zero, |sum, x| sum + *x * *x);
+            squares.sqrt()
+        };
+        largest = (length * zero.like(lever.arm)).max(largest);
     }
     largest
+}
+
+/// Penetration of a cluster that is tolerated by default, as a fraction of its size. The built-in
+/// rover reaches 1.408 m and has 1e-8 m: one step of driving on a plane adds less.
+const PENETRATION: f64 = 1e-8 / 1.408;
+
+/// Penetration that is tolerated, m: `stated`, or what a cluster has by default.
+#[inline(always)]
+pub(crate) fn tolerated(stated: Option<f64>, mechanism: &Mechanism, cluster: usize) -> f64 {
+    stated.unwrap_or_else(|| PENETRATION * mechanism.size(cluster))
 }

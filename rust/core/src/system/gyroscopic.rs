@@ -6,7 +6,7 @@
 //!
 //! C is frozen, `C = C(q_m, v_m)`. Its skew part does no work and rotates the velocity by a Cayley
 //! transform, whatever the spin. Its symmetric part `½ Ṁ` can make the matrix singular if a frame
-//! rotates by radians in a step. It is then left out, and the audit
+//! rotates by radians in a step. It is then left out for the whole cluster of trees, and the audit
 //! ([`crate::integrator::energy_audit`]) corrects the resulting change of the energy.
 
 use nalgebra::{DMatrix, DVector, DVectorView};
@@ -22,6 +22,8 @@ pub(super) struct GyroscopicScratch {
     matrix: DMatrix<f64>,
     /// `h (τ − G − C v) + J`, then Δv.
     load: DVector<f64>,
+    /// Of each cluster, whether the symmetric part is left out.
+    is_skew: Vec<bool>,
 }
 
 impl GyroscopicScratch {
@@ -48,15 +50,15 @@ impl GyroscopicScratch {
         }
         coriolis_matrix(model, kinematics, v_frozen, &mut self.coriolis, &mut self.C);
         let v = DVectorView::from_slice(v, nv);
-        for is_skew in [false, true] {
-            if is_skew {
-                keep_skew_part(&mut self.C);
-            }
+        let mechanism = model.mechanism();
+        self.is_skew.clear();
+        self.is_skew.resize(mechanism.n_clusters(), false);
+        loop {
             let C = self.C.as_slice();
             for (entry, c) in self.matrix.as_mut_slice().iter_mut().zip(C) {
                 *entry = theta * h * c;
             }
-            mass_matrix.add_to_dense(model.mechanism(), 0, &mut self.matrix);
+            mass_matrix.add_to_dense(mechanism, 0, &mut self.matrix);
             let load = self.load.as_mut_slice();
             for ((load, y), impulse) in load.iter_mut().zip(&*y).zip(impulse) {
                 *load = y + impulse;
@@ -65,21 +67,23 @@ impl GyroscopicScratch {
             // If the symmetric part is positive definite, every pivot is positive without row
             // exchanges.
             let change = self.load.as_mut_slice();
-            if eliminate(model, &mut self.matrix, change, is_skew) {
-                mass_matrix.times(model.mechanism(), change, y);
+            let Some(cluster) = eliminate(model, &mut self.matrix, change, &self.is_skew) else {
+                mass_matrix.times(mechanism, change, y);
                 for (y, impulse) in y.iter_mut().zip(impulse) {
                     *y -= impulse;
                 }
                 return;
-            }
+            };
+            self.is_skew[cluster] = true;
+            keep_skew_part(&mut self.C, |k| mechanism.cluster_of_velocity(k) == cluster);
         }
     }
 }
 
-/// `A ← ½ (A − Aᵀ)`.
-fn keep_skew_part(A: &mut DMatrix<f64>) {
-    for k in 0..A.ncols() {
-        for i in 0..=k {
+/// `A ← ½ (A − Aᵀ)` for the velocities of a cluster.
+fn keep_skew_part(A: &mut DMatrix<f64>, is_own: impl Fn(usize) -> bool) {
+    for k in (0..A.ncols()).filter(|k| is_own(*k)) {
+        for i in (0..=k).filter(|i| is_own(*i)) {
             let half = 0.5 * (A[(i, k)] - A[(k, i)]);
             A[(i, k)] = half;
             A[(k, i)] = -half;
@@ -87,19 +91,20 @@ fn keep_skew_part(A: &mut DMatrix<f64>) {
     }
 }
 
-/// Solves `A x = b` in place of b, by elimination without exchanges; false
-/// where a pivot is not positive, unless `is_forced`.
+/// Solves `A x = b` in place of b, by elimination without exchanges. Returns a cluster of which a
+/// pivot is not positive, unless it is `forced`.
 ///
 /// A has the sparsity of M. Elimination from the leaves to the base preserves it: each velocity
 /// changes only the rows and columns of its path.
-fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], is_forced: bool) -> bool {
+fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], forced: &[bool]) -> Option<usize> {
     let n = b.len();
     let A = A.as_mut_slice();
     for k in (0..n).rev() {
         let (before, own) = A.split_at_mut(k * n);
         let pivot = own[k];
-        if !is_forced && (pivot.is_nan() || pivot <= 0.0) {
-            return false;
+        let cluster = model.mechanism().cluster_of_velocity(k);
+        if !forced[cluster] && (pivot.is_nan() || pivot <= 0.0) {
+            return Some(cluster);
         }
         let path = model.velocity_path(k);
         let path = &path[..path.len() - 1];
@@ -129,7 +134,7 @@ fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], is_forced: bool
             .sum();
         b[k] = (b[k] - known) / A[k * n + k];
     }
-    true
+    None
 }
 
 #[cfg(test)]
@@ -155,10 +160,12 @@ mod tests {
         let M = kinematics.mass_matrix(&model);
         let A = &M + C * 0.01;
         let mut x = DVector::from_column_slice(&v);
-        assert!(eliminate(&model, &mut A.clone(), x.as_mut_slice(), false));
+        let pivot = eliminate(&model, &mut A.clone(), x.as_mut_slice(), &[false]);
+        assert_eq!(pivot, None);
         assert!((A * x - DVector::from_column_slice(&v)).norm() < 1e-12);
         let mut turned_round = -M;
         let mut x = v;
-        assert!(!eliminate(&model, &mut turned_round, &mut x, false));
+        let pivot = eliminate(&model, &mut turned_round, &mut x, &[false]);
+        assert_eq!(pivot, Some(0));
     }
 }

@@ -331,14 +331,15 @@ impl MechanicalSystem for PlanarSystem<'_> {
         }
     }
 
-    fn energy(
+    fn energies(
         &mut self,
         options: &StepOptions,
         q: &Vec<f64>,
         v: &[f64],
-    ) -> Option<MechanicalEnergy> {
-        let energy = self.machine.energy(q, v, &options.gravity.xy());
-        Some(energy)
+        out: &mut Vec<MechanicalEnergy>,
+    ) {
+        out.clear();
+        out.push(self.machine.energy(q, v, &options.gravity.xy()));
     }
 
     fn work_of_displacement(
@@ -352,7 +353,13 @@ impl MechanicalSystem for PlanarSystem<'_> {
         sum_of_products(&self.parts.driving, displacement)
     }
 
-    fn work(&mut self, options: &StepOptions, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> Work {
+    fn work(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Vec<f64>>,
+        v_end: &[f64],
+        out: &mut [Work],
+    ) {
         self.set_driving(start.v, v_end);
         let parts = &*self.parts;
         let (h, theta) = (options.time_step, options.theta);
@@ -366,10 +373,10 @@ impl MechanicalSystem for PlanarSystem<'_> {
             let surplus = torque * turned - own.line.work(torque, turned);
             work -= own.motor.gain.abs() * surplus;
         }
-        Work {
+        out.fill(Work {
             supplied: work,
             ..Work::default()
-        }
+        });
     }
 
     fn half_solve(&self, y: &mut [f64]) {
@@ -446,7 +453,7 @@ impl MechanicalSystem for PlanarSystem<'_> {
         Some(self.problem(q, mu))
     }
 
-    fn displacement(&self, y: &[f64]) -> f64 {
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
         self.machine.displacement(y)
     }
 }

@@ -253,9 +253,14 @@ impl<T: Lane> SandContact<T> {
         is_new
     }
 
-    /// Work of the sand on the machines over a step between two velocities, J.
-    pub(crate) fn work(&mut self, layers: &Layers<'_>, v: &[T], v_end: &[T]) -> T {
-        let mut total = T::splat(self.token, 0.0);
+    /// Adds to `out` the work of the sand on each cluster over a step between two velocities, J.
+    pub(crate) fn work(
+        &mut self,
+        mechanism: &Mechanism,
+        layers: &Layers<'_>,
+        [v, v_end]: [&[T]; 2],
+        out: &mut [T],
+    ) {
         if self.is_given {
             self.guess.copy_from_slice(v_end);
         }
@@ -271,13 +276,13 @@ impl<T: Lane> SandContact<T> {
                 },
             );
             let sinkage = patch.sinkage(layers, lanes);
+            let own = &mut out[mechanism.cluster_of_body(patch.wheel.body)];
             T::vectorize(
                 self.token,
                 #[inline(always)]
-                || total += patch.weigh(step, lanes, v, (&twist, sinkage)),
+                || *own += patch.weigh(step, lanes, v, (&twist, sinkage)),
             );
         }
-        total
     }
 
     /// The step whose work was last computed becomes the state of some lanes.

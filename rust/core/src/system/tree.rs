@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::command::Command;
-use super::extent::{Turning, displacement};
+use super::extent::{Turning, displacement, tolerated};
 use super::loops::{each, placed};
 use super::momentum_balance::BalanceScene;
 use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
@@ -14,8 +14,8 @@ use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
 use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{
-    Activation, Contact, ContactKey, Opposite, Part, detect, detect_limits, detect_pairs,
-    generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
+    Activation, Contact, ContactKey, Opposite, Part, clusters_of, detect, detect_limits,
+    detect_pairs, generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
@@ -25,7 +25,7 @@ use crate::integrator::{
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::multibody::bias::bias;
-use crate::multibody::energy::energy;
+use crate::multibody::energy::energies;
 use crate::multibody::{Configuration, Factor, Model};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::sand::RutMap;
@@ -170,6 +170,29 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
+    fn n_clusters(&self) -> usize {
+        self.model.mechanism().n_clusters()
+    }
+
+    #[inline]
+    fn cluster_of_velocity(&self, k: usize) -> usize {
+        self.model.mechanism().cluster_of_velocity(k)
+    }
+
+    fn clusters_of(&self, key: &ContactKey) -> [usize; 2] {
+        clusters_of(self.model, key)
+    }
+
+    fn take_clusters(
+        &self,
+        from: &Configuration,
+        is_taken: &dyn Fn(usize) -> bool,
+        to: &mut Configuration,
+    ) {
+        to.take_clusters(self.model, from, is_taken);
+    }
+
+    #[inline]
     fn advance(&self, q: &mut Configuration, v: &[f64], h: f64) {
         q.advance(self.model, v, h);
     }
@@ -263,9 +286,10 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn compliant_mass(&self) -> Option<f64> {
+    fn compliant_mass(&self, cluster: usize) -> Option<f64> {
         let model = &self.model;
-        model.has_compliance().then(|| model.mass())
+        let mass = || model.inertias().mass_of(model.mechanism(), cluster);
+        model.has_compliance().then(mass)
     }
 
     fn compliance(&self, contact: &Contact, v: &[f64]) -> Option<Compliance> {
@@ -334,13 +358,18 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
-        Turning::of(0.0, self.model.mechanism(), v).is_gyroscopic(options.time_step)
+    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], cluster: usize) -> bool {
+        let turning = Turning::of_cluster(0.0, self.model.mechanism(), v, cluster);
+        turning.is_gyroscopic(options.time_step)
     }
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
-        Turning::of(0.0, self.model.mechanism(), v).of_frames()
+        let mechanism = self.model.mechanism();
+        let of_frames = |own| Turning::of_cluster(0.0, mechanism, v, own).of_frames();
+        (0..mechanism.n_clusters())
+            .map(of_frames)
+            .fold(0.0, f64::max)
     }
 
     fn translation_axis(&self, velocity: usize) -> Option<usize> {
@@ -411,14 +440,16 @@ impl MechanicalSystem for TreeSystem<'_> {
         is_new | is_new_in_sand
     }
 
-    fn energy(
+    fn energies(
         &mut self,
         options: &StepOptions,
         q: &Configuration,
         v: &[f64],
-    ) -> Option<MechanicalEnergy> {
+        out: &mut Vec<MechanicalEnergy>,
+    ) {
+        out.clear();
         if self.parts.has_given_sand() {
-            return None;
+            return;
         }
         let TreeScratch {
             q: lane,
@@ -428,18 +459,22 @@ impl MechanicalSystem for TreeSystem<'_> {
         lane.set_lane(0, q);
         let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
         let gravity = options.gravity.into();
-        let (energy, momentum) = energy(mechanism, inertias, lane, v, gravity, scratch);
-        Some(MechanicalEnergy {
-            kinetic: energy.kinetic,
-            potential: energy.potential,
+        let found = energies(mechanism, inertias, lane, v, gravity, scratch);
+        out.extend(found.iter().enumerate().map(|(cluster, own)| {
             // A tree on a fixed base, or tied to the world, passes momentum on to it.
-            momentum: if self.model.is_free() && !self.model.holds_the_world() {
-                momentum.into()
-            } else {
-                Vector3::zeros()
-            },
-            mass: self.model.mass(),
-        })
+            let is_held = mechanism.is_held(cluster);
+            MechanicalEnergy {
+                kinetic: own.energy.kinetic,
+                potential: own.energy.potential,
+                momentum: if is_held {
+                    Vector3::zeros()
+                } else {
+                    own.momentum.into()
+                },
+                mass: inertias.mass_of(mechanism, cluster),
+                is_held,
+            }
+        }));
     }
 
     fn work(
@@ -447,24 +482,33 @@ impl MechanicalSystem for TreeSystem<'_> {
         options: &StepOptions,
         start: Start<'_, Configuration>,
         v_end: &[f64],
-    ) -> Work {
-        let of_sand = (self.sand()).map_or(0.0, |(sand, scene, _)| {
-            sand.work(&scene.layers, start.v, v_end)
-        });
+        out: &mut [Work],
+    ) {
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let velocities = [start.v, v_end];
-        let applied = self.parts.applied.iter().zip(start.v.iter().zip(v_end));
-        let power = applied
-            .map(|(force, (v, end))| force * (options.theta * end + (1.0 - options.theta) * v));
-        let of_wrenches = options.time_step * power.sum::<f64>();
-        let mut work = (self.parts.drives).work(mechanism, step(options), places, velocities);
-        work.supplied += of_wrenches;
-        work.damped -= of_sand;
-        work
+        (self.parts.drives).work(mechanism, step(options), places, velocities, out);
+        let mut of_sand = std::mem::take(&mut self.parts.of_sand);
+        of_sand.clear();
+        of_sand.resize(out.len(), 0.0);
+        if let Some((sand, scene, _)) = self.sand() {
+            sand.work(mechanism, &scene.layers, velocities, &mut of_sand);
+        }
+        for (cluster, (work, of_sand)) in out.iter_mut().zip(&of_sand).enumerate() {
+            let own = 0..self.parts.applied.len();
+            let own = own.filter(|&k| mechanism.cluster_of_velocity(k) == cluster);
+            let power = own.map(|k| {
+                let mean = options.theta * v_end[k] + (1.0 - options.theta) * start.v[k];
+                self.parts.applied[k] * mean
+            });
+            work.supplied += options.time_step * power.sum::<f64>();
+            work.damped -= *of_sand;
+        }
+        self.parts.of_sand = of_sand;
     }
 
-    fn stored(&self, q: &Configuration) -> f64 {
-        self.parts.drives.stored(0.0, &q.joints)
+    fn stored(&self, q: &Configuration, out: &mut [f64]) {
+        let mechanism = self.model.mechanism();
+        (self.parts.drives).stored(mechanism, 0.0, &q.joints, out);
     }
 
     fn work_of_displacement(
@@ -623,8 +667,20 @@ impl MechanicalSystem for TreeSystem<'_> {
         Some(self.problem(q, mu))
     }
 
-    fn displacement(&self, y: &[f64]) -> f64 {
-        displacement(0.0, self.model.mechanism(), y)
+    fn lever(&self, contact: &Contact) -> f64 {
+        match contact.part {
+            Part::Limit(joint, _) => self.model.mechanism().joints[joint].arm,
+            _ => 1.0,
+        }
+    }
+
+    fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
+        let stated = options.penetration_tolerance;
+        tolerated(stated, self.model.mechanism(), cluster)
+    }
+
+    fn displacement(&self, y: &[f64], cluster: usize) -> f64 {
+        displacement(0.0, self.model.mechanism(), y, cluster)
     }
 }
 

@@ -36,6 +36,8 @@ pub struct TreeScratch {
     pub(super) force: Vec<f64>,
     /// Generalized force of the wrenches at the midpoint (nv); empty without any.
     pub(super) applied: Vec<f64>,
+    /// Work of the sand by cluster, J.
+    pub(super) of_sand: Vec<f64>,
     pub(super) pairs: PairSearch,
     /// Found by the last detection, x and z, m.
     pub(super) unknown_ground: Option<[f64; 2]>,
@@ -75,6 +77,7 @@ impl TreeScratch {
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
             applied: Vec::new(),
+            of_sand: Vec::new(),
             pairs: PairSearch::new(model),
             unknown_ground: None,
             joints_middle: limited.clone(),

@@ -18,7 +18,80 @@ pub(super) struct Conditions<T: Lane> {
     pub is_free: T::Mask,
 }
 
-/// Energies of the lanes over a step, J.
+/// Energies of the clusters over a step, J.
+pub(super) struct Energies<T: Lane> {
+    /// Kinetic and potential energy at the start and at the end of the step.
+    pub before: Vec<[T; 2]>,
+    pub after: Vec<[T; 2]>,
+    /// After the projection.
+    pub lifted: Vec<[T; 2]>,
+    /// Kinetic energies and momenta of the groups after the projection, kg m/s; and how their
+    /// velocities are carried there.
+    pub kinetic: Vec<T>,
+    pub momentum: [Vec<T>; 3],
+    /// Work of the drives, of the sand and of wheels that yield.
+    pub of_drives: Vec<Work<T>>,
+    pub of_sand: Vec<T>,
+    pub released: Vec<T>,
+    /// Sums over the contacts.
+    pub of_contacts: [Vec<T>; 4],
+    /// Masses, kg, and numbers and lanes on their way from group to cluster.
+    pub mass: Vec<T>,
+    /// What the springs store before and after the step or the projection.
+    pub stored: [Vec<T>; 2],
+    pub number: Vec<T>,
+    pub in_touch: Vec<T::Mask>,
+    pub on_ground: Vec<T::Mask>,
+}
+
+impl<T: Lane> Default for Energies<T> {
+    /// Of no cluster.
+    fn default() -> Self {
+        Self {
+            before: Vec::new(),
+            after: Vec::new(),
+            lifted: Vec::new(),
+            kinetic: Vec::new(),
+            momentum: std::array::from_fn(|_| Vec::new()),
+            of_drives: Vec::new(),
+            of_sand: Vec::new(),
+            released: Vec::new(),
+            of_contacts: std::array::from_fn(|_| Vec::new()),
+            mass: Vec::new(),
+            stored: [Vec::new(), Vec::new()],
+            number: Vec::new(),
+            in_touch: Vec::new(),
+            on_ground: Vec::new(),
+        }
+    }
+}
+
+impl<T: Lane> Energies<T> {
+    /// Nothing, of so many clusters.
+    pub fn new(token: T::Token, n: usize) -> Self {
+        let zeros = || vec![T::splat(token, 0.0); n];
+        let both = || vec![[T::splat(token, 0.0); 2]; n];
+        Self {
+            before: both(),
+            after: both(),
+            lifted: both(),
+            kinetic: zeros(),
+            momentum: std::array::from_fn(|_| zeros()),
+            of_drives: vec![Work::none(T::splat(token, 0.0)); n],
+            of_sand: zeros(),
+            released: zeros(),
+            of_contacts: std::array::from_fn(|_| zeros()),
+            mass: zeros(),
+            stored: [zeros(), zeros()],
+            number: zeros(),
+            in_touch: vec![T::mask(token, 0); n],
+            on_ground: vec![T::mask(token, 0); n],
+        }
+    }
+}
+
+/// Energies of a group over a step, J; 0 in the lanes of a cluster that does not lead it.
+#[derive(Clone)]
 pub(super) struct Balance<T: Lane> {
     /// Kinetic and potential energy at the start and at the end of the step.
     pub before: [T; 2],
@@ -41,6 +114,43 @@ pub(super) struct Balance<T: Lane> {
     pub is_corrected: T::Mask,
 }
 
+/// How the audit corrects the velocity of a group: lanes, the share that is left of the motion, and
+/// the lanes in which it is left relative to a translation, m/s.
+#[derive(Clone, Copy)]
+pub(super) struct Correction<T: Lane> {
+    pub lanes: T::Mask,
+    pub share: T,
+    pub is_relative: T::Mask,
+    pub translation: [T; 3],
+}
+
+impl<T: Lane> Correction<T> {
+    /// Corrects the velocity of a tree.
+    #[inline(always)]
+    pub fn apply(&self, tree: &TreeSpan, v: &mut [T]) {
+        let zero = self.share.like(0.0);
+        for (k, v) in v[tree.velocities.clone()].iter_mut().enumerate() {
+            let common = if k < 3 {
+                T::select(self.is_relative, self.translation[k], zero)
+            } else {
+                zero
+            };
+            *v = T::select(self.lanes, common + self.share * (*v - common), *v);
+        }
+    }
+
+    /// Takes over another's lane.
+    pub fn take(&mut self, token: T::Token, lane: usize, other: &Self) {
+        let own = T::mask(token, 1 << lane);
+        self.lanes = (self.lanes & !own) | (other.lanes & own);
+        self.is_relative = (self.is_relative & !own) | (other.is_relative & own);
+        self.share.set(lane, other.share.get(lane));
+        for (own, other) in self.translation.iter_mut().zip(&other.translation) {
+            own.set(lane, other.get(lane));
+        }
+    }
+}
+
 impl<T: Lane> Balance<T> {
     /// Nothing.
     pub fn new(token: T::Token) -> Self {
@@ -49,11 +159,7 @@ impl<T: Lane> Balance<T> {
             before: [zero; 2],
             after: [zero; 2],
             momentum: Vec3::splat(token, [0.0; 3]),
-            work: Work {
-                supplied: zero,
-                damped: zero,
-                of_springs: zero,
-            },
+            work: Work::none(zero),
             stored: zero,
             released: zero,
             contact_work: zero,
@@ -89,42 +195,33 @@ impl<T: Lane> Balance<T> {
         is_lost
     }
 
-    /// Removes the excess from the velocity `v` at the end of the step. Returns the lanes whose
-    /// local velocities are shortened, and by which factor.
+    /// How the excess is removed from the velocity at the end of the step.
     #[inline(always)]
-    pub fn correct(
-        &self,
-        conditions: &Conditions<T>,
-        trees: &[TreeSpan],
-        v: &mut [T],
-    ) -> (T::Mask, T) {
-        let zero = conditions.mass.like(0.0);
-        let Some(excess) = self.excess else {
-            return (self.is_corrected & !self.is_corrected, zero);
-        };
+    pub fn correction(&self, conditions: &Conditions<T>) -> Correction<T> {
         let (lanes, mass, momentum) = (self.is_corrected, conditions.mass, self.momentum);
+        let Some(excess) = self.excess else {
+            let zero = mass.like(0.0);
+            return Correction {
+                lanes: lanes & !lanes,
+                share: zero,
+                is_relative: lanes,
+                translation: [zero; 3],
+            };
+        };
         let (of_relative, is_enough) = excess.share_of_relative_motion(momentum, mass);
-        let (is_free, is_gain) = (conditions.is_free, zero.lt(excess.value));
+        let (is_free, is_gain) = (conditions.is_free, excess.is_gain());
         let is_relative = conditions.untouched & (is_free | is_gain) & is_enough;
-        let share = T::select(is_relative, of_relative, excess.share());
-        // Free flight that loses more than its relative energy is left as it is.
-        let lanes = lanes & (is_relative | is_gain);
         let translation = momentum * (mass.like(1.0) / mass);
-        let common = [translation.x, translation.y, translation.z];
-        for tree in trees {
-            for (k, v) in v[tree.velocities.clone()].iter_mut().enumerate() {
-                let common = if k < 3 {
-                    T::select(is_relative, common[k], zero)
-                } else {
-                    zero
-                };
-                *v = T::select(lanes, common + share * (*v - common), *v);
-            }
+        Correction {
+            // Free flight that loses more than its relative energy is left as it is.
+            lanes: lanes & (is_relative | is_gain),
+            share: T::select(is_relative, of_relative, excess.share()),
+            is_relative,
+            translation: [translation.x, translation.y, translation.z],
         }
-        (lanes, share)
     }
 
-    /// Enters the balance into the lanes' reports.
+    /// Adds the balance to the lanes' reports.
     #[inline(always)]
     pub fn report(&self, reports: &mut [StepReport; MAX_LANES]) {
         let [kinetic, potential] = self.before;
@@ -142,7 +239,7 @@ impl<T: Lane> Balance<T> {
             x.store(&mut entry[..T::LANES]);
         }
         for (lane, report) in reports[..T::LANES].iter_mut().enumerate() {
-            report.energy_gain = gain[lane];
+            report.energy_gain = report.energy_gain.max(gain[lane]);
             report.enter_energies(entries.map(|entry| entry[lane]));
         }
     }

@@ -44,14 +44,16 @@ impl<T: Lane> Block<T> {
         if !self.options.materials.is_empty() {
             self.mix_materials();
         }
-        let mut is_same = 0;
         for lane in 0..T::LANES {
             let memory = &self.memories[lane];
-            let is_own = self.contacts.recall(lane, memory, problems);
-            is_same |= u32::from(is_own) << lane;
+            let own = (lane, self.models[lane].as_ref());
+            (self.contacts).recall(own, memory, problems, &mut self.is_same);
         }
-        self.is_same = T::mask(self.token, is_same);
-        self.persists = self.is_same & self.has_persistent;
+        let both = self.is_same.iter().zip(&self.has_persistent);
+        for (persists, (is_same, has)) in self.persists.iter_mut().zip(both) {
+            *persists = *is_same & *has;
+        }
+        self.contacts.intersect(&mut self.persists);
     }
 
     /// Friction of contacts whose two materials have a law of their own.

@@ -27,11 +27,12 @@ impl<T: Lane> Block<T> {
     /// and from the last step's impulses.
     pub(super) fn load(&mut self) {
         let token = self.token;
-        let is_any = (self.persists & self.going).any();
+        let persists = self.any(&self.persists);
+        let is_any = (persists & self.going).any();
         T::vectorize(
             token,
             #[inline(always)]
-            || self.push_and_drive(is_any),
+            || self.push_and_drive(is_any, persists),
         );
         self.weigh(true);
         T::vectorize(
@@ -48,7 +49,7 @@ impl<T: Lane> Block<T> {
     }
 
     #[inline(always)]
-    fn push_and_drive(&mut self, is_any: bool) {
+    fn push_and_drive(&mut self, is_any: bool, persists: T::Mask) {
         let zero = self.number(0.0);
         let step = self.time_step();
         if is_any {
@@ -57,7 +58,7 @@ impl<T: Lane> Block<T> {
                 &self.machine,
                 contacts,
                 end,
-                self.persists,
+                persists,
                 &self.p_last,
                 &mut self.pushed,
             );
@@ -93,11 +94,11 @@ impl<T: Lane> Block<T> {
     fn add_torque_and_pushed(&mut self, is_any: bool) {
         let (h, theta) = self.time_step();
         let share = h.like(1.0) - theta;
-        let persists = self.persists;
-        for ((y, torque), pushed) in self.y.iter_mut().zip(&self.torque).zip(&self.pushed) {
+        let pushed = self.pushed.iter().zip(&self.cluster_of);
+        for ((y, torque), (pushed, cluster)) in self.y.iter_mut().zip(&self.torque).zip(pushed) {
             *y = *torque - h * *y;
             if is_any {
-                *y = T::select(persists, *y + *pushed, *y);
+                *y = T::select(self.persists[*cluster], *y + *pushed, *y);
             }
         }
         self.factor.half_solve(&self.machine, &mut self.y);
@@ -112,11 +113,13 @@ impl<T: Lane> Block<T> {
     fn add_torque_and_correction(&mut self, is_any: bool) {
         let (h, theta) = self.time_step();
         let share = h.like(1.0) - theta;
-        let persists = self.persists;
         let pushed = self.pushed.iter().zip(&self.persistent);
-        for ((y, torque), (pushed, before)) in self.y.iter_mut().zip(&self.torque).zip(pushed) {
+        let pushed = pushed.zip(&self.cluster_of);
+        let y = self.y.iter_mut().zip(&self.torque);
+        for ((y, torque), ((pushed, before), cluster)) in y.zip(pushed) {
             *y = *torque - h * *y;
             if is_any {
+                let persists = self.persists[*cluster];
                 *y = T::select(persists, *y + share * (*before - *pushed), *y);
             }
         }

@@ -31,9 +31,15 @@ impl<T: Lane> Block<T> {
         for (own, x) in self.persistent.iter_mut().zip(persistent) {
             own.set(lane, *x);
         }
-        self.has_persistent = self.has_persistent & !own;
-        if !persistent.is_empty() {
-            self.has_persistent = self.has_persistent | own;
+        let is_one = self.n_clusters() == 1;
+        for (cluster, has) in self.has_persistent.iter_mut().enumerate() {
+            *has = *has & !own;
+            // Of several clusters, those that did not persist have zeros.
+            let mut all = persistent.iter().zip(&self.cluster_of);
+            if !persistent.is_empty() && (is_one || all.any(|(x, of)| *of == cluster && *x != 0.0))
+            {
+                *has = *has | own;
+            }
         }
     }
 
@@ -77,8 +83,15 @@ impl<T: Lane> Block<T> {
             .impulses
             .clone_from(&self.memories[lane].impulses);
         rover.warm_start.persistent.clear();
-        if self.has_persistent.get(lane) {
-            let persistent = self.persistent.iter().map(|x| x.get(lane));
+        if self.any(&self.has_persistent).get(lane) {
+            let persistent = self.persistent.iter().zip(&self.cluster_of);
+            let persistent = persistent.map(|(x, cluster)| {
+                if self.has_persistent[*cluster].get(lane) {
+                    x.get(lane)
+                } else {
+                    0.0
+                }
+            });
             rover.warm_start.persistent.extend(persistent);
         }
         if let Some(loops) = &self.rows.loops {
@@ -102,11 +115,13 @@ impl<T: Lane> Block<T> {
     /// Follows after rovers were loaded.
     pub fn begin(&mut self) {
         self.drives.finish_loading();
-        if self.is_new.any() {
-            let (energy, _) = self.energy(State::Start);
-            let balance = &mut self.balance;
-            let energy = energy.kinetic_and_potential();
-            balance.before = select_both(self.is_new, energy, balance.before);
+        let is_new = self.is_new;
+        if is_new.any() {
+            let mut found = std::mem::take(&mut self.energies);
+            for (before, own) in found.before.iter_mut().zip(self.energy(State::Start)) {
+                *before = select_both(is_new, own.energy.kinetic_and_potential(), *before);
+            }
+            self.energies = found;
             self.is_new = T::mask(self.token, 0);
         }
     }

@@ -27,18 +27,19 @@ mod sinking;
 
 use std::sync::Arc;
 
-use self::balance::Balance;
+use self::balance::{Balance, Energies};
 use super::contacts::Contacts;
 use super::ground::Ground;
+use super::joint_slots::JointRow;
 use super::machine::Machine;
 use super::problem::{MAX_CONTACTS, Triple};
 use super::rows::Rows;
 use super::yielding::Yields;
 use crate::integrator::{StepOptions, StepReport, WarmStart};
 use crate::multibody::bias::BiasScratch;
-use crate::multibody::energy::energy;
+use crate::multibody::energy::{EnergyOfCluster, energies};
 use crate::multibody::{
-    Energy, EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
+    EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
 };
 use crate::sand::RutMap;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
@@ -116,11 +117,15 @@ pub struct Block<T: Lane> {
     /// Impulses of each lane's present step.
     next_memories: [WarmStart; MAX_LANES],
     persistent: Vec<T>,
-    has_persistent: T::Mask,
-    /// Lanes whose contacts are those of the last step, which persisted.
-    persists: T::Mask,
-    /// Lanes whose contacts are those of the last step.
-    is_same: T::Mask,
+    /// By cluster: lanes of which it is known.
+    has_persistent: Vec<T::Mask>,
+    /// By cluster: lanes in which the contacts of its group are those of the last step, which
+    /// persisted.
+    persists: Vec<T::Mask>,
+    /// By cluster: lanes in which the contacts of its group are those of the last step.
+    is_same: Vec<T::Mask>,
+    /// Of each velocity, its cluster.
+    cluster_of: Vec<usize>,
     start: LaneConfiguration<T>,
     v: Vec<T>,
     time: T,
@@ -145,21 +150,24 @@ pub struct Block<T: Lane> {
     u: Vec<Triple<T>>,
     /// Impulses of the last step by slot, N s.
     p_last: Vec<Triple<T>>,
-    /// Lanes whose contact is in impact, by slot, and lanes with an impact.
+    /// Lanes whose contact is in impact, by slot, and lanes with an impact in its group, by cluster.
     impact: Vec<T::Mask>,
-    has_impact: T::Mask,
+    has_impact: Vec<T::Mask>,
     /// An impulse (nv), or its factor coordinates, or a change of the velocity.
     y: Vec<T>,
     /// Torques' impulse over the step (nv).
     torque: Vec<T>,
     /// Generalized impulse of the contacts (nv).
     pushed: Vec<T>,
-    balance: Balance<T>,
+    /// Energies of the clusters, and their balances: that of a group is its first cluster's.
+    energies: Energies<T>,
+    balances: Vec<Balance<T>>,
     /// Lanes whose energy at the start is not known yet.
     is_new: T::Mask,
-    /// Lanes whose position must be projected, and their deepest gap, m.
-    is_deep: T::Mask,
-    deepest: T,
+    /// By cluster: lanes in which the position of its group must be projected, and its deepest gap,
+    /// m.
+    is_deep: Vec<T::Mask>,
+    deepest: Vec<T>,
     /// Lanes that hold a rover.
     occupied: T::Mask,
     /// Lanes that take part in the present step and have not fallen back.
@@ -181,6 +189,8 @@ impl<T: Lane> Block<T> {
         let place = || LaneConfiguration::new(token, machine);
         let contacts = Contacts::new(token, machine);
         let slots = vec![[zero; 3]; contacts.n_slots()];
+        let n = machine.n_clusters();
+        let masks = || vec![nobody; n];
         Self {
             token,
             options: StepOptions::default(),
@@ -196,9 +206,12 @@ impl<T: Lane> Block<T> {
             memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, machine.nv())),
             next_memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, 0)),
             persistent: vector(),
-            has_persistent: nobody,
-            persists: nobody,
-            is_same: nobody,
+            has_persistent: masks(),
+            persists: masks(),
+            is_same: masks(),
+            cluster_of: (0..machine.nv())
+                .map(|k| machine.cluster_of_velocity(k))
+                .collect(),
             start: place(),
             v: vector(),
             time: zero,
@@ -220,16 +233,17 @@ impl<T: Lane> Block<T> {
             gaps: slots.clone(),
             p_last: slots.clone(),
             impact: vec![nobody; slots.len()],
-            has_impact: nobody,
+            has_impact: masks(),
             mu: vec![zero; slots.len()],
             u: slots,
             y: vector(),
             torque: vector(),
             pushed: vector(),
-            balance: Balance::new(token),
+            energies: Energies::new(token, n),
+            balances: vec![Balance::new(token); n],
             is_new: nobody,
-            is_deep: nobody,
-            deepest: zero,
+            is_deep: masks(),
+            deepest: vec![zero; n],
             occupied: nobody,
             going: nobody,
             reasons: [None; MAX_LANES],
@@ -304,13 +318,13 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    /// Energy of the start or of the end of the step.
-    fn energy(&mut self, state: State) -> (Energy<T>, Vec3<T>) {
+    /// Energies of the clusters at the start or at the end of the step.
+    fn energy(&mut self, state: State) -> &[EnergyOfCluster<T>] {
         let (place, v) = match state {
             State::Start => (&self.start, &self.v),
             State::End => (&self.end, &self.v_end),
         };
-        energy(
+        energies(
             &self.machine,
             &self.inertias,
             place,
@@ -320,36 +334,51 @@ impl<T: Lane> Block<T> {
         )
     }
 
-    /// The linear momentum that only contacts with the ground change; 0 of a machine that is tied
-    /// to the world.
-    fn own_momentum(&self, momentum: Vec3<T>) -> Vec3<T> {
-        if self.machine.holds_the_world {
-            Vec3::splat(self.token, [0.0; 3])
-        } else {
-            momentum
+    /// What a unit of a slot's gap counts as where it is compared with lengths, m: of a stop the arm
+    /// of its joint.
+    #[inline(always)]
+    fn lever(&self, slot: usize) -> Option<T> {
+        match self.contacts.joint_row(slot) {
+            Some((joint, JointRow::Stop(_))) => Some(self.number(self.machine.joints[joint].arm)),
+            _ => None,
         }
     }
 
-    /// Lanes with a contact.
+    /// Number of clusters.
     #[inline(always)]
-    fn in_touch(&self) -> T::Mask {
-        let mut in_touch = T::mask(self.token, 0);
+    fn n_clusters(&self) -> usize {
+        self.balances.len()
+    }
+
+    /// Lanes in which any cluster is marked.
+    #[inline(always)]
+    fn any(&self, masks: &[T::Mask]) -> T::Mask {
+        let nobody = T::mask(self.token, 0);
+        masks.iter().fold(nobody, |all, own| all | *own)
+    }
+
+    /// `masks`: by cluster, lanes in which its group has a contact.
+    #[inline(always)]
+    fn find_touch(&self, masks: &mut [T::Mask]) {
+        masks.fill(T::mask(self.token, 0));
         for &slot in self.contacts.used() {
-            in_touch = in_touch | self.contacts.slot(slot).active;
+            let active = self.contacts.slot(slot).active;
+            self.contacts.mark(slot, active, masks);
         }
-        in_touch
+        self.contacts.unite(masks);
     }
 
-    /// Lanes with a contact with the ground.
+    /// `masks`: by cluster, lanes in which its group has a contact with the ground.
     #[inline(always)]
-    fn on_ground(&self) -> T::Mask {
-        let mut on_ground = T::mask(self.token, 0);
+    fn find_ground(&self, masks: &mut [T::Mask]) {
+        masks.fill(T::mask(self.token, 0));
         for &slot in self.contacts.used_by_shapes() {
             if self.contacts.cluster_of(slot).is_some() {
-                on_ground = on_ground | self.contacts.slot(slot).active;
+                let active = self.contacts.slot(slot).active;
+                self.contacts.mark(slot, active, masks);
             }
         }
-        on_ground
+        self.contacts.unite(masks);
     }
 
     /// Number of the friction-contact problems of all lanes: one of each cluster in each lane.
@@ -370,4 +399,20 @@ impl<T: Lane> Block<T> {
 enum State {
     Start,
     End,
+}
+
+/// The linear momentum of a cluster that only contacts with the ground change; 0 of one that is tied
+/// to the world.
+#[inline(always)]
+fn own_momentum<T: Lane>(
+    token: T::Token,
+    machine: &Machine,
+    cluster: usize,
+    momentum: Vec3<T>,
+) -> Vec3<T> {
+    if machine.is_held(cluster) {
+        Vec3::splat(token, [0.0; 3])
+    } else {
+        momentum
+    }
 }

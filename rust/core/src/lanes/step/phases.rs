@@ -1,11 +1,15 @@
 //! The three parts of a step.
 
-use super::balance::{Conditions, select_both};
-use super::{Block, Fallback, Next, State};
-use crate::integrator::{Phase, Probe, StepReport};
+use std::sync::Arc;
+
+use super::balance::{Balance, Conditions, Correction, Energies, select_both};
+use super::{Block, Fallback, Next, State, own_momentum};
+use crate::contact::clusters_of;
+use crate::integrator::{Phase, Probe, Stabilisation, StepReport};
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
+use crate::multibody::Model;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::extent::Turning;
 
@@ -79,10 +83,9 @@ impl<T: Lane> Block<T> {
         self.load();
         self.rows
             .to_problems(&self.contacts, &self.u, &self.mu, problems);
-        let same = self.is_same.bits();
         let problems_in_use = &mut problems[..self.contacts.n_problems()];
         for (index, problem) in problems_in_use.iter_mut().enumerate() {
-            problem.begins_least = same >> Self::lane_of(index) & 1 == 1;
+            problem.begins_least = self.is_same[index / T::LANES].get(Self::lane_of(index));
         }
         probe.end(Phase::Bias);
         if self.contacts.factored() != 0 {
@@ -118,19 +121,56 @@ impl<T: Lane> Block<T> {
             return;
         }
         let step = self.time_step();
-        let mut unknown = 0;
-        for (lane, memory) in self.memories[..T::LANES].iter().enumerate() {
-            unknown |= u32::from(memory.impulses.is_empty()) << lane;
-        }
-        let weight = self.inertias.mass * self.gravity.norm() * step.0;
+        self.find_unknown();
+        let (machine, contacts, token) = (&*self.machine, &self.contacts, self.token);
+        let (unknown, masses) = (&self.energies.in_touch, &self.energies.mass);
+        let fall = self.gravity.norm() * step.0;
+        let weight = |slot: usize| {
+            if let ([unknown], [mass]) = (&unknown[..], &masses[..]) {
+                return (*unknown, *mass * fall);
+            }
+            let (mut lanes, mut weight) = (0, fall);
+            for lane in 0..T::LANES {
+                let cluster = contacts.own_cluster(slot, lane);
+                lanes |= unknown[cluster].bits() & 1 << lane;
+                weight.set(lane, masses[cluster].get(lane) * fall.get(lane));
+            }
+            (T::mask(token, lanes), weight)
+        };
         self.yields.update(
-            (&self.machine, &self.contacts),
+            (machine, contacts),
             (&self.poses_middle, &self.v),
             step,
             &self.rows.u_before,
             &self.p_last,
-            (T::mask(self.token, unknown), weight),
+            weight,
         );
+    }
+
+    /// `energies.in_touch`: by cluster, lanes that remember no contact; and the clusters' masses.
+    fn find_unknown(&mut self) {
+        let mut unknown = std::mem::take(&mut self.energies.in_touch);
+        unknown.fill(T::mask(self.token, 0));
+        for (lane, memory) in self.memories[..T::LANES].iter().enumerate() {
+            let own = T::mask(self.token, 1 << lane);
+            for (cluster, unknown) in unknown.iter_mut().enumerate() {
+                let touches = |model: &Arc<Model>| {
+                    let mut keys = memory.impulses.iter();
+                    keys.any(|(key, _)| clusters_of(model, key).contains(&cluster))
+                };
+                let is_known = match &self.models[lane] {
+                    Some(model) if self.balances.len() > 1 => touches(model),
+                    _ => !memory.impulses.is_empty(),
+                };
+                if !is_known {
+                    *unknown = *unknown | own;
+                }
+            }
+        }
+        self.energies.in_touch = unknown;
+        for (cluster, mass) in self.energies.mass.iter_mut().enumerate() {
+            *mass = self.inertias.mass_of(&self.machine, cluster);
+        }
     }
 
     /// Configurations at the midpoint and at the predicted end.
@@ -138,7 +178,11 @@ impl<T: Lane> Block<T> {
     fn predict(&mut self) {
         let (h, theta) = (self.options.time_step, self.options.theta);
         let zero = self.number(0.0);
-        let is_fast = Turning::of(zero, &self.machine, &self.v).is_gyroscopic(self.number(h));
+        let mut is_fast = T::mask(self.token, 0);
+        for cluster in 0..self.n_clusters() {
+            let turning = Turning::of_cluster(zero, &self.machine, &self.v, cluster);
+            is_fast = is_fast | turning.is_gyroscopic(self.number(h));
+        }
         self.fall_back(Fallback::Turning, is_fast);
         let machine = &*self.machine;
         self.middle
@@ -188,31 +232,29 @@ impl<T: Lane> Block<T> {
         if (self.drives.has_motors() || self.sand.is_some()) && self.revise(problems, probe) {
             return Next::Retake;
         }
-        let (after, momentum) = self.energy(State::End);
-        self.balance.after = after.kinetic_and_potential();
-        self.balance.momentum = self.own_momentum(momentum);
-        let of_sand = self.work_of_sand();
+        self.weigh_ends();
+        self.weigh_sand();
         T::vectorize(
             token,
             #[inline(always)]
-            || self.audit(of_sand),
+            || self.audit(),
         );
-        if self.balance.is_corrected.any() {
-            self.weigh_again();
-        }
         T::vectorize(
             token,
             #[inline(always)]
-            || self.balance.report(&mut self.reports),
+            || {
+                for balance in &self.balances {
+                    balance.report(&mut self.reports);
+                }
+            },
         );
         probe.end(Phase::Update);
-        let is_deep = self.tolerated().is_some_and(|tolerated| {
-            T::vectorize(
+        let is_deep = self.options.stabilisation == Stabilisation::Projection
+            && T::vectorize(
                 token,
                 #[inline(always)]
-                || self.measure(tolerated),
-            )
-        });
+                || self.measure(),
+            );
         if is_deep { Next::Project } else { Next::Finish }
     }
 
@@ -242,7 +284,9 @@ impl<T: Lane> Block<T> {
         }
         for lane in (0..T::LANES).filter(|&lane| self.retaken.get(lane)) {
             self.n_retaken[lane] += 1;
-            (self.contacts).recall(lane, &self.memories[lane], problems);
+            let own = (lane, self.models[lane].as_ref());
+            let is_same = &mut self.is_same;
+            (self.contacts).recall(own, &self.memories[lane], problems, is_same);
         }
         self.set_up(problems, false, probe);
         true
@@ -268,54 +312,145 @@ impl<T: Lane> Block<T> {
             .set_moved(&self.machine, &self.middle, &self.v_end, share);
         self.end.normalise();
         self.find_impacts();
-        self.balance.contact_work = self.contact_work();
+        self.weigh_contacts();
     }
 
-    /// Lets lanes whose step does not balance fall back, and corrects the velocity of those with a
-    /// little too much energy.
+    /// Energies and momenta at the end of the step, of clusters and of groups.
+    fn weigh_ends(&mut self) {
+        let mut balances = std::mem::take(&mut self.balances);
+        let mut own = std::mem::take(&mut self.energies);
+        let machine = Arc::clone(&self.machine);
+        let token = self.token;
+        for (cluster, found) in self.energy(State::End).iter().enumerate() {
+            own.after[cluster] = found.energy.kinetic_and_potential();
+            balances[cluster].momentum = own_momentum(token, &machine, cluster, found.momentum);
+        }
+        for (balance, (before, after)) in
+            (balances.iter_mut()).zip(own.before.iter().zip(&own.after))
+        {
+            (balance.before, balance.after) = (*before, *after);
+        }
+        if self.contacts.joined() != 0 {
+            let number = &mut own.number;
+            self.gather(&mut balances, number, |own| &mut own.before[0]);
+            self.gather(&mut balances, number, |own| &mut own.before[1]);
+            self.gather(&mut balances, number, |own| &mut own.after[0]);
+            self.gather(&mut balances, number, |own| &mut own.after[1]);
+            self.gather(&mut balances, number, |own| &mut own.momentum.x);
+            self.gather(&mut balances, number, |own| &mut own.momentum.y);
+            self.gather(&mut balances, number, |own| &mut own.momentum.z);
+        }
+        (self.balances, self.energies) = (balances, own);
+    }
+
+    /// Sums a number over each group.
+    fn gather(
+        &self,
+        balances: &mut [Balance<T>],
+        numbers: &mut [T],
+        of: impl Fn(&mut Balance<T>) -> &mut T,
+    ) {
+        for (number, balance) in numbers.iter_mut().zip(&mut *balances) {
+            *number = *of(balance);
+        }
+        self.contacts.gather(numbers);
+        for (number, balance) in numbers.iter().zip(balances) {
+            *of(balance) = *number;
+        }
+    }
+
+    /// Lets lanes of which a group does not balance fall back, and corrects the velocity of groups
+    /// with a little too much energy.
     #[inline(always)]
-    fn audit(&mut self, of_sand: T) {
+    fn audit(&mut self) {
         let (h, theta) = self.time_step();
-        let places = &self.start.joints;
-        let mut work =
-            (self.drives).work(&self.machine, (h, theta), places, [&self.v, &self.v_end]);
-        work.damped -= of_sand;
-        self.balance.work = work;
-        let zero = h.like(0.0);
-        let stored = |places: &[T]| self.drives.stored(zero, places);
-        self.balance.stored = stored(&self.end.joints) - stored(places);
-        let mut released = h.like(0.0);
+        let mut own = std::mem::take(&mut self.energies);
+        let mut balances = std::mem::take(&mut self.balances);
+        let (places, velocities) = (&self.start.joints, [&self.v[..], &self.v_end]);
+        let (machine, step, zero) = (&*self.machine, (h, theta), h.like(0.0));
+        (self.drives).work(machine, step, places, velocities, &mut own.of_drives);
+        let [before, after] = &mut own.stored;
+        self.drives.stored(machine, zero, places, before);
+        (self.drives).stored(machine, zero, &self.end.joints, after);
+        for (c, balance) in balances.iter_mut().enumerate() {
+            balance.work = own.of_drives[c];
+            balance.work.damped -= own.of_sand[c];
+            balance.stored = own.stored[1][c] - own.stored[0][c];
+        }
+        if self.contacts.joined() != 0 {
+            let number = &mut own.number;
+            self.gather(&mut balances, number, |own| &mut own.work.supplied);
+            self.gather(&mut balances, number, |own| &mut own.work.damped);
+            self.gather(&mut balances, number, |own| &mut own.work.of_springs);
+            self.gather(&mut balances, number, |own| &mut own.stored);
+        }
+        self.balances = balances;
+        own.released.fill(zero);
         if !self.yields.is_empty() {
             let (contacts, before) = (&self.contacts, &self.rows.u_before);
-            released = self.yields.supplied(contacts, h, &self.p, &self.u, before);
+            let released = &mut own.released;
+            (self.yields).supplied(contacts, h, &self.p, &self.u, before, released);
+        }
+        for (cluster, mass) in own.mass.iter_mut().enumerate() {
+            *mass = self.inertias.mass_of(&self.machine, cluster);
+        }
+        self.find_touch(&mut own.in_touch);
+        self.find_ground(&mut own.on_ground);
+        for sums in [&mut own.released, &mut own.mass] {
+            self.contacts.gather(sums);
         }
         let nobody = T::mask(self.token, 0);
         let conserves = self.options.theta <= 0.5;
-        let conditions = Conditions {
-            mass: self.inertias.mass,
-            fall: self.gravity.norm() * h,
-            untouched: !self.on_ground(),
-            is_free: if conserves { !self.in_touch() } else { nobody },
+        let fall = self.gravity.norm() * h;
+        let conditions = |c: usize| Conditions {
+            mass: own.mass[c],
+            fall,
+            untouched: !own.on_ground[c],
+            is_free: if conserves { !own.in_touch[c] } else { nobody },
         };
-        let is_lost = (self.balance).audit(released, &conditions, self.going);
+        let (mut is_lost, mut is_corrected) = (nobody, nobody);
+        for (c, balance) in self.balances.iter_mut().enumerate() {
+            let going = self.going & self.contacts.leads(c);
+            is_lost = is_lost | balance.audit(own.released[c], &conditions(c), going);
+            is_corrected = is_corrected | balance.is_corrected;
+        }
+        if is_corrected.any() {
+            self.correct(conditions);
+        }
+        self.energies = own;
         self.fall_back(Fallback::Energy, is_lost);
-        if self.balance.is_corrected.any() {
-            let trees = &self.machine.trees;
-            let (shortened, share) = self.balance.correct(&conditions, trees, &mut self.v_end);
-            for &slot in self.contacts.used() {
-                for u in &mut self.u[slot] {
-                    *u = T::select(shortened, *u * share, *u);
-                }
-            }
+        if is_corrected.any() {
+            self.weigh_ends();
         }
     }
 
-    /// Energy of the lanes whose velocity was corrected.
-    fn weigh_again(&mut self) {
-        let (after, momentum) = self.energy(State::End);
-        self.balance.momentum = self.own_momentum(momentum);
-        let (balance, after) = (&mut self.balance, after.kinetic_and_potential());
-        balance.after = select_both(balance.is_corrected, after, balance.after);
+    /// Corrects the velocities, and the local ones. `conditions`: of each group.
+    fn correct(&mut self, conditions: impl Fn(usize) -> Conditions<T>) {
+        let found = self.balances.iter().enumerate();
+        let mut all: Vec<Correction<T>> = found
+            .map(|(c, balance)| balance.correction(&conditions(c)))
+            .collect();
+        for lane in 0..T::LANES {
+            for cluster in 0..all.len() {
+                let leader = self.contacts.leader(cluster, lane);
+                if leader != cluster {
+                    let other = all[leader];
+                    all[cluster].take(self.token, lane, &other);
+                }
+            }
+        }
+        for tree in &self.machine.trees {
+            all[tree.cluster].apply(tree, &mut self.v_end);
+        }
+        let lanes: Vec<T::Mask> = all.iter().map(|own| own.lanes).collect();
+        let shares: Vec<T> = all.iter().map(|own| own.share).collect();
+        for &slot in self.contacts.used() {
+            let shortened = self.contacts.mask_of(slot, &lanes);
+            let share = self.contacts.number_of(slot, &shares);
+            for u in &mut self.u[slot] {
+                *u = T::select(shortened, *u * share, *u);
+            }
+        }
     }
 
     /// Last part of a step. `problems`: those of [`Self::set_gaps`], solved, if a lane's position
@@ -325,7 +460,7 @@ impl<T: Lane> Block<T> {
     /// If there are fewer than [`Self::n_problems`].
     pub fn finish(&mut self, problems: Option<&[ContactProblem]>, probe: &mut dyn Probe) {
         let token = self.token;
-        if let Some(problems) = problems.filter(|_| self.is_deep.any()) {
+        if let Some(problems) = problems.filter(|_| self.any(&self.is_deep).any()) {
             self.project(problems);
         }
         probe.end(Phase::Projection);
@@ -354,7 +489,13 @@ impl<T: Lane> Block<T> {
         let going = self.going;
         let (h, _) = self.time_step();
         self.rows.find_loop_impulses(&self.contacts, going, &self.p);
-        let persists = self.is_same & self.in_touch() & !self.has_impact;
+        let mut persists = std::mem::take(&mut self.persists);
+        self.find_touch(&mut persists);
+        for ((persists, same), impact) in
+            (persists.iter_mut().zip(&self.is_same)).zip(&self.has_impact)
+        {
+            *persists = *persists & *same & !*impact;
+        }
         let (contacts, end) = (&self.contacts, &self.poses_end);
         self.rows.generalized_impulse(
             &self.machine,
@@ -367,12 +508,35 @@ impl<T: Lane> Block<T> {
         for (own, pushed) in self.persistent.iter_mut().zip(&self.pushed) {
             *own = T::select(going, *pushed, *own);
         }
-        self.has_persistent = (self.has_persistent & !going) | (persists & going);
+        let is_one = persists.len() == 1;
+        for (cluster, (has, persists)) in self
+            .has_persistent
+            .iter_mut()
+            .zip(&mut persists)
+            .enumerate()
+        {
+            if !is_one {
+                // As a rover that leaves the block and comes back.
+                let zero = h.like(0.0);
+                let mut is_any = going & !going;
+                for (x, of) in self.persistent.iter().zip(&self.cluster_of) {
+                    if *of == cluster {
+                        is_any = is_any | zero.lt(x.abs());
+                    }
+                }
+                *persists = *persists & is_any;
+            }
+            *has = (*has & !going) | (*persists & going);
+        }
+        self.persists = persists;
         self.start.select_from(going, &self.end);
         for (v, end) in self.v.iter_mut().zip(&self.v_end) {
             *v = T::select(going, *end, *v);
         }
-        self.balance.before = select_both(going, self.balance.after, self.balance.before);
+        let Energies { before, after, .. } = &mut self.energies;
+        for (before, after) in before.iter_mut().zip(after) {
+            *before = select_both(going, *after, *before);
+        }
         self.time = T::select(going, self.time + h, self.time);
         self.drives.accept(going);
         if let Some(sand) = &mut self.sand {

@@ -86,14 +86,16 @@ impl<T: Lane> Block<T> {
         is_new
     }
 
-    /// Work of the sand over the step, J.
-    pub(super) fn work_of_sand(&mut self) -> T {
-        let Some(mut sand) = self.sand.take() else {
-            return self.number(0.0);
-        };
-        let work = sand.work(&self.layers(), &self.v, &self.v_end);
-        self.sand = Some(sand);
-        work
+    /// Work of the sand on each cluster over the step, J.
+    pub(super) fn weigh_sand(&mut self) {
+        let mut work = std::mem::take(&mut self.energies.of_sand);
+        work.fill(self.number(0.0));
+        if let Some(mut sand) = self.sand.take() {
+            let velocities = [&self.v[..], &self.v_end];
+            sand.work(&self.machine, &self.layers(), velocities, &mut work);
+            self.sand = Some(sand);
+        }
+        self.energies.of_sand = work;
     }
 
     /// Notes where the wheels of the lanes are that are still going.

@@ -30,8 +30,9 @@ impl ModelDescription {
         let own: f64 = self.solids.iter().map(|solid| solid.mass).sum();
         let mass = own + tracks.iter().map(|track| track.mass).sum::<f64>();
         let more: usize = tracks.iter().map(|track| track.wheels).sum();
-        let shared = yielding(mass, self.wheels.len() + more);
+        let n = self.wheels.len() + more;
         for track in &tracks {
+            let shared = yielding(mass, n, track.radius);
             let end = self.end_of_tree(&track.solid);
             let (solids, wheels): (Vec<_>, Vec<_>) =
                 (0..track.wheels).map(|k| track.wheel(k, shared)).unzip();

@@ -228,7 +228,7 @@ pub struct WheelDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grousers: Option<u32>,
     /// Normal stiffness where it touches, N/m; 0: rigid. By default a wheel that can stand on a
-    /// line yields by 0.03 mm under its share of the weight, and any other one is rigid.
+    /// line yields by 3e-4 of its radius under its share of the weight, and any other one is rigid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
     /// Normal damping beside the stiffness, N s/m; 0 by default.

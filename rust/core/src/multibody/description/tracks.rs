@@ -37,7 +37,7 @@ pub struct TrackDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounding: Option<f64>,
     /// Normal stiffness of an inner wheel, N/m; the first and the last one have half of it. By
-    /// default they yield by 0.03 mm under their share of the weight; 0: rigid.
+    /// default they yield by 3e-4 of their radius under their share of the weight; 0: rigid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
     /// Normal damping beside the stiffness, N s/m.

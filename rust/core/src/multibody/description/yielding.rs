@@ -2,12 +2,14 @@
 //!
 //! Two contacts share the load of a rigid cylinder on rigid ground by micrometres: an axle that
 //! tilts by a hair puts all of it on one end, and the path follows. Real wheels yield by more. A
-//! cylinder whose stiffness is not stated deflects by [`DEFLECTION`] under its share of the weight.
+//! cylinder whose stiffness is not stated deflects by [`DEFLECTION`] of its radius under its share
+//! of the weight: the same machine at another size deflects in proportion.
 
 use super::{ModelDescription, WheelDescription};
 
-/// Deflection under a wheel's share of the weight, m.
-const DEFLECTION: f64 = 3e-5;
+/// Deflection under a wheel's share of the weight, as a fraction of its radius: 0.03 mm for the
+/// built-in rover's wheels of 0.1 m.
+const DEFLECTION: f64 = 3e-4;
 
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.81;
@@ -29,16 +31,18 @@ impl WheelDescription {
 }
 
 impl ModelDescription {
-    /// Writes stiffness and critical damping, to two digits, into wheels that touch along a line
-    /// and state none, and a relaxation length into those that yield and state none.
+    /// Writes stiffness and critical damping into wheels that touch along a line and state none,
+    /// and a relaxation length into those that yield and state none.
     pub(in crate::multibody) fn state_yielding(&mut self) {
         let mass: f64 = self.solids.iter().map(|solid| solid.mass).sum();
-        let [stiffness, damping] = yielding(mass, self.wheels.len());
+        let n = self.wheels.len();
         let lines = self
             .wheels
             .iter_mut()
             .filter(|wheel| wheel.stands_on_a_line());
         for wheel in lines.filter(|wheel| wheel.stiffness.is_none()) {
+            let radius = wheel.contact_radius.unwrap_or(wheel.radius);
+            let [stiffness, damping] = yielding(mass, n, radius);
             wheel.stiffness = Some(stiffness);
             wheel.damping = Some(damping);
         }
@@ -48,29 +52,25 @@ impl ModelDescription {
             let soft = wheel.stiffness.filter(|stiffness| *stiffness > 0.0);
             if let (Some(stiffness), None) = (soft, wheel.relaxation_length) {
                 let length = half_length(radius, share / stiffness);
-                wheel.relaxation_length = Some(two_digits(length).clamp(1e-9 * radius, radius));
+                wheel.relaxation_length = Some(length.clamp(1e-9 * radius, radius));
             }
         }
     }
 }
 
-/// Stiffness (N/m) and critical damping (N s/m), to two digits, of each of `n` wheels that carry a
-/// mass (kg).
-pub(super) fn yielding(mass: f64, n: usize) -> [f64; 2] {
-    let stiffness = two_digits(mass * GRAVITY / (n as f64 * DEFLECTION));
-    let time = 2.0 * (DEFLECTION / GRAVITY).sqrt();
-    [stiffness.min(1e12), two_digits(time * stiffness).min(1e12)]
+/// Stiffness (N/m) and critical damping (N s/m) of each of `n` wheels of a radius (m) that carry a
+/// mass (kg). They are not rounded, so that they scale with the machine.
+pub(super) fn yielding(mass: f64, n: usize, radius: f64) -> [f64; 2] {
+    let deflection = DEFLECTION * radius;
+    let stiffness = mass * GRAVITY / (n as f64 * deflection);
+    let time = 2.0 * (deflection / GRAVITY).sqrt();
+    [stiffness.min(1e12), (time * stiffness).min(1e12)]
 }
 
 /// Half the length of the contact of a wheel that is pressed onto a plane by a deflection, m: the
 /// relaxation length of a tread whose points deflect one by one.
 fn half_length(radius: f64, deflection: f64) -> f64 {
     (2.0 * radius * deflection).sqrt()
-}
-
-/// A positive number to two significant digits.
-fn two_digits(x: f64) -> f64 {
-    format!("{x:.1e}").parse().unwrap_or(x)
 }
 
 #[cfg(test)]
@@ -91,12 +91,12 @@ mod tests {
             .map(|wheel| wheel.tread.map(|own| own.stiffness))
             .collect();
         let share = mass * 9.81 / 6.0 / 3e-5;
-        assert!((own[0].unwrap() / share - 1.0).abs() < 0.05);
+        assert!((own[0].unwrap() / share - 1.0).abs() < 1e-12);
         assert_eq!(own[1..], [None, None, None, Some(1e6), own[0]]);
         let heavier = model.with_masses_scaled(1.3).unwrap();
         assert_eq!(heavier.wheels()[0].tread, model.wheels()[0].tread);
         let length = model.wheels()[0].tread.unwrap().relaxation_length;
         let half = (2.0 * model.wheels()[0].radius * 3e-5).sqrt();
-        assert!((length / half - 1.0).abs() < 0.05, "{length}");
+        assert!((length / half - 1.0).abs() < 1e-12, "{length}");
     }
 }

@@ -129,6 +129,13 @@ impl Model {
             machines,
         };
         model.build_loops()?;
+        let tied = model.loops.iter().map(|closure| {
+            let trees = closure.trees(&model.mechanism).collect();
+            (trees, closure.holds_the_world())
+        });
+        let tied: Vec<(Vec<usize>, bool)> = tied.collect();
+        model.mechanism.tie(&tied);
+        model.find_levers();
         Ok(model)
     }
 }

@@ -24,6 +24,8 @@ pub(super) fn mechanism_of(
             .map(|joint| OwnJoint {
                 body: joint.body,
                 velocity: joint.velocity,
+                cluster: 0,
+                arm: 1.0,
             })
             .collect(),
         rotors: (0..joints.len())
@@ -57,6 +59,7 @@ pub(super) fn mechanism_of(
             rows: first..mechanism.rows.len(),
             is_free: tree.is_free,
             pose: if t > 0 { pose } else { 0 },
+            cluster: t,
         });
     }
     for b in 0..bodies.len() {

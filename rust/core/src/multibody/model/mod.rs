@@ -9,6 +9,7 @@ mod build;
 mod close;
 pub(in crate::multibody) mod closed_loop;
 mod edit;
+mod levers;
 mod links;
 mod machines;
 mod parts;

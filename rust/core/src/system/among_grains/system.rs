@@ -242,8 +242,9 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.tree.load(options, start_b, v_b, y_b);
     }
 
-    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
-        self.tree.is_gyroscopic(options, self.halves(v).1)
+    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], _cluster: usize) -> bool {
+        let mut clusters = 0..self.tree.n_clusters();
+        clusters.any(|own| self.tree.is_gyroscopic(options, self.halves(v).1, own))
     }
 
     fn load_gyroscopic(
@@ -287,10 +288,19 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.tree.turning(self.halves(v).1)
     }
 
-    fn work(&mut self, options: &StepOptions, start: Start<'_, Both>, v_end: &[f64]) -> Work {
+    fn work(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Both>,
+        v_end: &[f64],
+        out: &mut [Work],
+    ) {
         let (_, start) = self.starts(start);
         let (_, v_end) = self.halves(v_end);
-        self.tree.work(options, start, v_end)
+        let mut of_clusters = vec![Work::default(); self.tree.n_clusters()];
+        self.tree.work(options, start, v_end, &mut of_clusters);
+        let whole = of_clusters.into_iter().reduce(|a, b| a + b);
+        out.fill(whole.unwrap_or_default());
     }
 
     fn accept(&mut self) {
@@ -470,8 +480,10 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.bed.add_moments(y_a);
     }
 
-    fn displacement(&self, y: &[f64]) -> f64 {
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
         let (y_a, y_b) = self.halves(y);
-        (self.bed.displacement(y_a)).max(self.tree.displacement(y_b))
+        let clusters = 0..self.tree.n_clusters();
+        let of_trees = clusters.map(|own| self.tree.displacement(y_b, own));
+        of_trees.fold(self.bed.displacement(y_a, 0), f64::max)
     }
 }

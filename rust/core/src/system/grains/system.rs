@@ -626,7 +626,7 @@ where
         self.parts.rolling.add(&self.parts.pairs.round, y);
     }
 
-    fn displacement(&self, y: &[f64]) -> f64 {
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
         match &self.scene.machine {
             Some(machine) => machine.displacement(self.scene.machine_velocities(y)),
             None => 0.0,
@@ -641,7 +641,7 @@ const PUSHED_OUT: f64 = 0.2;
 /// [`rebound_at_gap`]; an excessive overlap is pushed out.
 pub(in crate::system) fn gap_law(options: &StepOptions, gap_start: f64, u_N_before: f64) -> f64 {
     let h = options.time_step;
-    let excess = gap_start + options.penetration_tolerance;
+    let excess = gap_start + options.penetration_tolerance.unwrap_or(0.0);
     if excess < 0.0 && options.stabilisation == Stabilisation::PushOut {
         return PUSHED_OUT * excess / h;
     }

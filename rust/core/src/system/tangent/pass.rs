@@ -4,13 +4,15 @@ use super::direction::Direction;
 use super::held_tree::TangentScene;
 use super::scratch::{Correction, Tangent};
 use super::varying_sand::VaryingSand;
+use crate::contact::clusters_of;
 use crate::integrator::UnilateralContact;
 use crate::integrator::carried_velocity::{Carried, Moving};
 use crate::integrator::held_step::SAME;
 use crate::integrator::mechanical_system::MOST_REVISIONS;
+use crate::integrator::work::Work;
 use crate::multibody::Configuration;
 use crate::multibody::bias::bias;
-use crate::multibody::energy::energy;
+use crate::multibody::energy::energies;
 use crate::scalar::{Dual, Lane, Vec3};
 
 /// Positions at the end of a step: before and after the projection.
@@ -342,27 +344,51 @@ impl<T: Lane> Tangent<T> {
     fn choose_correction(&mut self, scene: &TangentScene<'_>) -> bool {
         let fastest = scene.v_end.iter().fold(1e-3_f64, |m, v| m.max(v.abs()));
         let kept = self.v_end.clone();
-        let mut best = (f64::INFINITY, Correction::None);
+        self.find_groups(scene);
+        let n = self.group_of.len();
+        let mechanism = scene.model.mechanism();
+        let mut best = vec![(f64::INFINITY, Correction::None); n];
         for correction in [Correction::None, Correction::Relative, Correction::Whole] {
-            self.correction = correction;
+            self.corrections.clear();
+            self.corrections.resize(n, correction);
             self.v_end.copy_from_slice(&kept);
             self.conclude(scene);
-            let pairs = self.v_end.iter().zip(scene.v_end);
-            let off = pairs.fold(0.0_f64, |m, (a, b)| m.max((a.get(0) - b).abs()));
-            // The same to rounding: the simpler one.
-            if off < 0.5 * best.0 {
-                best = (off, correction);
+            let mut off = vec![0.0_f64; n];
+            for (k, (a, b)) in self.v_end.iter().zip(scene.v_end).enumerate() {
+                let own = &mut off[self.group_of[mechanism.cluster_of_velocity(k)]];
+                *own = own.max((a.get(0) - b).abs());
             }
-            if best.0 <= ROUNDING * fastest {
+            for (best, off) in best.iter_mut().zip(off) {
+                // The same to rounding: the simpler one.
+                if off < 0.5 * best.0 {
+                    *best = (off, correction);
+                }
+            }
+            if best.iter().all(|own| own.0 <= ROUNDING * fastest) {
                 break;
             }
         }
-        if best.1 != self.correction {
-            self.correction = best.1;
+        let chosen: Vec<Correction> = best.iter().map(|own| own.1).collect();
+        if chosen != self.corrections {
+            self.corrections = chosen;
             self.v_end.copy_from_slice(&kept);
             self.conclude(scene);
         }
-        best.0 <= SAME * fastest
+        best.iter().all(|own| own.0 <= SAME * fastest)
+    }
+
+    /// The groups of clusters that touch each other in the step.
+    fn find_groups(&mut self, scene: &TangentScene<'_>) {
+        let mechanism = scene.model.mechanism();
+        self.group_of.clear();
+        self.group_of.extend(0..mechanism.n_clusters());
+        for contact in &scene.held.step.contacts {
+            let both = clusters_of(scene.model, &contact.key).map(|own| self.group_of[own]);
+            let first = both[0].min(both[1]);
+            for own in self.group_of.iter_mut().filter(|own| both.contains(own)) {
+                *own = first;
+            }
+        }
     }
 
     /// The state at the end, from the velocity before the audit.
@@ -380,7 +406,7 @@ impl<T: Lane> Tangent<T> {
         );
         self.close_end(scene, false);
         self.end.normalise();
-        if self.correction != Correction::None {
+        if self.corrections.iter().any(|own| *own != Correction::None) {
             self.correct(scene);
         }
         if scene.held.step.projection.is_none() {
@@ -398,50 +424,76 @@ impl<T: Lane> Tangent<T> {
         );
         self.close_end(scene, true);
         self.reached.normalise();
-        self.carry_velocity(scene, before);
+        self.carry_velocity(scene, &before);
     }
 
-    /// Kinetic energy and momentum of the velocity at the end, before or after the projection.
-    fn moving(&mut self, scene: &TangentScene<'_>, place: Place) -> Moving<Dual<T>> {
+    /// Kinetic energy and momentum of each group with the velocity at the end, before or after the
+    /// projection.
+    fn moving(&mut self, scene: &TangentScene<'_>, place: Place) -> Vec<Moving<Dual<T>>> {
         let q = match place {
             Place::End => &self.end,
             Place::Reached => &self.reached,
         };
         let (mechanism, scratch) = (scene.model.mechanism(), &mut self.energy_scratch);
         let gravity = Vec3::splat(self.token, scene.options.gravity.into());
-        let (energy, momentum) =
-            energy(mechanism, &self.inertias, q, &self.v_end, gravity, scratch);
-        let is_free = scene.model.is_free() && !scene.model.holds_the_world();
-        Moving {
-            kinetic: energy.kinetic,
-            momentum: if is_free {
-                momentum
-            } else {
-                Vec3::splat(self.token, [0.0; 3])
-            },
+        let found = energies(mechanism, &self.inertias, q, &self.v_end, gravity, scratch);
+        let zero = Dual::splat(self.token, 0.0);
+        let none = Moving {
+            kinetic: zero,
+            momentum: Vec3::new(zero, zero, zero),
+        };
+        let mut all = vec![none; found.len()];
+        for (own, group) in found.iter().zip(&self.group_of) {
+            all[*group].kinetic += own.energy.kinetic;
+            all[*group].momentum += own.momentum;
         }
+        for (cluster, group) in self.group_of.iter().enumerate() {
+            if mechanism.is_held(cluster) {
+                all[*group].momentum = none.momentum;
+            }
+        }
+        all
     }
 
-    /// The velocity at the projected position, see [`crate::integrator::carried_velocity`].
-    fn carry_velocity(&mut self, scene: &TangentScene<'_>, before: Moving<Dual<T>>) {
-        let after = self.moving(scene, Place::Reached);
-        let is_alone = (scene.held.step.contacts.iter()).all(UnilateralContact::is_internal);
-        let lanes = if is_alone {
-            u32::MAX >> (32 - T::LANES)
-        } else {
-            0
+    /// The velocities of the groups that were moved at their projected positions, see
+    /// [`crate::integrator::carried_velocity`]. `before`: at those before it.
+    fn carry_velocity(&mut self, scene: &TangentScene<'_>, before: &[Moving<Dual<T>>]) {
+        let step = &scene.held.step;
+        let Some(projection) = &step.projection else {
+            return;
         };
-        let is_alone = T::mask(self.token, lanes);
-        let carried = Carried::new(before, after, self.inertias.mass, is_alone);
-        for v in &mut self.v_end {
-            *v *= carried.share;
-        }
-        let Vec3 { x, y, z } = carried.common;
-        let trees = &scene.model.mechanism().trees;
-        for tree in trees.iter().filter(|tree| tree.is_free) {
-            let translation = &mut self.v_end[tree.velocities.start..];
-            for (v, common) in translation.iter_mut().zip([x, y, z]) {
-                *v += common;
+        let after = self.moving(scene, Place::Reached);
+        let mechanism = scene.model.mechanism();
+        for (group, (before, after)) in before.iter().zip(after).enumerate() {
+            let of_contact = |key| self.group_of[clusters_of(scene.model, key)[0]];
+            let contacts = step.contacts.iter().zip(&projection.moved);
+            let mut own = contacts.filter(|(contact, _)| of_contact(&contact.key) == group);
+            if !own.clone().any(|(_, is_moved)| *is_moved) {
+                continue;
+            }
+            let is_alone = own.all(|(contact, _)| contact.is_internal());
+            let lanes = if is_alone {
+                u32::MAX >> (32 - T::LANES)
+            } else {
+                0
+            };
+            let is_alone = T::mask(self.token, lanes);
+            let clusters = (0..self.group_of.len()).filter(|own| self.group_of[*own] == group);
+            let masses = clusters.map(|own| self.inertias.mass_of(mechanism, own));
+            let mass = masses.reduce(|a, b| a + b).unwrap_or(self.inertias.mass);
+            let carried = Carried::new(*before, after, mass, is_alone);
+            let Vec3 { x, y, z } = carried.common;
+            let trees = mechanism.trees.iter();
+            for tree in trees.filter(|tree| self.group_of[tree.cluster] == group) {
+                let own = &mut self.v_end[tree.velocities.clone()];
+                for v in &mut *own {
+                    *v *= carried.share;
+                }
+                if tree.is_free {
+                    for (v, common) in own.iter_mut().zip([x, y, z]) {
+                        *v += common;
+                    }
+                }
             }
         }
     }
@@ -451,45 +503,58 @@ impl<T: Lane> Tangent<T> {
         let step = self.step(scene);
         let mechanism = scene.model.mechanism();
         let gravity = Vec3::splat(self.token, scene.options.gravity.into());
-        let scratch = &mut self.energy_scratch;
-        let (inertias, mass) = (&self.inertias, self.inertias.mass);
-        let before = energy(mechanism, inertias, &self.start, &self.v, gravity, scratch).0;
-        let (after, momentum) = energy(
-            mechanism,
-            inertias,
-            &self.end,
-            &self.v_end,
-            gravity,
-            scratch,
-        );
-        let places = &self.start.joints;
-        let mut work = (self.drives)
-            .work(mechanism, step, places, [&self.v, &self.v_end])
-            .total();
+        let (inertias, scratch) = (&self.inertias, &mut self.energy_scratch);
+        let before = energies(mechanism, inertias, &self.start, &self.v, gravity, scratch).to_vec();
+        let (end, v_end) = (&self.end, &self.v_end);
+        let after = energies(mechanism, inertias, end, v_end, gravity, scratch).to_vec();
         let (h, theta) = step;
-        for (force, (v, end)) in self.applied.iter().zip(self.v.iter().zip(&self.v_end)) {
-            work += h * *force * (theta * *end + (h.like(1.0) - theta) * *v);
+        let (zero, one) = (h.like(0.0), h.like(1.0));
+        let (places, velocities) = (&self.start.joints, [&self.v[..], &self.v_end]);
+        let mut of_drives = vec![Work::none(zero); mechanism.n_clusters()];
+        (self.drives).work(mechanism, step, places, velocities, &mut of_drives);
+        let mut works: Vec<Dual<T>> = of_drives.iter().map(Work::total).collect();
+        let speeds = self.v.iter().zip(&self.v_end).enumerate();
+        for (force, (k, (v, end))) in self.applied.iter().zip(speeds) {
+            works[mechanism.cluster_of_velocity(k)] +=
+                h * *force * (theta * *end + (one - theta) * *v);
         }
-        let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
-        let (zero, one) = (mass.like(0.0), mass.like(1.0));
-        let is_free = scene.model.is_free() && !scene.model.holds_the_world();
-        let is_relative = self.correction == Correction::Relative && is_free;
-        let whole = if is_relative {
-            momentum.dot(momentum) / (mass + mass)
-        } else {
-            zero
-        };
-        let share = (one - excess / (after.kinetic - whole)).max(zero).sqrt();
-        let common = momentum * (one / mass);
-        let common = [common.x, common.y, common.z];
-        for v in &mut self.v_end {
-            *v *= share;
-        }
-        if is_relative {
-            for tree in &mechanism.trees {
-                let translation = &mut self.v_end[tree.velocities.start..];
-                for (v, common) in translation.iter_mut().zip(common) {
-                    *v += (one - share) * common;
+        for (group, correction) in self.corrections.iter().enumerate() {
+            let own = || (0..works.len()).filter(|own| self.group_of[*own] == group);
+            if *correction == Correction::None || self.group_of[group] != group {
+                continue;
+            }
+            let is_relative =
+                *correction == Correction::Relative && !own().any(|own| mechanism.is_held(own));
+            let (mut excess, mut kinetic, mut mass) = (zero, zero, zero);
+            let mut momentum = Vec3::new(zero, zero, zero);
+            let momenta = |own: usize| after[own].momentum;
+            for own in own() {
+                let (before, after) = (&before[own].energy, &after[own].energy);
+                let change =
+                    (after.kinetic - before.kinetic) + (after.potential - before.potential);
+                excess += change - works[own];
+                kinetic += after.kinetic;
+                mass += self.inertias.mass_of(mechanism, own);
+                momentum += momenta(own);
+            }
+            let whole = if is_relative {
+                momentum.dot(momentum) / (mass + mass)
+            } else {
+                zero
+            };
+            let share = (one - excess / (kinetic - whole)).max(zero).sqrt();
+            let common = momentum * (one / mass);
+            let common = [common.x, common.y, common.z];
+            let trees = mechanism.trees.iter();
+            for tree in trees.filter(|tree| self.group_of[tree.cluster] == group) {
+                let own = &mut self.v_end[tree.velocities.clone()];
+                for v in &mut *own {
+                    *v *= share;
+                }
+                if is_relative {
+                    for (v, common) in own.iter_mut().zip(common) {
+                        *v += (one - share) * common;
+                    }
                 }
             }
         }

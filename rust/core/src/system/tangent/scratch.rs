@@ -64,7 +64,9 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) d_mu: T,
     pub(super) d_stiffness: T,
     pub(super) d_damping: T,
-    pub(super) correction: Correction,
+    /// Of each group of clusters, by its first one; and the group of each cluster.
+    pub(super) corrections: Vec<Correction>,
+    pub(super) group_of: Vec<usize>,
     /// Of a machine with closed loops.
     pub(super) loops: Option<VaryingLoops<T>>,
     /// Of a machine on soft ground.
@@ -118,7 +120,8 @@ impl<T: Lane> Tangent<T> {
             d_mu: zero,
             d_stiffness: zero,
             d_damping: zero,
-            correction: Correction::None,
+            corrections: Vec::new(),
+            group_of: Vec::new(),
             loops: Loops::new(token, mechanism, model.loops(), 1).map(|loops| VaryingLoops {
                 loops,
                 factor: Factor::new(token, mechanism),
