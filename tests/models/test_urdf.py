@@ -73,7 +73,7 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     path = write(tmp_path, rover())
     report = RoverModel.from_urdf(path).import_report
     assert any("torque limit" in entry for entry in report.assumed)
-    assert any("yields 0.03 mm" in entry for entry in report.assumed)
+    assert any("yields 0.0003 of its radius" in entry for entry in report.assumed)
     given = {"torque_limit": 12.0, "steering_stiffness": 300.0, "steering_damping": 4.0, "steering_limit": 0.3}
     given |= {"brake_stiffness": 700.0, "brake_damping": 9.0}
     model = RoverModel.from_urdf(path, wheel_stiffness=0.0, **given)

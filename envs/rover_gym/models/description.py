@@ -29,10 +29,8 @@ BRAKE_STIFFNESS, BRAKE_TIME = 100.0, 0.02
 #: Largest friction that is read, and least share of it along a wheel. A wheel at 10 holds on slopes of 84 degrees, and
 #: files write 1e5 for "does not slip".
 MOST_FRICTION, LEAST_SHARE = 10.0, 0.01
-#: Compression of a wheel under its share of the weight, m, and damping relative to stiffness, s: critical for that
-#: share.
-YIELD = 3e-5
-YIELDING_TIME = 2.0 * math.sqrt(YIELD / GRAVITY)
+#: Compression of a wheel under its share of the weight, as a share of its radius: that of a cylinder in the catalogue.
+YIELD = 3e-4
 #: Kinds of shapes that are drawn and collide as they are; meshes collide as their hulls.
 SOLID = ("box", "sphere", "cylinder", "capsule", "ellipsoid")
 UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states none
@@ -276,18 +274,18 @@ def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOpt
     """Stiffness, N/m, and damping, N s/m, where a wheel touches; stiffness 0 for a rigid wheel.
 
     Without compliance, the weight of a rigid chassis rests on three of its wheels, and micrometres of height decide
-    which.
+    which. Neither number is rounded, so that they scale with the robot.
     """
-    stiffness = options.wheel_stiffness
+    stiffness, compression = options.wheel_stiffness, YIELD * role.radius
     if stiffness is None:
-        stiffness = float(f"{weight / YIELD:.2g}")
+        stiffness = weight / compression
         tree.assumed.append(
-            f"wheel {role.link}: stiffness {stiffness:g} N/m, by which it yields {1e3 * YIELD:g} mm "
+            f"wheel {role.link}: stiffness {stiffness:.3g} N/m, by which it yields {YIELD:g} of its radius "
             "under its share of the weight, and critical damping"
         )
     if stiffness == 0.0:
         return {"stiffness": 0.0}
-    return {"stiffness": stiffness, "damping": float(f"{YIELDING_TIME * stiffness:.2g}")}
+    return {"stiffness": stiffness, "damping": 2.0 * math.sqrt(compression / GRAVITY) * stiffness}
 
 
 class Materials:

@@ -98,7 +98,8 @@ def from_urdf(
         wheel_width: Width of every wheel, m; 0 for thin discs, which cost less to simulate. By default the width of the
             wheel's collision cylinder in the file, or 0.
         wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
-            compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+            compressed by 3e-4 of its radius under its share of the weight, which determines the wheel loads of a rigid
+            chassis.
         masses: Masses of links by their names, kg, for files that only draw. A link that has no mass in the file gets
             the inertia of its shapes.
         mesh_parts: Most convex parts into which a concave collision mesh is divided. With 1 a mesh collides as its
@@ -161,7 +162,8 @@ def from_mjcf(
         wheel_width: Width of every wheel, m; 0 for thin discs, which cost less to simulate. By default the width of the
             wheel's collision cylinder in the file, or 0.
         wheel_stiffness: Normal contact stiffness of every wheel, N/m; 0 for rigid wheels. By default a wheel is
-            compressed by 0.03 mm under its share of the weight, which determines the wheel loads of a rigid chassis.
+            compressed by 3e-4 of its radius under its share of the weight, which determines the wheel loads of a rigid
+            chassis.
         masses: Masses of links by their names, kg, for files that only draw. A link that has no mass in the file gets
             the inertia of its shapes.
         mesh_parts: Most convex parts into which a concave collision mesh is divided. With 1 a mesh collides as its

@@ -59,6 +59,7 @@ impl Tread {
             damping: travel.like(self.damping),
             tangential: travel.like(self.tangential_ratio * self.stiffness),
             fading: travel * travel.like(1.0 / self.relaxation_length),
+            slack: travel.like(SLACK * self.relaxation_length),
         }
     }
 }
@@ -74,6 +75,8 @@ pub struct Compliance<T = f64> {
     pub tangential: T,
     /// V/σ, 1/s.
     pub fading: T,
+    /// Deflection that counts as elastic whatever the forces, m.
+    pub slack: T,
 }
 
 /// Law of one contact over a step: Coulomb's law between impulse p and `u + diagonal p + shift`.
@@ -95,8 +98,9 @@ pub struct Yielding<T = f64> {
     friction: [T; 2],
 }
 
-/// Deflection that counts as elastic whatever the forces, m.
-const SLACK: f64 = 1e-6;
+/// Deflection that counts as elastic whatever the forces, as a share of the relaxation length: below
+/// 1e-6 m for the built-in rover's wheels.
+const SLACK: f64 = 1e-4;
 
 /// Share of the spring along the surface that acts where the last step is not known and the contact
 /// hardly rolls. It makes loads unique; a rover parked across a slope of 10 degrees creeps by 0.1
@@ -120,6 +124,7 @@ impl<T: Lane> Compliance<T> {
                     damping: a.damping * share * share + b.damping * rest * rest,
                     tangential: a.tangential * along,
                     fading: a.fading * along + b.fading * (one - along),
+                    slack: a.slack + b.slack,
                 })
             }
             (one, other) => one.or(other),
@@ -136,6 +141,7 @@ impl<T: Lane> Compliance<T> {
             damping: both(self.damping, other.damping),
             tangential: both(self.tangential, other.tangential),
             fading: both(self.fading, other.fading),
+            slack: both(self.slack, other.slack),
         }
     }
 
@@ -166,6 +172,7 @@ impl<T: Lane> Compliance<T> {
             damping,
             tangential,
             fading,
+            slack,
         } = *self;
         let (zero, one) = (h.like(0.0), h.like(1.0));
         let moved = h * u_N;
@@ -175,7 +182,7 @@ impl<T: Lane> Compliance<T> {
         let force = T::select(unknown, weight, before[0]) / h;
         let by_force = (force + damping * u_N).max(zero).min(force) / stiffness;
         let elastic = (h.like(2.0) * deflection).min(by_force);
-        let known = gap.max(-(elastic + h.like(SLACK)));
+        let known = gap.max(-(elastic + slack));
         let weight = h * stiffness + damping;
         let diagonal = one / (h * weight);
         // The damper acts on the deflection, which begins when the gap is closed.

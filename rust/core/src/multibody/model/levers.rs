@@ -39,7 +39,19 @@ fn across(point: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
 const ALONG: f64 = 1e-9;
 
 impl Model {
-    /// Balls around the parts of all bodies.
+    /// A ball of the radius of gyration around the mass centre of a body.
+    fn ball_of_mass(&self, body: usize) -> Ball {
+        let own = &self.inertias.bodies[body];
+        let largest = own.rest + own.first.max(own.second).max(0.0);
+        Ball {
+            body,
+            centre: Vector3::new(own.centre.x, own.centre.y, own.centre.z),
+            radius: if own.mass > 0.0 { (largest / own.mass).sqrt() } else { 0.0 },
+            disc: None,
+        }
+    }
+
+    /// Balls around the parts of all bodies. A body without parts is as large as its inertia says.
     fn balls(&self) -> Vec<Ball> {
         let ball = |body, centre, radius| Ball {
             body,
@@ -55,11 +67,14 @@ impl Model {
         let spheres = (self.spheres.iter()).map(|own| ball(own.body, own.centre, own.radius));
         let colliders = self.colliders.iter();
         let colliders = colliders.map(|own| ball(own.body, own.centre, own.bound()));
-        wheels
-            .chain(boxes)
-            .chain(spheres)
-            .chain(colliders)
-            .collect()
+        let parts = wheels.chain(boxes).chain(spheres).chain(colliders);
+        let mut balls: Vec<Ball> = parts.collect();
+        for body in 0..self.bodies.len() {
+            if balls.iter().all(|own| own.body != body) {
+                balls.push(self.ball_of_mass(body));
+            }
+        }
+        balls
     }
 
     /// Largest distance of anything that each body carries from the body's origin.

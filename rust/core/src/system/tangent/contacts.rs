@@ -8,7 +8,7 @@ use crate::contact::contact_slope::SlopeOfBody;
 use crate::contact::jacobian::sides;
 use crate::contact::limit;
 use crate::contact::rows::{Place, Triple, add_scaled};
-use crate::contact::{Contact, Part};
+use crate::contact::{Contact, Part, clusters_of};
 use crate::law::compliance::{Compliance, Yielding};
 use crate::multibody::{Model, Poses};
 use crate::scalar::{Dual, Lane, Vec3};
@@ -148,14 +148,16 @@ impl<T: Lane> Tangent<T> {
                 stiffness: own.stiffness * Dual::new(one, self.d_stiffness),
                 damping: own.damping * Dual::new(one, self.d_damping),
                 tangential: own.tangential * Dual::new(one, self.d_stiffness),
-                fading: own.fading,
+                ..own
             })
         };
         let contact = &scene.held.step.contacts[i];
         let other = contact.other.and_then(|other| of(other.part));
         let law = Compliance::in_series(of(contact.part), other)?;
         // As the step without a memory takes it.
-        let weight = self.inertias.mass * number(options.gravity.norm()) * h;
+        let mechanism = scene.model.mechanism();
+        let [cluster, _] = clusters_of(scene.model, &contact.key);
+        let weight = self.inertias.mass_of(mechanism, cluster) * number(options.gravity.norm()) * h;
         let u_N = self.local(scene, i, &self.v)[0];
         let step = (h, number(options.theta));
         let unknown = (T::mask(self.token, u32::MAX >> (32 - T::LANES)), weight);
