@@ -89,6 +89,7 @@ impl<T: Lane> Block<T> {
         for (own, has_impact) in is_rough.iter_mut().zip(&self.has_impact) {
             *own = *own | *has_impact;
         }
+        self.contacts.unite(&mut is_rough);
         let persists = self.persists.iter().zip(&is_rough);
         let is_any = persists.fold(false, |any, (own, rough)| any | (*own & !*rough).any());
         if is_any {

@@ -39,19 +39,7 @@ fn across(point: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
 const ALONG: f64 = 1e-9;
 
 impl Model {
-    /// A ball of the radius of gyration around the mass centre of a body.
-    fn ball_of_mass(&self, body: usize) -> Ball {
-        let own = &self.inertias.bodies[body];
-        let largest = own.rest + own.first.max(own.second).max(0.0);
-        Ball {
-            body,
-            centre: Vector3::new(own.centre.x, own.centre.y, own.centre.z),
-            radius: if own.mass > 0.0 { (largest / own.mass).sqrt() } else { 0.0 },
-            disc: None,
-        }
-    }
-
-    /// Balls around the parts of all bodies. A body without parts is as large as its inertia says.
+    /// Balls around the parts of all bodies.
     fn balls(&self) -> Vec<Ball> {
         let ball = |body, centre, radius| Ball {
             body,
@@ -67,14 +55,11 @@ impl Model {
         let spheres = (self.spheres.iter()).map(|own| ball(own.body, own.centre, own.radius));
         let colliders = self.colliders.iter();
         let colliders = colliders.map(|own| ball(own.body, own.centre, own.bound()));
-        let parts = wheels.chain(boxes).chain(spheres).chain(colliders);
-        let mut balls: Vec<Ball> = parts.collect();
-        for body in 0..self.bodies.len() {
-            if balls.iter().all(|own| own.body != body) {
-                balls.push(self.ball_of_mass(body));
-            }
-        }
-        balls
+        wheels
+            .chain(boxes)
+            .chain(spheres)
+            .chain(colliders)
+            .collect()
     }
 
     /// Largest distance of anything that each body carries from the body's origin.
@@ -115,6 +100,11 @@ impl Model {
     }
 
     /// Finds the levers of the mechanism, and the size of each cluster.
+    ///
+    /// A turning that moves no part has the size of its cluster as its arm, and 1 m where the
+    /// cluster has no size: such a machine touches nothing. An arm of 0 would close a stop at any
+    /// angle. Masses have no influence, so that machines that differ in them alone have one
+    /// mechanism.
     pub(super) fn find_levers(&mut self) {
         let balls = self.balls();
         let reach = self.reaches(&balls);
@@ -150,6 +140,12 @@ impl Model {
                         lever(body.velocity, 1, ratio * arm);
                     }
                 }
+            }
+        }
+        for lever in &mut levers {
+            let size = sizes[lever.cluster];
+            if lever.arm == 0.0 {
+                lever.arm = if size > 0.0 { size } else { 1.0 };
             }
         }
         for own in &mut self.mechanism.joints {
