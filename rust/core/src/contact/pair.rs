@@ -55,12 +55,13 @@ impl ContactKey {
     #[inline]
     #[must_use]
     pub fn lasting(self) -> Self {
-        if self.feature as usize & ON_SURFACE == 0 {
-            return self;
-        }
-        Self {
-            opposite: Opposite::Ground(ANY_PIECE),
-            ..self
+        match self.opposite {
+            // The features of pairs are counted otherwise: the bit says nothing there.
+            Opposite::Ground(_) if self.feature as usize & ON_SURFACE != 0 => Self {
+                opposite: Opposite::Ground(ANY_PIECE),
+                ..self
+            },
+            _ => self,
         }
     }
 
