@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rover_core::contact::generalized_impulse;
+use rover_core::contact::{ContactKey, Part, generalized_impulse};
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Configuration, JointKind, Kinematics, Model, ModelDescription};
@@ -118,6 +118,18 @@ fn an_impulse_between_two_bodies_is_no_force_and_no_couple_on_both_together() {
             assert!(moment.norm() < 1e-14, "{moment}");
         }
     }
+}
+
+/// The story: half the features of two boxes looked like those on a surface. The next step knew such
+/// a contact as one with the ground, and the boxes were judged apart while they collided.
+#[test]
+fn the_next_step_knows_both_sides_of_a_contact_between_bodies() {
+    for feature in 0..1 << 15 {
+        let key = ContactKey::between(Part::Box(0), feature, Part::Box(1));
+        assert_eq!(key.lasting(), key, "{feature}");
+    }
+    let key = ContactKey::on_ground(Part::Wheel(0), 0, 3).on_surface();
+    assert_ne!(key.lasting(), key);
 }
 
 #[test]
