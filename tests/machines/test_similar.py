@@ -32,13 +32,13 @@ def scaled(description: dict[str, Any], s: float) -> dict[str, Any]:
         solid.pop("armature", None)
         solid.pop("drive", None)
     for wheel in description.get("wheels", []):
-        for key, power in {"radius": 1, "contact_radius": 1, "width": 1, "rounding": 1, "torque_limit": 4}.items():
+        for key in ("radius", "contact_radius", "width", "rounding", "relaxation_length"):
+            if key in wheel:
+                wheel[key] *= s
+        for key, power in {"torque_limit": 4.0, "stiffness": 2.0, "damping": 2.5}.items():
             if key in wheel:
                 wheel[key] *= s**power
         wheel.pop("motor", None)
-        if "stiffness" in wheel:
-            wheel["stiffness"] *= s**2
-            wheel["damping"] *= s**2.5
     for tag in description.get("tags", []):
         tag["position"] = [x * s for x in tag["position"]]
     return description

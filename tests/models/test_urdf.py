@@ -80,7 +80,7 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     assert model.to_dict()["wheels"][0]["stiffness"] == 0.0
     soft = RoverModel.from_urdf(path, wheel_stiffness=2e5).to_dict()["wheels"][0]
     assert soft["stiffness"] == 2e5
-    assert soft["damping"] == pytest.approx(2e5 * 2.0 * (3e-5 / 9.81) ** 0.5, rel=0.05)
+    assert soft["damping"] == pytest.approx(2e5 * 2.0 * (3e-4 * soft["radius"] / 9.81) ** 0.5)
     assert model.import_report.assumed == ()
     assert model.wheel_torque_limits.tolist() == [12.0] * 3
     assert model.steering_limit == 0.3

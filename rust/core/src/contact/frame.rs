@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::PlacedShape;
-use crate::geometry::query::disc_plane::rolling;
+use crate::geometry::query::disc_plane::{FLAT, rolling};
 use crate::geometry::query::{PairPoint, SurfacePoint};
 use crate::scalar::Vec3;
 
@@ -20,16 +20,16 @@ pub struct ContactFrame {
     pub b: Vector3<f64>,
 }
 
-/// Sine of the angle between axle and normal below which they do not define the rolling direction.
-const PARALLEL: f64 = 1e-9;
+/// Distance from the axle below which a point of a wheel has no direction along the rim, m.
+const ON_AXLE: f64 = 1e-9;
 
 impl ContactFrame {
-    /// Frame of a wheel with unit axle `s`. If s is parallel to n, the wheel's `spoke` defines t.
+    /// Frame of a wheel with unit axle `s`. If the wheel lies flat, its `spoke` defines t.
     #[inline]
     #[must_use]
     pub fn of_wheel(n: &Vector3<f64>, s: &Vector3<f64>, spoke: &Vector3<f64>) -> Self {
         let (rolling, length) = rolling(Vec3::from(*n), Vec3::from(*s));
-        let t = if length > PARALLEL {
+        let t = if length > FLAT {
             rolling.into()
         } else {
             (spoke - n * n.dot(spoke)).normalize()
@@ -81,7 +81,7 @@ impl ContactFrame {
         };
         // A disc in contact on its face rolls along its rim.
         let along_rim = disc.axle.cross(&(point.point - disc.centre));
-        let along_rim = along_rim.try_normalize(PARALLEL).unwrap_or(disc.spoke);
+        let along_rim = along_rim.try_normalize(ON_AXLE).unwrap_or(disc.spoke);
         Self::of_wheel(&point.n, &disc.axle, &along_rim)
     }
 

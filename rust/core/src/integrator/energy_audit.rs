@@ -15,9 +15,9 @@
 //!   the rebounds are slower than Newton's law says, which the report's residual contains.
 //! - Clusters that touch each other are judged together, and apart from all others
 //!   ([`super::groups`]): neither energies nor corrections of other groups count.
-//! - Where nothing outside touches a group only the motion relative to its mass centre is scaled, so the linear momentum is kept. Contacts among its own parts feel relative
-//!   velocities alone. Free flight conserves energy too: without any contact s may be above 1.
-//!
+//! - Where nothing outside touches a group only the motion relative to its mass centre is scaled, so
+//!   the linear momentum is kept. Contacts among its own parts feel relative velocities alone. Free
+//!   flight conserves energy too: without any contact s may be above 1.
 //! - If even v⁺ = 0 leaves an excess, the displacement is shortened too: a contact ended the motion
 //!   within the step.
 //!

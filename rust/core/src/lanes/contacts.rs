@@ -31,7 +31,7 @@ use super::pieces::LanePlane;
 use super::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers};
-use crate::geometry::query::disc_plane::{rolling, to_lowest};
+use crate::geometry::query::disc_plane::{FLAT, rolling, to_lowest};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
@@ -41,9 +41,6 @@ use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// Number of the plane in every terrain that has one.
 const PLANE: u32 = 0;
-
-/// Sine of the angle between axle and normal below which a wheel has no rolling direction.
-const PARALLEL: f64 = 1e-9;
 
 /// Lengths below which a direction is not taken from a difference, m.
 const NO_DIRECTION: f64 = 1e-12;
@@ -1089,7 +1086,7 @@ impl<T: Lane> Contacts<T> {
         let wheel = &self.parts.wheels[self.part_of[slot]];
         let slot = &mut self.slots[slot];
         let radius = T::splat(self.token, wheel.radius);
-        let parallel = radius.like(PARALLEL);
+        let flat = radius.like(FLAT);
         let mut undefined = T::mask(self.token, 0);
         if (slot.active & !slot.on_sphere).any() {
             let (t, length) = rolling(n, s);
@@ -1097,7 +1094,7 @@ impl<T: Lane> Contacts<T> {
             slot.t = t;
             slot.point = centre + to_lowest(t, s, radius);
             slot.gap = height + n.dot(centre) - radius * length;
-            undefined = slot.active & !slot.on_sphere & length.le(parallel);
+            undefined = slot.active & !slot.on_sphere & length.le(flat);
         }
         if slot.on_sphere.any() {
             let sphere = &slot.sphere;
@@ -1111,7 +1108,7 @@ impl<T: Lane> Contacts<T> {
             let n = from_sphere * (radius.like(1.0) / distance);
             let across = n.cross(s);
             let across_length = across.norm();
-            let rolls = across_length.gt(parallel);
+            let rolls = across_length.gt(flat);
             let mut t = across * (radius.like(1.0) / across_length);
             if (slot.on_sphere & !rolls).any() {
                 // The face touches: along the rim.
@@ -1145,7 +1142,7 @@ impl<T: Lane> Contacts<T> {
         let slot = &mut self.slots[slot];
         let radius = T::splat(self.token, wheel.radius);
         let (one, rounding) = (radius.like(1.0), radius.like(wheel.rounding));
-        let parallel = radius.like(PARALLEL);
+        let flat = radius.like(FLAT);
         let on_plane = slot.active & !slot.on_sphere;
         let mut undefined = T::mask(self.token, 0);
         if on_plane.any() {
@@ -1155,14 +1152,14 @@ impl<T: Lane> Contacts<T> {
             slot.t = t;
             slot.point = circle + to_lowest(t, s, radius) - n * rounding;
             slot.gap = height + n.dot(circle) - radius * length - rounding;
-            undefined = on_plane & length.le(parallel);
+            undefined = on_plane & length.le(flat);
         }
         if slot.on_sphere.any() {
             let here = slot.on_sphere;
             let near = wheel.nearest(s, slot.sphere.centre - end.origin_of(wheel.tree) - centre);
             let across = near.n.cross(s);
             let length = across.norm();
-            let rolls = length.gt(parallel);
+            let rolls = length.gt(flat);
             let mut t = across * (one / length);
             if (here & !rolls).any() {
                 // A side face touches: along the rim.

@@ -47,6 +47,8 @@ pub struct Tread {
     pub tangential_ratio: f64,
     /// Relaxation length σ, m.
     pub relaxation_length: f64,
+    /// Radius of the wheel, m.
+    pub radius: f64,
 }
 
 impl Tread {
@@ -59,7 +61,7 @@ impl Tread {
             damping: travel.like(self.damping),
             tangential: travel.like(self.tangential_ratio * self.stiffness),
             fading: travel * travel.like(1.0 / self.relaxation_length),
-            slack: travel.like(SLACK * self.relaxation_length),
+            slack: travel.like(SLACK * self.radius),
         }
     }
 }
@@ -98,9 +100,9 @@ pub struct Yielding<T = f64> {
     friction: [T; 2],
 }
 
-/// Deflection that counts as elastic whatever the forces, as a share of the relaxation length: below
-/// 1e-6 m for the built-in rover's wheels.
-const SLACK: f64 = 1e-4;
+/// Deflection that counts as elastic whatever the forces, as a share of the wheel's radius: 1e-6 m for
+/// the built-in rover's wheels.
+const SLACK: f64 = 1e-5;
 
 /// Share of the spring along the surface that acts where the last step is not known and the contact
 /// hardly rolls. It makes loads unique; a rover parked across a slope of 10 degrees creeps by 0.1
@@ -300,6 +302,7 @@ mod tests {
         damping: 900.0,
         tangential_ratio: 0.7,
         relaxation_length: 0.012,
+        radius: 0.1,
     };
 
     /// Law of a contact at rest on its spring, with a tangential impulse before.

@@ -7,13 +7,18 @@
 //!
 //! A wheel lying flat touches with its whole rim. Two more rim points, 120 degrees to either side
 //! of the lowest, then support it. Their gap is `n·c + d + R |w| / 2`, so they come in continuously
-//! as the wheel tips over.
+//! as the wheel tips over. Where `|w|` is below [`FLAT`], the first point is the end of the wheel's
+//! spoke: the lowest point would run around the rim with every tremor, away from its own force.
 
 use nalgebra::Vector3;
 
 use super::SurfacePoint;
 use crate::geometry::{Disc, Plane};
 use crate::scalar::{Lane, Vec3};
+
+/// Sine of the angle between axle and normal up to which a wheel lies flat. A point of the rim is
+/// then at most twice this times the radius higher than the lowest one.
+pub(crate) const FLAT: f64 = 1e-5;
 
 /// Rolling direction `n × s / |n × s|` of a wheel with the unit axle s over a plane with the unit
 /// normal n, and `|n × s|`. All searches for contacts take the lowest point from these numbers, so
@@ -34,7 +39,7 @@ pub(crate) fn to_lowest<T: Lane>(rolling: Vec3<T>, s: Vec3<T>, radius: T) -> Vec
     rolling.cross(s) * radius
 }
 
-/// Rim points whose gap is at most `reach`; the lowest one always comes first if it is near.
+/// Rim points whose gap is at most `reach`, the lowest one first.
 ///
 /// `base` (m, world) is where the disc's coordinates have their origin: the
 /// centre's world position is `base + centre`.
@@ -48,10 +53,9 @@ pub fn rim_points(
 ) {
     let rim = Rim::of(disc, plane, base);
     for feature in 0..3 {
-        if rim.gap(feature) > reach {
-            return;
+        if rim.gap(feature) <= reach {
+            visit(&rim.point(feature));
         }
-        visit(&rim.point(feature));
     }
 }
 
@@ -107,29 +111,37 @@ impl<'a> Rim<'a> {
     /// Of a point, m.
     #[inline]
     fn gap(&self, feature: usize) -> f64 {
+        if self.length <= FLAT {
+            return self.height + self.normal.dot(&self.arm(feature));
+        }
         let share = if feature == 0 { 1.0 } else { -0.5 };
         self.height - share * self.disc.radius * self.length
     }
 
+    /// From the centre to a point, m.
     #[inline]
-    fn point(&self, feature: usize) -> SurfacePoint {
+    fn arm(&self, feature: usize) -> Vector3<f64> {
         let disc = self.disc;
-        let down = if self.length > 1e-9 {
+        let first = if self.length > FLAT {
             to_lowest(self.rolling, Vec3::from(disc.axle), disc.radius).into()
         } else {
             disc.spoke * disc.radius
         };
-        let side = || disc.axle.cross(&down) * 0.75_f64.sqrt();
-        let arm = match feature {
-            0 => down,
-            1 => down * -0.5 + side(),
-            _ => down * -0.5 - side(),
-        };
+        let side = || disc.axle.cross(&first) * 0.75_f64.sqrt();
+        match feature {
+            0 => first,
+            1 => first * -0.5 + side(),
+            _ => first * -0.5 - side(),
+        }
+    }
+
+    #[inline]
+    fn point(&self, feature: usize) -> SurfacePoint {
         SurfacePoint {
             feature,
-            point: disc.centre + arm,
+            point: self.disc.centre + self.arm(feature),
             n: *self.normal,
-            rolling: disc.spoke,
+            rolling: self.disc.spoke,
             gap: self.gap(feature),
         }
     }

@@ -505,6 +505,7 @@ fn wheels(
                 damping: wheel.damping.unwrap_or(0.0),
                 tangential_ratio: wheel.tangential_ratio.unwrap_or(1.0),
                 relaxation_length: wheel.relaxation_length.unwrap_or(wheel.radius),
+                radius: wheel.contact_radius.unwrap_or(wheel.radius),
             }),
             material: named(wheel.material.as_ref(), "wheel"),
             torque_limit: wheel.torque_limit,
