@@ -360,7 +360,7 @@ fn several_machines_obey_the_law_of_the_general_step() {
         ];
         let should_touch = !alone.contains(&name);
         assert_eq!(touching > 50, should_touch, "{name}: {touching}");
-        assert!(met.fallbacks * 50 < steps, "{name}: {}", met.fallbacks);
+        assert!(met.fallbacks * 50 <= steps, "{name}: {}", met.fallbacks);
         // A few friction problems have several answers.
         let typical = met.differences[steps * 95 / 100];
         assert!(typical < 1e-9, "{name}: {typical:e}");
