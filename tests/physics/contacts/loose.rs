@@ -120,8 +120,8 @@ fn an_impulse_between_two_bodies_is_no_force_and_no_couple_on_both_together() {
     }
 }
 
-/// The story: half the features of two boxes looked like those on a surface. The next step knew such
-/// a contact as one with the ground, and the boxes were judged apart while they collided.
+/// The story: half the features of two boxes looked like those on a surface. The next step knew
+/// such a contact as one with the ground, and the boxes were judged apart while they collided.
 #[test]
 fn the_next_step_knows_both_sides_of_a_contact_between_bodies() {
     for feature in 0..1 << 15 {

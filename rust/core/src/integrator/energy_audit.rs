@@ -15,9 +15,9 @@
 //!   the rebounds are slower than Newton's law says, which the report's residual contains.
 //! - Clusters that touch each other are judged together, and apart from all others
 //!   ([`super::groups`]): neither energies nor corrections of other groups count.
-//! - Where nothing outside touches a group only the motion relative to its mass centre is scaled, so
-//!   the linear momentum is kept. Contacts among its own parts feel relative velocities alone. Free
-//!   flight conserves energy too: without any contact s may be above 1.
+//! - Where nothing outside touches a group only the motion relative to its mass centre is scaled,
+//!   so the linear momentum is kept. Contacts among its own parts feel relative velocities alone.
+//!   Free flight conserves energy too: without any contact s may be above 1.
 //! - If even v⁺ = 0 leaves an excess, the displacement is shortened too: a contact ended the motion
 //!   within the step.
 //!
@@ -31,7 +31,8 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::carried_velocity::Carried;
-use super::groups::{Group, keep_ends, return_ends};
+use super::excess::{Balance, Excess};
+use super::groups::Group;
 use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::report::StepReport;
@@ -39,19 +40,10 @@ use super::scratch::ScratchOf;
 use super::step_contacts::{contact_work, place};
 use super::warm_start::WarmStart;
 use super::work::{Ledger, Work};
-use crate::scalar::{Lane, Vec3};
+use crate::scalar::Vec3;
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
 pub const GAIN: f64 = 5e-10;
-
-/// Excess, as a fraction of the kinetic energy, above which the step is repeated.
-const COARSE: f64 = 1e-3;
-
-/// Rounding errors allowed in the difference of two energies.
-const ROUNDINGS: f64 = 64.0;
-
-/// Largest relative increase of the energy of free motion in a step.
-const RAISE: f64 = 1.0;
 
 /// Fraction of the kinetic energy after a step that may be removed by scaling the velocity alone.
 const SHORT: f64 = 0.5;
@@ -254,7 +246,7 @@ fn hold_back<S: MechanicalSystem>(
     let before = ws.groups.energy(&ws.before, number);
     let (h, theta) = (options.time_step, options.theta);
     let d = S::DIMENSION.components();
-    keep_ends(system, ws);
+    ws.keep_ends(system);
     for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
         *mean = theta * end + (1.0 - theta) * begin;
     }
@@ -287,13 +279,13 @@ fn hold_back<S: MechanicalSystem>(
         system.set_moved(start.configuration, &ws.v_mean, share * h, &mut ws.end);
         system.close_end(&ws.p, &mut ws.end, &mut ws.v);
         system.normalise(&mut ws.end);
-        return_ends(system, ws, |own, _| own != number);
+        ws.return_ends(system, |own, _| own != number);
     }
     work.times(share)
 }
 
-/// Carries the velocity `ws.v` of each group that a projection displaced, by its part of `ws.dv`, to
-/// its position in `ws.end`, see [`super::carried_velocity`]. Counts the energy that this added
+/// Carries the velocity `ws.v` of each group that a projection displaced, by its part of `ws.dv`,
+/// to its position in `ws.end`, see [`super::carried_velocity`]. Counts the energy that this added
 /// beyond the actuators' work on the way. `ws.stored[1]`: in springs before it, J.
 pub(super) fn carry_velocity<S: MechanicalSystem>(
     system: &mut S,
@@ -339,115 +331,6 @@ pub(super) fn carry_velocity<S: MechanicalSystem>(
     report.energy_lifted += lifted.max(0.0);
     report.energy_lost += (-lifted).max(0.0);
     ws.audited.is(&ws.end, &ws.v, &ws.after);
-}
-
-/// Energy balance of a group in a step.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Balance {
-    after: MechanicalEnergy,
-    excess: Excess<f64>,
-    work: Work,
-    /// Work of the contacts by their law, and what yielding ones release.
-    contact_work: f64,
-    released: f64,
-    /// What the audit removes.
-    removed: f64,
-}
-
-/// Excess of the change of the energy over what was supplied, and what it is compared with, J.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Excess<T> {
-    pub value: T,
-    /// Kinetic energy after the step.
-    kinetic: T,
-    /// The kinetic energy at hand. A machine at rest has none as a measure: at least what gravity
-    /// adds in a step of free fall.
-    size: T,
-    /// Rounding of the balance.
-    rounding: T,
-}
-
-impl<T: Lane> Excess<T> {
-    /// `before` and `after`: kinetic and potential energy; `supplied`: work of the actuators, and
-    /// what contacts release; `fall`: speed of a body that falls for the step from rest, m/s.
-    #[inline(always)]
-    pub(crate) fn new(
-        before: [T; 2],
-        after: [T; 2],
-        [work, released]: [T; 2],
-        (mass, fall): (T, T),
-    ) -> Self {
-        let [kinetic, _] = after;
-        let change = (after[0] - before[0]) + (after[1] - before[1]);
-        let least = work.like(0.5) * mass * fall * fall;
-        let sizes = before[0].abs() + after[0].abs() + before[1].abs() + after[1].abs();
-        Self {
-            value: change - (work + released),
-            kinetic,
-            size: before[0].max(kinetic).max(least),
-            rounding: work.like(ROUNDINGS * f64::EPSILON) * (sizes + work.abs()),
-        }
-    }
-
-    /// Free flight may neither gain nor lose.
-    #[inline(always)]
-    fn measured(&self, is_free: T::Mask) -> T {
-        T::select(is_free, self.value.abs(), self.value)
-    }
-
-    /// Where the step is accepted as it is; `gain` and, in free flight, `drift`: fractions of the
-    /// kinetic energy.
-    #[inline(always)]
-    pub(crate) fn is_balanced(&self, is_free: T::Mask, [gain, drift]: [T; 2]) -> T::Mask {
-        let allowed = self.rounding + T::select(is_free, drift, gain) * self.size;
-        self.measured(is_free).le(allowed)
-    }
-
-    /// Where it is coarse, or an excess remains at v⁺ = 0. What is not finite is coarse.
-    #[inline(always)]
-    pub(crate) fn is_coarse(&self, is_free: T::Mask, gain: T) -> T::Mask {
-        let coarse = self.size.like(COARSE) * self.size;
-        !self.measured(is_free).le(coarse) | self.is_left(gain)
-    }
-
-    /// Where an excess remains at v⁺ = 0.
-    #[inline(always)]
-    fn is_left(&self, gain: T) -> T::Mask {
-        !(self.value - self.kinetic).le(self.rounding + gain * self.size)
-    }
-
-    /// Where there is more energy than supplied.
-    #[inline(always)]
-    pub(crate) fn is_gain(&self) -> T::Mask {
-        self.value.like(0.0).lt(self.value)
-    }
-
-    /// As a fraction of the kinetic energy.
-    #[inline(always)]
-    pub(crate) fn relative(&self) -> T {
-        let (zero, tiny) = (self.value.like(0.0), self.value.like(f64::MIN_POSITIVE));
-        (self.value - self.rounding).max(zero) / self.size.max(tiny)
-    }
-
-    /// Scale of the velocity that removes it.
-    #[inline(always)]
-    pub(crate) fn share(&self) -> T {
-        let (zero, one) = (self.value.like(0.0), self.value.like(1.0));
-        (one - self.value / self.kinetic).max(zero).sqrt()
-    }
-
-    /// Scale of the motion relative to the mass centre that removes it, and where it is no larger
-    /// than the energy of that motion.
-    #[inline(always)]
-    pub(crate) fn share_of_relative_motion(&self, momentum: Vec3<T>, mass: T) -> (T, T::Mask) {
-        let one = mass.like(1.0);
-        let whole = momentum.dot(momentum) / (mass.like(2.0) * mass);
-        let relative = self.kinetic - whole;
-        let share = (one - self.value / relative)
-            .min(mass.like(1.0 + RAISE))
-            .sqrt();
-        (share, self.value.lt(relative))
-    }
 }
 
 /// `ws.after` and `ws.work`: energies of the clusters at `ws.end` and `ws.v`, and the work of their
@@ -526,12 +409,12 @@ fn shortened_balance<S: MechanicalSystem>(
         // together.
         let before = ws.groups.energy(&ws.before, number);
         let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
-        keep_ends(system, ws);
+        ws.keep_ends(system);
         let gaps = (system.n_clusters() > 1).then(|| ws.gap_end.clone());
         shorten(system, ws, share, number);
         place(system, options, ws);
         system.normalise(&mut ws.end);
-        return_ends(system, ws, |own, _| own != number);
+        ws.return_ends(system, |own, _| own != number);
         for (i, gap) in gaps.into_iter().flatten().enumerate() {
             if ws.groups.of_contact(i) != number {
                 ws.gap_end[i] = gap;

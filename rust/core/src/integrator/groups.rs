@@ -8,7 +8,6 @@
 
 use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, UnilateralContact};
 use super::options::StepOptions;
-use super::scratch::ScratchOf;
 use super::warm_start::WarmStart;
 
 /// The groups of a step. A group has the number of its first cluster.
@@ -219,35 +218,5 @@ impl Groups {
             .map(|(_, x)| *x)
             .reduce(|a, b| a + b)
             .unwrap_or_default()
-    }
-}
-
-/// Keeps the configuration and the velocity at the end of the step, for [`return_ends`].
-pub(super) fn keep_ends<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>) {
-    if system.n_clusters() > 1 {
-        ws.kept.clone_from(&ws.end);
-        ws.v_kept.copy_from_slice(&ws.v);
-    }
-}
-
-/// Returns to some groups what was kept of them.
-pub(super) fn return_ends<S: MechanicalSystem>(
-    system: &S,
-    ws: &mut ScratchOf<S>,
-    is_meant: impl Fn(usize, &Group) -> bool,
-) {
-    if system.n_clusters() == 1 {
-        return;
-    }
-    let groups = &ws.groups;
-    let is_meant = |cluster: usize| {
-        let number = groups.of_cluster(cluster);
-        is_meant(number, groups.group(number))
-    };
-    system.take_clusters(&ws.kept, &is_meant, &mut ws.end);
-    for (k, (v, kept)) in ws.v.iter_mut().zip(&ws.v_kept).enumerate() {
-        if is_meant(system.cluster_of_velocity(k)) {
-            *v = *kept;
-        }
     }
 }

@@ -1,22 +1,20 @@
 //! The contacts of one group as a problem of their own.
 
-use super::mechanical_system::MechanicalSystem;
 use super::report::StepReport;
-use super::scratch::{ScratchOf, left_of};
 use crate::problem::{FrictionContactProblem, Operator, Redundancy};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
 /// Memory of the problem of a group.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Island {
-    contacts: Vec<usize>,
+    pub contacts: Vec<usize>,
     W: Vec<f64>,
     q: Vec<f64>,
     mu: Vec<f64>,
     p: Vec<f64>,
     u: Vec<f64>,
     /// Work of the solves of each group in this step, in the solver's unit.
-    spent: Vec<u64>,
+    pub spent: Vec<u64>,
     /// Last solve of each group.
     answers: Vec<Option<SolveReport>>,
 }
@@ -50,7 +48,7 @@ impl Island {
 
     /// Solves the contacts of a group from `p`, N s, with the answer `u`, m/s. Impulses that the
     /// motion leaves open are those of least norm if there is a `redundancy`.
-    fn solve(
+    pub(super) fn solve(
         &mut self,
         problem: &FrictionContactProblem<'_>,
         compliance: f64,
@@ -107,51 +105,13 @@ pub(super) enum Level {
     Position(f64),
 }
 
-/// Solves the contacts of a group, as [`MechanicalSystem::solve`] does those of all.
-///
-/// The answer is the same without the other groups. Its options are those of a problem of its size.
-pub(super) fn solve_group<S: MechanicalSystem>(
-    system: &S,
-    options: &SolverOptions,
-    ws: &mut ScratchOf<S>,
-    group: usize,
-    level: Level,
-) -> Option<SolveReport> {
-    let island = &mut ws.island;
-    island.contacts.clear();
-    let groups = &ws.groups;
-    (island.contacts).extend((0..ws.mu.len()).filter(|&i| groups.of_contact(i) == group));
-    let budget = options.budget_of(island.contacts.len());
-    let spent = island.spent.get(group).copied().unwrap_or(0);
-    let options = SolverOptions {
-        budget: Some(left_of(budget, spent)),
-        ..*options
-    };
-    let (p, u) = match level {
-        Level::Velocity => (&mut ws.p, &mut ws.u),
-        Level::Position(_) => (&mut ws.p_position, &mut ws.u_position),
-    };
-    let problem = system.problem(&ws.q_free, &ws.mu);
-    let compliance = match level {
-        Level::Velocity => 0.0,
-        Level::Position(compliance) => compliance,
-    };
-    let is_settled =
-        matches!(level, Level::Velocity) && system.open_problem(&ws.q_free, &ws.mu).is_some();
-    let redundancy = is_settled.then_some(&mut ws.redundancy);
-    let report = island.solve(
-        &problem,
-        compliance,
-        &options,
-        [p, u],
-        &mut ws.solver,
-        redundancy,
-    )?;
-    if let Some(own) = island.spent.get_mut(group) {
-        *own += report.work;
-    }
-    ws.work_spent += report.work;
-    Some(report)
+/// Divisor of the solver's budget for the least that each solve of a step gets, however much the
+/// ones before it have spent.
+const SOLVE_SHARE: u64 = 16;
+
+/// Budget of the next solve of a step.
+pub(super) fn left_of(budget: u64, spent: u64) -> u64 {
+    budget.saturating_sub(spent).max(budget / SOLVE_SHARE)
 }
 
 /// Makes the impulses of a converged answer (p, u) that the motion leaves open those of least norm.

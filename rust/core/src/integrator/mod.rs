@@ -45,6 +45,7 @@ pub(crate) mod carried_velocity;
 pub mod contact_modes;
 pub mod energy_audit;
 pub mod error;
+pub(crate) mod excess;
 mod groups;
 pub(crate) mod held_step;
 mod island;

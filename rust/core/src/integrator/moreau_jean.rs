@@ -32,7 +32,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use super::energy_audit::{Audit, GAIN, Verdict, carry_velocity, note_energy_before};
 use super::error::StepError;
-use super::groups::{Group, return_ends};
+use super::groups::Group;
 use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
 use super::options::StepOptions;
 use super::position_projection;
@@ -435,7 +435,7 @@ pub(super) fn finish<S: MechanicalSystem>(
 
 /// Returns to the groups that the projection did not move what they had before it.
 fn return_unmoved<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>) {
-    return_ends(system, ws, |_, own| !own.is_moved);
+    ws.return_ends(system, |_, own| !own.is_moved);
 }
 
 /// Notes whose contacts persisted in this step; whether any did.

@@ -10,13 +10,12 @@
 //! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical
 //! systems with unilateral contact and Coulomb's friction*, CMAME 256, 224–250.
 
-use super::groups::keep_ends;
-use super::island::{Level, soften, solve_group};
+use super::island::{Level, soften};
 use super::mechanical_system::MechanicalSystem;
 use super::options::{Stabilisation, StepOptions};
 use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
-use super::step_contacts::set_friction;
+use super::step_contacts::{set_friction, solve_group};
 use crate::problem::{FrictionContactProblem, Operator};
 use crate::solver::{SolveReport, SolveStatus, SolverOptions, solve};
 
@@ -61,14 +60,14 @@ pub(super) fn project<S: MechanicalSystem>(
             let group = ws.groups.of_cluster(system.cluster_of_velocity(k));
             *displacement *= ws.groups.group(group).share;
         }
-        keep_ends(system, ws);
+        ws.keep_ends(system);
         system.advance(&mut ws.end, &ws.dv, 1.0);
     }
     has_moved
 }
 
-/// Adds the displacement of a group, whose deepest gap is `deepest`, to `ws.dv`; returns which share
-/// of it is to be made.
+/// Adds the displacement of a group, whose deepest gap is `deepest`, to `ws.dv`; returns which
+/// share of it is to be made.
 fn project_group<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,

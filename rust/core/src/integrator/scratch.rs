@@ -1,8 +1,8 @@
 //! Scratch of a step, common to all systems: vectors over velocities and over contacts.
 
-use super::energy_audit::Balance;
-use super::groups::Groups;
-use super::island::Island;
+use super::excess::Balance;
+use super::groups::{Group, Groups};
+use super::island::{Island, left_of};
 use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, UnilateralContact};
 use super::work::Work;
 use crate::law::compliance::Yielding;
@@ -151,13 +151,39 @@ impl<Q: Clone> Audited<Q> {
     }
 }
 
-/// Divisor of the solver's budget for the least that each solve of a step gets, however much the
-/// ones before it have spent.
-const SOLVE_SHARE: u64 = 16;
+impl<Q: Clone, C> Scratch<Q, C> {
+    /// Keeps the configuration and the velocity at the end of the step, for
+    /// [`Self::return_ends`].
+    pub(super) fn keep_ends<S>(&mut self, system: &S)
+    where
+        S: MechanicalSystem<Configuration = Q, Contact = C>,
+    {
+        if system.n_clusters() > 1 {
+            self.kept.clone_from(&self.end);
+            self.v_kept.copy_from_slice(&self.v);
+        }
+    }
 
-/// Budget of the next solve of a step.
-pub(super) fn left_of(budget: u64, spent: u64) -> u64 {
-    budget.saturating_sub(spent).max(budget / SOLVE_SHARE)
+    /// Returns to some groups what was kept of them.
+    pub(super) fn return_ends<S>(&mut self, system: &S, is_meant: impl Fn(usize, &Group) -> bool)
+    where
+        S: MechanicalSystem<Configuration = Q, Contact = C>,
+    {
+        if system.n_clusters() == 1 {
+            return;
+        }
+        let groups = &self.groups;
+        let is_meant = |cluster: usize| {
+            let number = groups.of_cluster(cluster);
+            is_meant(number, groups.group(number))
+        };
+        system.take_clusters(&self.kept, &is_meant, &mut self.end);
+        for (k, (v, kept)) in self.v.iter_mut().zip(&self.v_kept).enumerate() {
+            if is_meant(system.cluster_of_velocity(k)) {
+                *v = *kept;
+            }
+        }
+    }
 }
 
 impl<Q: Clone, C> Scratch<Q, C> {

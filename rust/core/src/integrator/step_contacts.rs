@@ -1,7 +1,7 @@
 //! The contacts of a step: forecast, assembly, solve, and the gaps at the end.
 
 use super::groups::Group;
-use super::island::{Level, settle, solve_group};
+use super::island::{Level, left_of, settle};
 use super::mechanical_system::{KeyOf, MechanicalSystem, UnilateralContact};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
@@ -9,7 +9,7 @@ use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
 use super::warm_start::WarmStart;
 use crate::contact::Activation;
-use crate::solver::SolveReport;
+use crate::solver::{SolveReport, SolverOptions};
 
 /// The contact forecast, measured from `q_m`, with the margin within which a resting contact stays
 /// closed.
@@ -478,4 +478,51 @@ pub(super) fn excuse_gaps<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>
             *gap = 0.0;
         }
     }
+}
+
+/// Solves the contacts of a group, as [`MechanicalSystem::solve`] does those of all.
+///
+/// The answer is the same without the other groups. Its options are those of a problem of its size.
+pub(super) fn solve_group<S: MechanicalSystem>(
+    system: &S,
+    options: &SolverOptions,
+    ws: &mut ScratchOf<S>,
+    group: usize,
+    level: Level,
+) -> Option<SolveReport> {
+    let island = &mut ws.island;
+    island.contacts.clear();
+    let groups = &ws.groups;
+    (island.contacts).extend((0..ws.mu.len()).filter(|&i| groups.of_contact(i) == group));
+    let budget = options.budget_of(island.contacts.len());
+    let spent = island.spent.get(group).copied().unwrap_or(0);
+    let options = SolverOptions {
+        budget: Some(left_of(budget, spent)),
+        ..*options
+    };
+    let (p, u) = match level {
+        Level::Velocity => (&mut ws.p, &mut ws.u),
+        Level::Position(_) => (&mut ws.p_position, &mut ws.u_position),
+    };
+    let problem = system.problem(&ws.q_free, &ws.mu);
+    let compliance = match level {
+        Level::Velocity => 0.0,
+        Level::Position(compliance) => compliance,
+    };
+    let is_settled =
+        matches!(level, Level::Velocity) && system.open_problem(&ws.q_free, &ws.mu).is_some();
+    let redundancy = is_settled.then_some(&mut ws.redundancy);
+    let report = island.solve(
+        &problem,
+        compliance,
+        &options,
+        [p, u],
+        &mut ws.solver,
+        redundancy,
+    )?;
+    if let Some(own) = island.spent.get_mut(group) {
+        *own += report.work;
+    }
+    ws.work_spent += report.work;
+    Some(report)
 }

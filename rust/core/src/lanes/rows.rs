@@ -101,12 +101,10 @@ impl<T: Lane> Rows<T> {
         let whole: Vec<usize> = (0..machine.nv()).collect();
         let path_of = |body: Option<usize>| body.map_or(&whole[..], |body| machine.path(body));
         let paths: Vec<&[usize]> = bodies.iter().map(|body| path_of(*body)).collect();
-        let mut common = Vec::with_capacity(paths.len() * paths.len());
-        for a in &paths {
-            for b in &paths {
-                common.push(a.iter().zip(*b).take_while(|(i, j)| i == j).count());
-            }
-        }
+        let shared = |a: &[usize], b: &[usize]| a.iter().zip(b).take_while(|(i, j)| i == j).count();
+        let common = paths
+            .iter()
+            .flat_map(|a| paths.iter().map(|b| shared(a, b)));
         let all = (BASE..machine.nv()).map(|velocity| Mover {
             velocity,
             motion: 0, // not read
@@ -141,7 +139,7 @@ impl<T: Lane> Rows<T> {
             bases: (paths.iter()).map(|path| path[0]).collect(),
             bodies,
             movers,
-            common,
+            common: common.collect(),
             has_rollers: (machine.wheels.iter())
                 .any(|wheel| wheel.rollers.is_some() || wheel.across.is_some()),
             Z: vec![[zero; 3]; n_rows],

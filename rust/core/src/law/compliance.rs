@@ -100,8 +100,8 @@ pub struct Yielding<T = f64> {
     friction: [T; 2],
 }
 
-/// Deflection that counts as elastic whatever the forces, as a share of the wheel's radius: 1e-6 m for
-/// the built-in rover's wheels.
+/// Deflection that counts as elastic whatever the forces, as a share of the wheel's radius: 1e-6 m
+/// for the built-in rover's wheels.
 const SLACK: f64 = 1e-5;
 
 /// Share of the spring along the surface that acts where the last step is not known and the contact

@@ -254,8 +254,8 @@ impl Mechanism {
         self.trees[self.tree_of[k]].cluster
     }
 
-    /// Numbers the clusters in the order of their first trees. `loops`: the trees that each loop ties
-    /// together, and whether it ties them to the world.
+    /// Numbers the clusters in the order of their first trees. `loops`: the trees that each loop
+    /// ties together, and whether it ties them to the world.
     pub(super) fn tie(&mut self, loops: &[(Vec<usize>, bool)]) {
         let mut of_tree: Vec<usize> = (0..self.trees.len()).collect();
         for (trees, _) in loops {

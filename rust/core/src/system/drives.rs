@@ -282,8 +282,8 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Work of the joints of each cluster over a step from `v` to `v_end`; keeps impulse and work of
-    /// each drive.
+    /// Work of the joints of each cluster over a step from `v` to `v_end`; keeps impulse and work
+    /// of each drive.
     #[inline(always)]
     pub fn work(
         &mut self,

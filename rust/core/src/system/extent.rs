@@ -66,8 +66,8 @@ impl<T: Lane> Turning<T> {
     }
 }
 
-/// Size of the displacement of a cluster (`y`, nv), m: the farthest that any joint, or any motion of
-/// a free base, moves what it carries; `zero`: 0 in every lane.
+/// Size of the displacement of a cluster (`y`, nv), m: the farthest that any joint, or any motion
+/// of a free base, moves what it carries; `zero`: 0 in every lane.
 #[inline(always)]
 pub(crate) fn displacement<T: Lane>(zero: T, mechanism: &Mechanism, y: &[T], cluster: usize) -> T {
     let mut largest = zero;

@@ -1,7 +1,8 @@
 //! The energy balance of a step, and its audit as [`crate::integrator::energy_audit`] does it.
 
 use crate::integrator::StepReport;
-use crate::integrator::energy_audit::{Excess, GAIN};
+use crate::integrator::energy_audit::GAIN;
+use crate::integrator::excess::Excess;
 use crate::integrator::work::{Ledger, Work};
 use crate::multibody::mechanism::TreeSpan;
 use crate::scalar::{Lane, MAX_LANES, Vec3};

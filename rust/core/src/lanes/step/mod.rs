@@ -150,7 +150,7 @@ pub struct Block<T: Lane> {
     u: Vec<Triple<T>>,
     /// Impulses of the last step by slot, N s.
     p_last: Vec<Triple<T>>,
-    /// Lanes whose contact is in impact, by slot, and lanes with an impact in its group, by cluster.
+    /// Lanes whose contact is in impact, by slot, and with an impact in its group, by cluster.
     impact: Vec<T::Mask>,
     has_impact: Vec<T::Mask>,
     /// An impulse (nv), or its factor coordinates, or a change of the velocity.
@@ -334,8 +334,8 @@ impl<T: Lane> Block<T> {
         )
     }
 
-    /// What a unit of a slot's gap counts as where it is compared with lengths, m: of a stop the arm
-    /// of its joint.
+    /// What a unit of a slot's gap counts as where it is compared with lengths, m: of a stop the
+    /// arm of its joint.
     #[inline(always)]
     fn lever(&self, slot: usize) -> Option<T> {
         match self.contacts.joint_row(slot) {
@@ -401,8 +401,8 @@ enum State {
     End,
 }
 
-/// The linear momentum of a cluster that only contacts with the ground change; 0 of one that is tied
-/// to the world.
+/// The linear momentum of a cluster that only contacts with the ground change; 0 of one that is
+/// tied to the world.
 #[inline(always)]
 fn own_momentum<T: Lane>(
     token: T::Token,

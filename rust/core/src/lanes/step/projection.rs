@@ -142,8 +142,8 @@ impl<T: Lane> Block<T> {
     }
 
     /// Carries the velocities of the groups that were moved to the projected position, and counts
-    /// the energy that this added, as [`crate::integrator::energy_audit`] does. `energies.stored[0]`:
-    /// in springs before it, J.
+    /// the energy that this added, as [`crate::integrator::energy_audit`] does.
+    /// `energies.stored[0]`: in springs before it, J.
     fn carry_velocity(&mut self) {
         let is_moved = self.any(&self.is_deep) & self.going;
         if !is_moved.any() {
@@ -189,8 +189,8 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    /// `energies.kinetic` and `energies.momentum`: kinetic energies and momenta of the groups at the
-    /// projected position, with the velocity before it.
+    /// `energies.kinetic` and `energies.momentum`: kinetic energies and momenta of the groups at
+    /// the projected position, with the velocity before it.
     fn weigh_moved(&mut self) {
         let mut own = std::mem::take(&mut self.energies);
         let machine = Arc::clone(&self.machine);

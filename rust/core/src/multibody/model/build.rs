@@ -103,7 +103,7 @@ impl Model {
             .map(|joint| (joint.velocity, joint.passive.armature))
             .collect();
         let has_slides = bodies.iter().any(|body| body.joint.slides());
-        let mut model = Self {
+        let model = Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
             fingerprint: fingerprint(description.to_json().unwrap_or_default().bytes()),
             own_frictions: own_frictions(&description),
@@ -128,15 +128,20 @@ impl Model {
             loops: Vec::new(),
             machines,
         };
-        model.build_loops()?;
-        let tied = model.loops.iter().map(|closure| {
-            let trees = closure.trees(&model.mechanism).collect();
+        model.completed()
+    }
+
+    /// With what follows from bodies and joints: loops, which trees they tie together, and levers.
+    fn completed(mut self) -> Result<Self, ModelError> {
+        self.build_loops()?;
+        let tied = self.loops.iter().map(|closure| {
+            let trees = closure.trees(&self.mechanism).collect();
             (trees, closure.holds_the_world())
         });
         let tied: Vec<(Vec<usize>, bool)> = tied.collect();
-        model.mechanism.tie(&tied);
-        model.find_levers();
-        Ok(model)
+        self.mechanism.tie(&tied);
+        self.find_levers();
+        Ok(self)
     }
 }
 

@@ -1,7 +1,8 @@
 //! The lengths of a machine: how far a unit of each velocity moves what it carries.
 //!
 //! They convert the change of an angle into a displacement, and say how large a machine is. All are
-//! upper bounds in any configuration, found once when the model is built, and grow with the machine.
+//! upper bounds in any configuration, found once when the model is built; they grow with the
+//! machine.
 
 use nalgebra::Vector3;
 
