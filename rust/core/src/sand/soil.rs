@@ -25,7 +25,7 @@ pub struct Soil {
 pub enum Law {
     /// Three-dimensional resistive force theory ([`super::resistive_force`]).
     Resistive(Resistive),
-    /// Bekker's pressure with Janosi's and Hanamoto's shear ([`super::bekker`]).
+    /// Bekker's, Wong's and Reece's, with Janosi's and Hanamoto's shear ([`super::bekker`]).
     Bekker(Bekker),
 }
 
@@ -117,6 +117,9 @@ impl Soil {
                 ("cohesion", &mut soil.cohesion),
                 ("internal_friction", &mut soil.internal_friction),
                 ("shear_modulus", &mut soil.shear_modulus),
+                ("stress_angle", &mut soil.stress_angle),
+                ("stress_angle_slip", &mut soil.stress_angle_slip),
+                ("slip_sinkage", &mut soil.slip_sinkage),
             ],
         };
         all.push(("memory", &mut self.memory));
