@@ -110,6 +110,9 @@ impl Motion {
     }
 }
 
+/// Sine that is none.
+const TINY: f64 = 1e-150;
+
 impl Default for Group {
     fn default() -> Self {
         let none = [0.0; MAX_LANES];
@@ -244,7 +247,7 @@ impl<'a> Feed<'a> {
         let ends = [end(from, -1.0), end(to, 1.0)];
         let kink = rolling.greatest.map(|share| {
             let (sin, cos) = sin_cos(share * acos(cos));
-            quarter::<f64>(cos, sin).copysign(rolling.entry)
+            quarter_of(cos, sin).copysign(rolling.entry)
         });
         let behind = kink.filter(|u| from < *u && *u < to).map(|u| {
             arc.from = u;
@@ -383,8 +386,8 @@ impl<T: Lane> LaneRings<T> {
 #[inline(always)]
 fn pressing<T: Lane>([x, y]: [f64; 2], [start, end]: [T; 2]) -> [T; 2] {
     let size = (x * x + y * y).sqrt();
-    let [x, y] = [x, y].map(|part| part / size);
-    let [from, to] = [[y, -x], [-y, x]].map(|[cos, sin]| quarter(start.like(cos), start.like(sin)));
+    let (x, y) = (x / size, y / size);
+    let [from, to] = [[y, -x], [-y, x]].map(|[cos, sin]| start.like(quarter_of(cos, sin)));
     [
         if x > 0.0 || y > 0.0 {
             from.max(start)
@@ -393,6 +396,16 @@ fn pressing<T: Lane>([x, y]: [f64; 2], [start, end]: [T; 2]) -> [T; 2] {
         },
         if x > 0.0 || y < 0.0 { to.min(end) } else { end },
     ]
+}
+
+/// [`quarter`], to rounding where the angle is small.
+fn quarter_of(cos: f64, sin: f64) -> f64 {
+    let half = if cos >= 0.0 {
+        sin / (1.0 + cos)
+    } else {
+        (1.0 - cos) / sin.abs().max(TINY).copysign(sin)
+    };
+    half / (1.0 + (1.0 + half * half).sqrt())
 }
 
 /// `tan(θ/4)` of the angle of a unit vector, −π < θ <= π.
