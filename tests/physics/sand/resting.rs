@@ -1,6 +1,7 @@
 //! Rest on sand: sinkage under the weight, no creep, every step and mass.
 
-use rover_core::nalgebra::Vector3;
+use rover_core::nalgebra::{UnitQuaternion, Vector3};
+use rover_core::sand::{Bekker, Law, Soil};
 
 use super::sand_scenes::{bekker_sand, dry_sand, placed, total_force, wide};
 
@@ -87,5 +88,60 @@ fn a_rover_that_is_placed_deep_in_bekkers_soil_rests() {
         }
         let error = (mean - Vector3::new(0.0, weight, 0.0)).norm();
         assert!(error < 0.02 * weight, "{h}: {mean}, {weight}");
+    }
+}
+
+/// With the shear along the arc, wheels in Bekker's soil crept at rest, or their steps did not
+/// converge: the shear changed its side within a rotation that no step resolves. Rovers rest along,
+/// askew and across a slope, after they have driven up, rolled back or spun their wheels, with the
+/// moving angle of greatest stress and with slip-sinkage.
+#[test]
+fn a_rover_rests_in_bekkers_soil_after_any_motion() {
+    let with = |stress_angle: f64, stress_angle_slip: f64, slip_sinkage: f64| {
+        let Law::Bekker(law) = bekker_sand().law else {
+            panic!("invariant: a soil of Bekker's law");
+        };
+        Soil {
+            law: Law::Bekker(Bekker {
+                stress_angle,
+                stress_angle_slip,
+                slip_sinkage,
+                ..law
+            }),
+            ..bekker_sand()
+        }
+    };
+    let model = wide("open-rover", 0.08, 3.0 / 12.7);
+    let weight = 9.81 * model.mass();
+    for soil in [with(0.0, 0.0, 0.0), with(0.4, 0.3, 0.3)] {
+        for (drive, turn) in [
+            (0.0, 90.0),
+            (0.0, 40.0),
+            (0.3, 0.0),
+            (-0.3, 0.0),
+            (2.4, 0.0),
+        ] {
+            for h in [0.005, 0.02] {
+                let mut sim = placed(&model, soil.clone(), 10.0_f64.to_radians(), h);
+                let (mut q, v) = (sim.q().clone(), sim.v().to_vec());
+                q.attitude *=
+                    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), f64::to_radians(turn));
+                sim.set_state(q, v);
+                let torque = drive * weight / 6.0 * model.wheels()[0].radius;
+                sim.set_wheel_torques(&[torque; 6]).unwrap();
+                let mut is_converged = sim.step((0.5 / h) as usize).unwrap().is_converged();
+                sim.brake();
+                let second = (1.0 / h) as usize;
+                is_converged &= sim.step(2 * second).unwrap().is_converged();
+                let before = sim.q().position;
+                is_converged &= sim.step(second).unwrap().is_converged();
+                let creep = (sim.q().position - before).norm();
+                let error = (total_force(&sim) - Vector3::new(0.0, weight, 0.0)).norm();
+                let scene = format!("drive {drive}, turned by {turn}, {h} s");
+                assert!(is_converged, "{scene}");
+                assert!(creep < 1e-6, "{scene}: {creep} m/s");
+                assert!(error < 1e-3 * weight, "{scene}: {error} N");
+            }
+        }
     }
 }

@@ -57,6 +57,7 @@ const LEAST_SHARE: f64 = 0.001;
 /// It is one number for all pieces, since a piece at the bottom of a rolling wheel hardly moves and
 /// yet bears its pressure. With less, a heavy wheel that has sunk deeper than its weight needs
 /// never comes to rest: its pressure then changes faster with its place than its shear can hold it.
+/// With half of it, one step in forty after a fall onto 17 degrees did not converge.
 const MOBILISED: f64 = 0.6;
 
 /// Length below which a vector has no direction.

@@ -203,7 +203,9 @@ impl<'a> Feed<'a> {
             }
             let (from, to) = (self.arcs.from[at], self.arcs.to[at]);
             self.ring += 1;
-            if let Some(ring) = self.arcs.rings[at].filter(|_| from < to) {
+            let is_felt =
+                |ring: &Ring| from < to && (ring.skin == Skin::Rim || !soil.spares_walls());
+            if let Some(ring) = self.arcs.rings[at].filter(is_felt) {
                 let cos = self.arcs.cos[at];
                 let mut arc = Arc {
                     ring,

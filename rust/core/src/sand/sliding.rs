@@ -13,16 +13,16 @@
 //!
 //! A wheel that turns the other way enters at −θ₁. A wheel that hardly turns has no such side: with
 //! `u = φ R/SLOW`, where φ is the rotation that the sand remembers, the side and 1/|u| become
-//! polynomials for |u| < 1. So j is smooth in what the sand remembers, also at rest, and it is the
-//! displacement of a locked wheel in units of the memory times the height of the arc above it.
+//! polynomials for |u| < 1. So j is smooth in what the sand remembers. Of a locked wheel it is
+//! proportional to its displacement: such a wheel is held as by a spring, and rests on a slope.
 //!
 //! # The surface that presses
 //!
 //! In steady motion the stress ends at the lowest point. A wheel that sinks presses on both sides,
-//! and one that is lifted on neither. In general the surface presses that is within a right angle
-//! of a direction, the *front*: that of travel in the wheel's plane, with a part of its rotation,
-//! by which a wheel has a front that spins in its place, and a little downward where it has
-//! neither.
+//! a wheel that is lifted on neither. In general, the surface within a right angle of the *front*
+//! presses. The front is the direction of travel in the wheel's plane, plus a part of the speed of
+//! the rim: a wheel that spins in place has a front, too. Without travel and rotation it points
+//! down.
 //!
 //! Source: Wong and Reece 1967, *Prediction of rigid wheel performance based on the analysis of
 //! soil–wheel stresses*.
@@ -36,14 +36,14 @@ use crate::scalar::{Lane, Vec3};
 /// published one from a slip of −1.29 on.
 const SLOW: f64 = 0.4;
 
-/// Displacement of a rim per displacement of a locked wheel, in units of the height of its arc.
+/// Way of a piece per displacement of a locked wheel, in units of half the chord of its arc.
 const LOCKED: f64 = 1.0;
 
-/// Part of the rotation in the front. A twice as large one moves nothing in steady motion.
+/// Part of the speed of the rim in the front. Steady motion has the same front with any part.
 const SPINNING: f64 = 0.5;
 
-/// Size of the front, relative to that of the memory, below which it points down. In steady motion the surface that presses then
-/// ends within 0.001 rad of the lowest point.
+/// Size of the front, relative to that of the memory, below which it points down. In steady motion
+/// the surface that presses then ends within 0.001 rad of the lowest point.
 const NO_FRONT: f64 = 0.05;
 
 /// Least sine of the angle at which a rim enters the sand, for the change of that angle with the
@@ -139,8 +139,8 @@ fn side(u: f64) -> [f64; 2] {
     [0.5 * u * (3.0 - u * u), 1.5 * (1.0 - u * u)]
 }
 
-/// The front of a shift and a rim's displacement, as parts of the size of the memory, and the change
-/// of its angle by them.
+/// The front of a wheel with a shift and a displacement of its rim, and the change of its angle by
+/// the shift down and along and by the rim. `size`: of the memory.
 fn front(shift: &Vector3<f64>, rim: f64, size: f64) -> ([f64; 2], [f64; 3]) {
     let along = shift.y - SPINNING * rim;
     let least = NO_FRONT * size.max(TINY);
@@ -332,6 +332,40 @@ mod tests {
                         "{turn} {k} {n}: {error}"
                     );
                 }
+            }
+        }
+    }
+
+    /// Of wheels that roll, spin, sink and are lifted.
+    #[test]
+    fn the_front_turns_as_its_slopes_say() {
+        for [down, along, turn] in [
+            [0.0, 0.7, -7.0],
+            [0.3, 0.1, -9.0],
+            [0.9, 0.02, 0.1],
+            [-0.5, -0.4, 3.0],
+        ] {
+            let size = |x: [f64; 3]| (x[0] * x[0] + x[1] * x[1] + (RADIUS * x[2]).powi(2)).sqrt();
+            let angle = |x: [f64; 3]| {
+                let parts = (Vector3::new(x[0], x[1], 0.0), Vector3::new(0.0, 0.0, x[2]));
+                let [down, along] = Rolling::new(parts, (RADIUS, size(x)), 1.0).front;
+                along.atan2(down)
+            };
+            let start = [down, along, turn];
+            let parts = (Vector3::new(down, along, 0.0), Vector3::new(0.0, 0.0, turn));
+            let found = Rolling::new(parts, (RADIUS, size(start)), 1.0).front_turns;
+            for k in 0..3 {
+                let moved = |sign: f64| {
+                    let mut x = start;
+                    x[k] += sign * 1e-6;
+                    angle(x)
+                };
+                let change = (moved(1.0) - moved(-1.0)) / 2e-6;
+                let error = (found[k] - change).abs();
+                assert!(
+                    error < 1e-6 * (1.0 + change.abs()),
+                    "{start:?} {k}: {error}"
+                );
             }
         }
     }

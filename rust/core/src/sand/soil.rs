@@ -90,6 +90,11 @@ impl Soil {
         }
     }
 
+    /// Whether side walls bear nothing.
+    pub(super) fn spares_walls(&self) -> bool {
+        matches!(self.law, Law::Bekker(_))
+    }
+
     /// Its numbers with their names, to be read or changed.
     #[must_use]
     pub fn numbers_mut(&mut self) -> Vec<(&'static str, &mut f64)> {
