@@ -15,7 +15,7 @@ const WHEELS: [([f64; 2], [f64; 2]); 3] = [
 ];
 
 /// The simulant of Ding et al. 2011.
-const SIMULANT: Bekker = Bekker {
+pub(super) const SIMULANT: Bekker = Bekker {
     cohesive_modulus: 15_600.0,
     frictional_modulus: 2_407_400.0,
     exponent: 1.1,

@@ -3,6 +3,7 @@
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::sand::{Bekker, Law, Soil};
 
+use super::published_law::SIMULANT;
 use super::sand_scenes::{bekker_sand, dry_sand, placed, total_force, wide};
 
 /// After it has settled, a rover that is left alone stays where it is, on level sand and on ten
@@ -97,23 +98,24 @@ fn a_rover_that_is_placed_deep_in_bekkers_soil_rests() {
 /// moving angle of greatest stress and with slip-sinkage.
 #[test]
 fn a_rover_rests_in_bekkers_soil_after_any_motion() {
-    let with = |stress_angle: f64, stress_angle_slip: f64, slip_sinkage: f64| {
-        let Law::Bekker(law) = bekker_sand().law else {
-            panic!("invariant: a soil of Bekker's law");
-        };
-        Soil {
-            law: Law::Bekker(Bekker {
-                stress_angle,
-                stress_angle_slip,
-                slip_sinkage,
-                ..law
-            }),
-            ..bekker_sand()
-        }
+    let moving = Bekker {
+        stress_angle: 0.4,
+        stress_angle_slip: 0.3,
+        ..SIMULANT
     };
+    let sinking = Bekker {
+        stress_angle_slip: 0.3,
+        slip_sinkage: 0.4,
+        ..SIMULANT
+    };
+    let options = [moving, sinking].map(|law| Soil {
+        law: Law::Bekker(law),
+        ..bekker_sand()
+    });
+    let [moving, sinking] = options;
     let model = wide("open-rover", 0.08, 3.0 / 12.7);
     let weight = 9.81 * model.mass();
-    for soil in [with(0.0, 0.0, 0.0), with(0.4, 0.3, 0.3)] {
+    for soil in [bekker_sand(), moving, sinking] {
         for (drive, turn) in [
             (0.0, 90.0),
             (0.0, 40.0),
@@ -127,9 +129,12 @@ fn a_rover_rests_in_bekkers_soil_after_any_motion() {
                 q.attitude *=
                     UnitQuaternion::from_axis_angle(&Vector3::y_axis(), f64::to_radians(turn));
                 sim.set_state(q, v);
+                sim.brake();
                 let torque = drive * weight / 6.0 * model.wheels()[0].radius;
-                sim.set_wheel_torques(&[torque; 6]).unwrap();
-                let mut is_converged = sim.step((0.5 / h) as usize).unwrap().is_converged();
+                if torque != 0.0 {
+                    sim.set_wheel_torques(&[torque; 6]).unwrap();
+                }
+                let mut is_converged = sim.step((0.6 / h) as usize).unwrap().is_converged();
                 sim.brake();
                 let second = (1.0 / h) as usize;
                 is_converged &= sim.step(2 * second).unwrap().is_converged();
