@@ -108,11 +108,10 @@ fn a_rover_rests_in_bekkers_soil_after_any_motion() {
         slip_sinkage: 0.4,
         ..SIMULANT
     };
-    let options = [moving, sinking].map(|law| Soil {
+    let [moving, sinking] = [moving, sinking].map(|law| Soil {
         law: Law::Bekker(law),
         ..bekker_sand()
     });
-    let [moving, sinking] = options;
     let model = wide("open-rover", 0.08, 3.0 / 12.7);
     let weight = 9.81 * model.mass();
     for soil in [bekker_sand(), moving, sinking] {

@@ -32,8 +32,8 @@ use nalgebra::Vector3;
 use crate::scalar::elementary::{acos, atan2, sin_cos};
 use crate::scalar::{Lane, Vec3};
 
-/// Speed of the rim, relative to that of the wheel, below which a wheel hardly turns: the law is the
-/// published one from a slip of −1.29 on.
+/// Speed of the rim, relative to that of the wheel, below which a wheel hardly turns: the law is
+/// the published one from a slip of −1.29 on.
 const SLOW: f64 = 0.4;
 
 /// Way of a piece per displacement of a locked wheel, in units of half the chord of its arc.
