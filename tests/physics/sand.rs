@@ -7,4 +7,5 @@ pub(crate) mod sand_scenes;
 mod derivatives;
 mod driving;
 mod forces;
+mod published_law;
 mod resting;

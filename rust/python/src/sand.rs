@@ -44,6 +44,15 @@ impl<'py> Numbers<'py> {
         Ok(number(&value, Kind::Terrain, name)?)
     }
 
+    /// A number that may be missing.
+    fn or_zero(&self, name: &str) -> PyResult<f64> {
+        if self.0.contains(name)? {
+            self.get(name)
+        } else {
+            Ok(0.0)
+        }
+    }
+
     fn interface(&self, name: &str) -> PyResult<Interface> {
         Ok(Interface {
             friction: self.get(&format!("{name}_friction"))?,
@@ -63,6 +72,9 @@ pub fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
             cohesion: numbers.get("cohesion")?,
             internal_friction: numbers.get("internal_friction")?,
             shear_modulus: numbers.get("shear_modulus")?,
+            stress_angle: numbers.or_zero("stress_angle")?,
+            stress_angle_slip: numbers.or_zero("stress_angle_slip")?,
+            slip_sinkage: numbers.or_zero("slip_sinkage")?,
         })
     } else {
         Law::Resistive(Resistive {

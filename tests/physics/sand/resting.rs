@@ -1,7 +1,9 @@
 //! Rest on sand: sinkage under the weight, no creep, every step and mass.
 
-use rover_core::nalgebra::Vector3;
+use rover_core::nalgebra::{UnitQuaternion, Vector3};
+use rover_core::sand::{Bekker, Law, Soil};
 
+use super::published_law::SIMULANT;
 use super::sand_scenes::{bekker_sand, dry_sand, placed, total_force, wide};
 
 /// After it has settled, a rover that is left alone stays where it is, on level sand and on ten
@@ -87,5 +89,63 @@ fn a_rover_that_is_placed_deep_in_bekkers_soil_rests() {
         }
         let error = (mean - Vector3::new(0.0, weight, 0.0)).norm();
         assert!(error < 0.02 * weight, "{h}: {mean}, {weight}");
+    }
+}
+
+/// With the shear along the arc, wheels in Bekker's soil crept at rest, or their steps did not
+/// converge: the shear changed its side within a rotation that no step resolves. Rovers rest along,
+/// askew and across a slope, after they have driven up, rolled back or spun their wheels, with the
+/// moving angle of greatest stress and with slip-sinkage.
+#[test]
+fn a_rover_rests_in_bekkers_soil_after_any_motion() {
+    let moving = Bekker {
+        stress_angle: 0.4,
+        stress_angle_slip: 0.3,
+        ..SIMULANT
+    };
+    let sinking = Bekker {
+        stress_angle_slip: 0.3,
+        slip_sinkage: 0.4,
+        ..SIMULANT
+    };
+    let [moving, sinking] = [moving, sinking].map(|law| Soil {
+        law: Law::Bekker(law),
+        ..bekker_sand()
+    });
+    let model = wide("open-rover", 0.08, 3.0 / 12.7);
+    let weight = 9.81 * model.mass();
+    for soil in [bekker_sand(), moving, sinking] {
+        for (drive, turn) in [
+            (0.0, 90.0),
+            (0.0, 40.0),
+            (0.3, 0.0),
+            (-0.3, 0.0),
+            (2.4, 0.0),
+        ] {
+            for h in [0.005, 0.02] {
+                let mut sim = placed(&model, soil.clone(), 10.0_f64.to_radians(), h);
+                let (mut q, v) = (sim.q().clone(), sim.v().to_vec());
+                q.attitude *=
+                    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), f64::to_radians(turn));
+                sim.set_state(q, v);
+                sim.brake();
+                let torque = drive * weight / 6.0 * model.wheels()[0].radius;
+                if torque != 0.0 {
+                    sim.set_wheel_torques(&[torque; 6]).unwrap();
+                }
+                let mut is_converged = sim.step((0.6 / h) as usize).unwrap().is_converged();
+                sim.brake();
+                let second = (1.0 / h) as usize;
+                is_converged &= sim.step(2 * second).unwrap().is_converged();
+                let before = sim.q().position;
+                is_converged &= sim.step(second).unwrap().is_converged();
+                let creep = (sim.q().position - before).norm();
+                let error = (total_force(&sim) - Vector3::new(0.0, weight, 0.0)).norm();
+                let scene = format!("drive {drive}, turned by {turn}, {h} s");
+                assert!(is_converged, "{scene}");
+                assert!(creep < 1e-6, "{scene}: {creep} m/s");
+                assert!(error < 1e-3 * weight, "{scene}: {error} N");
+            }
+        }
     }
 }

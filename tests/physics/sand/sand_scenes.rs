@@ -49,6 +49,9 @@ pub fn bekker_sand() -> Soil {
             cohesion: 200.0,
             internal_friction: 0.55,
             shear_modulus: 0.015,
+            stress_angle: 0.0,
+            stress_angle_slip: 0.0,
+            slip_sinkage: 0.0,
         }),
         ..dry_sand()
     }

@@ -40,6 +40,7 @@ pub mod piece;
 mod points;
 pub mod resistive_force;
 pub mod ruts;
+pub mod sliding;
 pub mod soil;
 pub mod state;
 pub mod test_bed;

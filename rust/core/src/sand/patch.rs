@@ -13,9 +13,9 @@ use super::memory::Memory;
 use super::piece::{Piece, Setting};
 use super::points::{Feed, Group, Immersed, Motion};
 use super::ruts::RutsNear;
+use super::sliding::{OnRing, Rolling, Slid};
 use super::soil::{Law, Soil};
 use super::wheel::{Rules, SandWheel, Skin};
-use crate::scalar::elementary::{acos, atan2};
 use crate::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
 /// Pose of a wheel.
@@ -85,13 +85,6 @@ pub enum Derivatives {
 /// Sine between axle and normal below which the wheel lies flat.
 const FLAT: f64 = 1e-9;
 
-/// How fast the side at which the rim enters changes with the direction of travel.
-const ENTRY: f64 = 0.1;
-
-/// Least sine of the angle at which a rim enters the sand, for the change of that angle with the
-/// depth.
-const STEEP: f64 = 0.05;
-
 /// A wheel relative to the bed, in its own axes: down and forward in its plane, and its axle.
 struct Frame<'a> {
     immersed: Immersed<'a>,
@@ -101,9 +94,6 @@ struct Frame<'a> {
     setting: Setting,
     /// Columns: down, along and axle in world axes.
     axes: Matrix3<f64>,
-    /// From −1 to 1: which end of an arc enters the sand; and its derivative by the displacement
-    /// along the wheel.
-    entry: [f64; 2],
 }
 
 /// Sums of six components, column by column, of each of eight lanes.
@@ -221,12 +211,6 @@ fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
     (e - axle * axle.dot(&e)).normalize()
 }
 
-/// Which end of an arc enters the sand, with its derivative.
-fn entry(along: f64) -> [f64; 2] {
-    let per = 1.0 / (along * along + ENTRY * ENTRY).sqrt();
-    [along * per, ENTRY * ENTRY * per * per * per]
-}
-
 impl<'a> Frame<'a> {
     fn new(
         (wheel, rules): (&'a SandWheel, &'a Rules),
@@ -246,7 +230,14 @@ impl<'a> Frame<'a> {
         let axes = Matrix3::from_columns(&[down, pose.axle.cross(&down), pose.axle]);
         let shift = axes.tr_mul(&Vector3::from(memory.shift));
         let turn = axes.tr_mul(&Vector3::from(memory.turn));
-        let stirred = memory.size(wheel.drum());
+        let mut rolling = Rolling::new(
+            (shift, turn),
+            (wheel.drum(), memory.size(wheel.drum())),
+            sine,
+        );
+        if let Law::Bekker(law) = &soil.law {
+            rolling.greatest = law.greatest(rolling.slip);
+        }
         let height = (pose.centre - bed.place).dot(&bed.normal);
         let beyond = height - 0.5 * wheel.width * lean.abs() - bed.highest;
         Self {
@@ -258,6 +249,7 @@ impl<'a> Frame<'a> {
                 shift,
                 turn,
                 motion: Motion::of(&shift, &turn),
+                rolling,
                 height,
                 highest: bed.highest,
                 dry: beyond / sine.max(FLAT),
@@ -269,10 +261,9 @@ impl<'a> Frame<'a> {
                 held: wheel.held(),
                 width: wheel.width,
                 gravity: bed.gravity,
-                stirred,
+                slip: rolling.slip,
             },
             axes,
-            entry: entry(shift.y),
         }
     }
 
@@ -332,45 +323,33 @@ impl<'a> Frame<'a> {
             area: lanes(&group.area) * per,
         };
         let (depth, by_place) = self.depth(elements.r);
-        let is_under = depth.gt(zero) & elements.area.gt(zero);
+        let grows = lanes(&group.grows);
+        let is_under = depth.gt(zero) & (elements.area.gt(zero) | zero.lt(grows.abs()));
         if is_under.any() {
             sums.is_touching = true;
             // What is not under counts for nothing, whatever lies beside it in a register.
             let area = T::select(is_under, elements.area, zero);
             let elements = Elements { area, ..elements };
             let depth = T::select(is_under, depth, zero);
-            let ends = lanes(&group.end);
-            let way = self.way(radius, ends, (cos, sin));
+            let slid = self.slid(&OnRing {
+                angle: [cos, sin],
+                end: lanes(&group.end),
+                radius,
+                offset: elements.r.z,
+                normal: [radial, elements.normal.z],
+            });
+            let depth = (depth + slid.deeper).max(zero);
             let at = (group.skin, first);
-            self.add_pieces(at, &elements, (depth, by_place, way), sums);
+            self.add_pieces(at, &elements, (depth, by_place, slid, grows), sums);
         }
     }
 
-    /// Way from where pieces entered. Only Bekker's law needs it.
+    /// Way of pieces since they entered. Only Bekker's law needs it.
     #[inline(always)]
-    fn way<T: Lane>(&self, radius: T, end: T, (cos, sin): (T, T)) -> Way<T> {
-        let zero = radius.like(0.0);
-        let Law::Bekker(_) = &self.immersed.soil.law else {
-            return Way {
-                from_entry: zero,
-                by_depth: zero,
-                by_along: zero,
-            };
-        };
-        let [entry, by_along] = self.entry;
-        let (mut angle, mut from_lowest, mut steep) = (zero, zero, zero);
-        for lane in 0..T::LANES {
-            let end = end.get(lane);
-            let theta = atan2(sin.get(lane), cos.get(lane));
-            angle.set(lane, acos(end) - entry * theta);
-            from_lowest.set(lane, theta);
-            steep.set(lane, (1.0 - end * end).max(STEEP * STEEP).sqrt());
-        }
-        let level = radius.like(self.immersed.g.x.max(FLAT));
-        Way {
-            from_entry: radius * angle,
-            by_depth: radius.like(1.0) / (steep * level),
-            by_along: -(radius * from_lowest * radius.like(by_along)),
+    fn slid<T: Lane>(&self, at: &OnRing<T>) -> Slid<T> {
+        match &self.immersed.soil.law {
+            Law::Bekker(_) => self.immersed.rolling.slid(at),
+            Law::Resistive(_) => Slid::none(at.end.token()),
         }
     }
 
@@ -422,7 +401,7 @@ impl<'a> Frame<'a> {
         &self,
         (skin, first): (Skin, usize),
         elements: &Elements<T>,
-        (depth, by_place, way): (T, Vec3<T>, Way<T>),
+        (depth, by_place, slid, grows): (T, Vec3<T>, Slid<T>, T),
         sums: &mut Sums<'_>,
     ) {
         let (r, area, token) = (elements.r, elements.area, depth.token());
@@ -433,7 +412,7 @@ impl<'a> Frame<'a> {
             x: shared(shift) + shared(turn).cross(r),
             down: shared(g),
             depth,
-            arc: [way.from_entry, way.by_depth],
+            slid,
             skin,
         };
         let wants_slopes = self.want != Derivatives::Wrench;
@@ -461,12 +440,22 @@ impl<'a> Frame<'a> {
             a * r.z - c * r.x,
             memory[1] * r.x - memory[0] * r.y,
         ];
-        let b = match &self.immersed.soil.law {
-            Law::Bekker(_) => b + stress.by_arc * (way.by_along * fresh),
-            Law::Resistive(_) => b,
-        };
+        let mut columns = [[a, b, c], by_turn];
+        if let Law::Bekker(_) = &self.immersed.soil.law {
+            let by_way = stress.by_way.map(|column| column * fresh);
+            let six = columns.iter_mut().flatten().zip(piece.slid.by_memory);
+            for (column, [along, across]) in six {
+                *column = *column + by_way[0] * along + by_way[1] * across;
+            }
+            let turned = stress.value * (grows * depth.like(by_memory));
+            let [down, along, turn] = self.immersed.rolling.front_turns;
+            for (column, by) in [((0, 0), down), ((0, 1), along), ((1, 2), turn)] {
+                columns[column.0][column.1] += turned * depth.like(by);
+            }
+        }
+        let [by_shift, by_turn] = columns;
         for (columns, rows) in [
-            ([a, b, c], &mut *sums.by_shift),
+            (by_shift, &mut *sums.by_shift),
             (by_turn, &mut *sums.by_turn),
         ] {
             for (rows, column) in rows.chunks_exact_mut(SIX).zip(columns) {
@@ -505,14 +494,6 @@ fn total<T: Lane, const N: usize>(token: T::Token, rows: &Rows<N>) -> [f64; N] {
         }
     }
     totals
-}
-
-/// Way of pieces from where they entered the sand, m, and its derivatives by the depth and by the
-/// displacement along the wheel.
-struct Way<T> {
-    from_entry: T,
-    by_depth: T,
-    by_along: T,
 }
 
 /// Elements of the surface, side by side in lanes: where they are, in the wheel's axes, and how

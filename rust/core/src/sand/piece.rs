@@ -2,6 +2,7 @@
 
 use crate::scalar::{Lane, Vec3};
 
+use super::sliding::Slid;
 use super::wheel::Skin;
 
 /// A piece of a wheel in the sand. All vectors have the same axes.
@@ -15,8 +16,8 @@ pub struct Piece<T: Lane> {
     pub down: Vec3<T>,
     /// Under the surface, m.
     pub depth: T,
-    /// Along the rim from where it enters the sand, m, and its derivative by the depth.
-    pub arc: [T; 2],
+    /// Its way over the sand since it entered. Only Bekker's law needs it.
+    pub slid: Slid<T>,
     /// What it is part of.
     pub skin: Skin,
 }
@@ -30,8 +31,8 @@ pub struct Setting {
     pub width: f64,
     /// m/s², into the sand.
     pub gravity: f64,
-    /// Size of what the sand remembers of the wheel, 1 in steady motion.
-    pub stirred: f64,
+    /// Slip of a driven wheel, from 0 to 1.
+    pub slip: f64,
 }
 
 /// Stress of the sand on a piece, N/m², and its derivatives.
@@ -43,8 +44,8 @@ pub struct Stress<T> {
     pub by_x: [Vec3<T>; 3],
     /// By the depth, N/m³.
     pub by_depth: Vec3<T>,
-    /// By the way from where the piece entered, N/m³.
-    pub by_arc: Vec3<T>,
+    /// By the way of the piece along the rim and across it, N/m³.
+    pub by_way: [Vec3<T>; 2],
 }
 
 impl<T: Lane> Stress<T> {
@@ -57,7 +58,7 @@ impl<T: Lane> Stress<T> {
             value: zero,
             by_x: [zero; 3],
             by_depth: zero,
-            by_arc: zero,
+            by_way: [zero; 2],
         }
     }
 }

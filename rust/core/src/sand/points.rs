@@ -7,8 +7,10 @@
 
 use nalgebra::Vector3;
 
+use super::sliding::Rolling;
 use super::soil::{Law, Resistive, Soil};
 use super::wheel::{Gauss, Ring, Rules, SandWheel, Skin};
+use crate::scalar::elementary::{acos, sin_cos};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 
 /// A wheel in the sand, in its own axes: down and forward in its plane, and its axle.
@@ -22,6 +24,7 @@ pub(super) struct Immersed<'a> {
     pub shift: Vector3<f64>,
     pub turn: Vector3<f64>,
     pub motion: Motion,
+    pub rolling: Rolling,
     /// Height of the wheel's centre over the plane of the bed, m.
     pub height: f64,
     /// What no height of the surface over that plane exceeds, m.
@@ -30,8 +33,8 @@ pub(super) struct Immersed<'a> {
     pub dry: f64,
 }
 
-/// Sizes of what the sand remembers: of the shift and of the turn, and of the shift in the wheel's
-/// plane and the turn out of it.
+/// Sizes of what the sand remembers: of all, of the shift and of the turn, and of the shift in the
+/// wheel's plane and the turn out of it.
 #[derive(Clone, Copy)]
 pub(super) struct Motion {
     size: f64,
@@ -57,6 +60,9 @@ struct Arc {
     from: f64,
     to: f64,
     cos: f64,
+    /// Of an end that moves with the direction of the motion, m: by how much area the ring grows
+    /// as that direction turns. 0 of an arc.
+    grows: f64,
 }
 
 /// Points of one skin. Those behind the last one have no area.
@@ -73,6 +79,8 @@ pub(super) struct Group {
     pub area: [f64; MAX_LANES],
     /// Cosines of the angles at which the rings leave the sand.
     pub end: [f64; MAX_LANES],
+    /// Area by which the surface that presses grows as the motion turns, m²; 0 but at its ends.
+    pub grows: [f64; MAX_LANES],
 }
 
 /// Fills one group after the other.
@@ -85,6 +93,9 @@ pub(super) struct Feed<'a> {
     now: Option<(Arc, &'a Gauss)>,
     /// Number of its points that were taken.
     taken: usize,
+    /// What else belongs to the last ring: in Bekker's law, the arc behind the angle of greatest
+    /// stress, and the ends of the surface that presses.
+    more: [Option<(Arc, &'a Gauss)>; 3],
 }
 
 impl Motion {
@@ -99,6 +110,9 @@ impl Motion {
     }
 }
 
+/// Sine that is none.
+const TINY: f64 = 1e-150;
+
 impl Default for Group {
     fn default() -> Self {
         let none = [0.0; MAX_LANES];
@@ -111,6 +125,7 @@ impl Default for Group {
             u: none,
             area: none,
             end: [1.0; MAX_LANES],
+            grows: none,
         }
     }
 }
@@ -129,6 +144,7 @@ impl<'a> Feed<'a> {
             },
             now: None,
             taken: 0,
+            more: [None; 3],
         }
     }
 
@@ -159,6 +175,7 @@ impl<'a> Feed<'a> {
             }
         }
         group.area[n..].fill(0.0);
+        group.grows[n..].fill(0.0);
         n > 0
     }
 
@@ -168,6 +185,10 @@ impl<'a> Feed<'a> {
             wheel, rules, dry, ..
         } = *self.wheel;
         let n_rings = rules.n_rings();
+        let soil = self.wheel.soil;
+        if let Some(more) = self.more.iter_mut().find_map(Option::take) {
+            return Some(more);
+        }
         while self.ring < n_rings {
             let at = self.ring % MAX_LANES;
             if at == 0 {
@@ -182,18 +203,66 @@ impl<'a> Feed<'a> {
             }
             let (from, to) = (self.arcs.from[at], self.arcs.to[at]);
             self.ring += 1;
-            if let Some(ring) = self.arcs.rings[at].filter(|_| from < to) {
+            let is_felt =
+                |ring: &Ring| from < to && (ring.skin == Skin::Rim || !soil.spares_walls());
+            if let Some(ring) = self.arcs.rings[at].filter(is_felt) {
                 let cos = self.arcs.cos[at];
-                let arc = Arc {
+                let mut arc = Arc {
                     ring,
                     from,
                     to,
                     cos,
+                    grows: 0.0,
                 };
-                return Some((arc, rules.along(self.ring - 1)));
+                let rule = rules.along(self.ring - 1);
+                if let Law::Bekker(_) = soil.law {
+                    self.more = self.divide(&mut arc, rule);
+                }
+                return Some((arc, rule));
             }
         }
         None
+    }
+
+    /// Leaves the first part of an arc; returns the other, and its ends.
+    fn divide(&self, arc: &mut Arc, rule: &'a Gauss) -> [Option<(Arc, &'a Gauss)>; 3] {
+        let rolling = &self.wheel.rolling;
+        let Arc {
+            ring,
+            from,
+            to,
+            cos,
+            ..
+        } = *arc;
+        // Only an end before the surface moves.
+        let surface = quarter::<f64>(cos, 1.0);
+        let end = |u: f64, sign: f64| {
+            let grows = sign * ring.radius * ring.width;
+            let end = Arc {
+                from: u,
+                to: u,
+                grows,
+                ..*arc
+            };
+            (u.abs() < surface).then_some((end, self.wheel.rules.point()))
+        };
+        let ends = [end(from, -1.0), end(to, 1.0)];
+        let kink = rolling.greatest.map(|share| {
+            let (sin, cos) = sin_cos(share * acos(cos));
+            quarter_of(cos, sin).copysign(rolling.entry)
+        });
+        let behind = kink.filter(|u| from < *u && *u < to).map(|u| {
+            arc.from = u;
+            (
+                Arc {
+                    to: u,
+                    from,
+                    ..*arc
+                },
+                rule,
+            )
+        });
+        [behind, ends[0], ends[1]]
     }
 }
 
@@ -216,6 +285,7 @@ impl Group {
             self.radial[lane] = ring.normal[0];
             self.axial[lane] = ring.normal[1];
             self.end[lane] = arc.cos;
+            self.grows[lane] = arc.grows;
         }
     }
 }
@@ -250,7 +320,7 @@ impl Arcs {
         let whole = [-end, end];
         let [from, to] = match &wheel.soil.law {
             Law::Resistive(sand) => rings.pushing(wheel, sand, whole),
-            Law::Bekker(_) => whole,
+            Law::Bekker(_) => pressing(wheel.rolling.front, whole),
         };
         T::select(is_clear, zero, from).store(&mut self.from[lanes.clone()]);
         T::select(is_clear, zero, to).store(&mut self.to[lanes.clone()]);
@@ -278,6 +348,7 @@ impl<T: Lane> LaneRings<T> {
             spin,
             speed,
             tilt,
+            ..
         } = wheel.motion;
         let reach = self.radius + self.offset.abs();
         let largest = number(size) + number(spin) * reach;
@@ -311,6 +382,32 @@ impl<T: Lane> LaneRings<T> {
             T::select(is_whole | only_start, end, sooner),
         ]
     }
+}
+
+/// The part of an arc within a right angle of a direction.
+#[inline(always)]
+fn pressing<T: Lane>([x, y]: [f64; 2], [start, end]: [T; 2]) -> [T; 2] {
+    let size = (x * x + y * y).sqrt();
+    let (x, y) = (x / size, y / size);
+    let [from, to] = [[y, -x], [-y, x]].map(|[cos, sin]| start.like(quarter_of(cos, sin)));
+    [
+        if x > 0.0 || y > 0.0 {
+            from.max(start)
+        } else {
+            start
+        },
+        if x > 0.0 || y < 0.0 { to.min(end) } else { end },
+    ]
+}
+
+/// [`quarter`], to rounding where the angle is small.
+fn quarter_of(cos: f64, sin: f64) -> f64 {
+    let half = if cos >= 0.0 {
+        sin / (1.0 + cos)
+    } else {
+        (1.0 - cos) / sin.abs().max(TINY).copysign(sin)
+    };
+    half / (1.0 + (1.0 + half * half).sqrt())
 }
 
 /// `tan(θ/4)` of the angle of a unit vector, −π < θ <= π.

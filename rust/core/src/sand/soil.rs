@@ -25,7 +25,7 @@ pub struct Soil {
 pub enum Law {
     /// Three-dimensional resistive force theory ([`super::resistive_force`]).
     Resistive(Resistive),
-    /// Bekker's pressure with Janosi's and Hanamoto's shear ([`super::bekker`]).
+    /// Bekker's, Wong's and Reece's, with Janosi's and Hanamoto's shear ([`super::bekker`]).
     Bekker(Bekker),
 }
 
@@ -90,6 +90,11 @@ impl Soil {
         }
     }
 
+    /// Whether side walls bear nothing.
+    pub(super) fn spares_walls(&self) -> bool {
+        matches!(self.law, Law::Bekker(_))
+    }
+
     /// Its numbers with their names, to be read or changed.
     #[must_use]
     pub fn numbers_mut(&mut self) -> Vec<(&'static str, &mut f64)> {
@@ -117,6 +122,9 @@ impl Soil {
                 ("cohesion", &mut soil.cohesion),
                 ("internal_friction", &mut soil.internal_friction),
                 ("shear_modulus", &mut soil.shear_modulus),
+                ("stress_angle", &mut soil.stress_angle),
+                ("stress_angle_slip", &mut soil.stress_angle_slip),
+                ("slip_sinkage", &mut soil.slip_sinkage),
             ],
         };
         all.push(("memory", &mut self.memory));

@@ -135,6 +135,7 @@ pub struct Rules {
     drum: [Gauss; 2],
     edge: Gauss,
     wall: [Gauss; 2],
+    point: Gauss,
 }
 
 impl Rules {
@@ -145,7 +146,13 @@ impl Rules {
             drum: points.drum.map(Gauss::new),
             edge: Gauss::new(points.edge),
             wall: points.wall.map(Gauss::new),
+            point: Gauss::new(1),
         }
+    }
+
+    /// The rule of one point.
+    pub(super) fn point(&self) -> &Gauss {
+        &self.point
     }
 
     /// Points of a wheel with edges.
