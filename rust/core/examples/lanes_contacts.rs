@@ -21,7 +21,6 @@ use rover_core::lanes::contacts::{Contacts, Sight};
 use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground as LaneGround;
 use rover_core::lanes::machine::Machine;
-use rover_core::lanes::problem::ContactProblem;
 use rover_core::lanes::rows::Rows;
 use rover_core::multibody::inertias::Inertias;
 use rover_core::multibody::lane_configuration::LaneConfiguration;
@@ -29,6 +28,7 @@ use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::multibody::{Factor, MassMatrix};
 use rover_core::scalar::{Instructions, Lane, LaneMask, Single, Vec3};
+use rover_core::solver::batch::problem::ContactProblem;
 
 const PHASES: [&str; 4] = ["replay", "detect", "assemble", "problems"];
 const STEPS: usize = 400;

@@ -15,7 +15,6 @@ use rover_core::lanes::contacts::{Contacts, Sight};
 use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground;
 use rover_core::lanes::machine::Machine;
-use rover_core::lanes::problem::ContactProblem;
 use rover_core::lanes::rows::{Answer, Rows};
 use rover_core::multibody::description::SolidDescription;
 use rover_core::multibody::inertias::Inertias;
@@ -25,6 +24,7 @@ use rover_core::multibody::{
     Configuration, Factor, Kinematics, MassMatrix, Model, ModelDescription,
 };
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
+use rover_core::solver::batch::problem::ContactProblem;
 
 use super::{OverLanes, Random, on_every_register, spread};
 

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, UnilateralContact};
-use rover_core::lanes::problem::{ContactProblem, MAX_DENSE, block};
-use rover_core::lanes::queue::{MAX_ITERATIONS, Queue};
 use rover_core::multibody::{Configuration, Model};
 use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
 use rover_core::scalar::{Lane, Single};
 use rover_core::simulation::RoverSimulation;
 use rover_core::solver::SolverOptions;
+use rover_core::solver::batch::problem::{ContactProblem, MAX_DENSE, block};
+use rover_core::solver::batch::queue::{MAX_ITERATIONS, Queue};
 
 use super::{OverLanes, on_every_register};
 

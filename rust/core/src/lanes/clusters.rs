@@ -7,10 +7,10 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
-use super::pattern::Pattern;
-use super::problem::MAX_CONTACTS;
 use crate::multibody::Mechanism;
 use crate::multibody::model::Loop;
+use crate::solver::batch::pattern::Pattern;
+use crate::solver::batch::problem::MAX_CONTACTS;
 
 /// The clusters of a machine.
 #[derive(Clone, Debug, PartialEq)]

@@ -28,7 +28,6 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
-use super::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
 use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers};
 use crate::geometry::query::disc_plane::{FLAT, rolling, to_lowest};
@@ -38,6 +37,7 @@ use crate::geometry::{Disc, Roller, Sphere};
 use crate::integrator::WarmStart;
 use crate::multibody::{Model, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::solver::batch::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 
 /// Number of the plane in every terrain that has one.
 const PLANE: u32 = 0;

@@ -6,7 +6,7 @@
 //! paths, so its slot has all of them.
 
 use super::machine::Machine;
-use super::problem::MAX_CONTACTS;
+use crate::solver::batch::problem::MAX_CONTACTS;
 
 /// Slots for a path with boxes or balls.
 const FOR_BODIES: usize = 4;

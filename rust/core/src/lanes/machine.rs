@@ -10,8 +10,6 @@ use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
 use super::clusters::Clusters;
-use super::pattern::Pattern;
-use super::problem::{MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::contact::Part;
 #[cfg(doc)]
 use crate::geometry::Roller;
@@ -20,6 +18,8 @@ use crate::multibody::description::Limits;
 use crate::multibody::model::Loop;
 use crate::multibody::{Mechanism, Model, Wheel};
 use crate::scalar::elementary::hypot;
+use crate::solver::batch::pattern::Pattern;
+use crate::solver::batch::problem::{MAX_CONTACTS, MAX_DENSE, MAX_DRY};
 use crate::system::sand_wheel::PlacedWheel;
 
 /// Most slots of a wheel beside those of its circles on a plane.

@@ -12,18 +12,16 @@
 //! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `wide_wheel`,
 //!   `joint_slots`, [`forecast`]: contacts of all lanes at once; `lane_detection`, `by_lane`,
 //!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
-//! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield; [`pattern`]: which
-//!   velocities a contact moves;
-//! - `clusters`: which trees have a problem of their own; [`problem`]: a friction-contact problem;
-//!   [`queue`], `lane_solver`, `sweeps`: how the problems of many are solved, by
-//!   [`crate::solver`]'s pivoting; `system`, `equations`,
-//!   `dry_equations`, `large_equations`, `velocity_equations`, `tree_matrix`: its linear systems;
+//! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
+//! - `clusters`: which trees have a problem of their own; `sweeps`: where a contact that touches is
+//!   solved with all others fixed. The problems are solved by [`crate::solver::batch`];
 //! - [`step`]: the step. The dynamics of the tree are those of [`crate::multibody`], its drives
 //!   those of [`crate::system`].
 //!
 //! # One call
 //!
-//! A step of a block of rovers; `queue` solves the problems of several blocks together:
+//! A step of a block of rovers; [`Queue`](crate::solver::batch::queue::Queue)
+//! solves the problems of several blocks together:
 //!
 //! ```text
 //! LaneRover ──► Block::load_rover     state, command and memory of one rover into its lane
@@ -55,8 +53,6 @@ mod by_lane;
 mod clusters;
 mod contact_plane;
 pub mod contacts;
-mod dry_equations;
-mod equations;
 pub mod forecast;
 mod free_slots;
 pub mod ground;
@@ -64,20 +60,12 @@ mod groups;
 mod joint_slots;
 mod lane_detection;
 pub mod lane_rover;
-mod lane_solver;
-mod large_equations;
 pub mod machine;
 mod parts;
-pub mod pattern;
 mod pieces;
-pub mod problem;
-pub mod queue;
 mod rolling;
 pub mod rows;
 pub mod step;
 mod sweeps;
-mod system;
-mod tree_matrix;
-mod velocity_equations;
 mod wide_wheel;
 pub mod yielding;

@@ -12,8 +12,6 @@ use super::clusters::WidePatterns;
 use super::contacts::{Contacts, Slot};
 use super::joint_slots::JointRow;
 use super::machine::Machine;
-use super::pattern::Pattern;
-use super::problem::{ContactProblem, Triple, block};
 use crate::contact::jacobian::{add_impulse, for_each_row};
 use crate::contact::rows::{Path, Place, add, add_scaled, product, square};
 use crate::contact::{Contact, rollers};
@@ -22,6 +20,8 @@ use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::model::Loop;
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::solver::batch::pattern::Pattern;
+use crate::solver::batch::problem::{ContactProblem, Triple, block};
 use crate::system::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
 
 /// What is read of a problem.

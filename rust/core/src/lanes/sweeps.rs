@@ -6,10 +6,10 @@
 //! one step, for all lanes of the block at once.
 
 use super::contacts::Contacts;
-use super::problem::Triple;
 use super::rows::Rows;
 use crate::contact::rows::{add_scaled, along};
 use crate::scalar::{Lane, LaneMask};
+use crate::solver::batch::problem::Triple;
 
 /// Newton steps on the multiplier of a slide.
 const SLIDE_STEPS: usize = 2;
@@ -138,7 +138,7 @@ pub(super) fn write_start<T: Lane>(
     contacts: &Contacts<T>,
     lanes: T::Mask,
     p: &[Triple<T>],
-    problems: &mut [super::problem::ContactProblem],
+    problems: &mut [crate::solver::batch::problem::ContactProblem],
 ) {
     for &slot in contacts.used() {
         let near =

@@ -2,11 +2,11 @@
 
 use super::contacts::Contacts;
 use super::machine::Machine;
-use super::problem::Triple;
 use crate::contact::Part;
 use crate::law::compliance::{Compliance, Yielding};
 use crate::multibody::Poses;
 use crate::scalar::{Lane, LaneMask};
+use crate::solver::batch::problem::Triple;
 
 /// The laws of a block's contacts. Empty where all wheels are rigid.
 #[derive(Clone, Debug)]

@@ -11,10 +11,10 @@ use super::rover::RoverSimulation;
 use crate::caught::caught;
 use crate::integrator::{NoProbe, StepError, StepOptions, StepReport};
 use crate::lanes::machine::Machine;
-use crate::lanes::problem::ContactProblem;
-use crate::lanes::queue::Queue;
 use crate::lanes::step::{Block, Next, are_alike};
 use crate::scalar::{Instructions, Lane};
+use crate::solver::batch::problem::ContactProblem;
+use crate::solver::batch::queue::Queue;
 
 /// Rovers that together cost less alone than as a block, as a fraction of its lanes.
 const FEW: f64 = 0.4;

@@ -2,10 +2,10 @@
 
 use std::sync::OnceLock;
 
-use crate::lanes::problem::ContactProblem;
-use crate::lanes::queue::Queue;
 use crate::lanes::step::Block;
 use crate::solver::SolverOptions;
+use crate::solver::batch::problem::ContactProblem;
+use crate::solver::batch::queue::Queue;
 
 /// A block of one lane, made when first needed. It holds no state: a copy has no block, only the
 /// operator of the last step.

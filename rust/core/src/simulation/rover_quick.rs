@@ -10,10 +10,10 @@ use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepRepor
 use crate::lanes::admission::{FallbackReason, admit};
 use crate::lanes::lane_rover::LaneRover;
 use crate::lanes::machine::Machine;
-use crate::lanes::problem::ContactProblem;
-use crate::lanes::queue::Queue;
 use crate::lanes::step::{Block, Next};
 use crate::scalar::{Lane, Single};
+use crate::solver::batch::problem::ContactProblem;
+use crate::solver::batch::queue::Queue;
 
 impl RoverScene {
     /// The machine of its fast steps; none if with these options it has none.

@@ -9,6 +9,7 @@
 //!   mode;
 //! - `linear`: the linear system of a Newton step and its factors, dense or block-sparse;
 //! - `pivoting`: pivoting on the contact modes, over any scalar, storage and linear system;
+//! - [`batch`]: the problems of many machines at once, by pivoting;
 //! - `scratch`: memory that the stages share;
 //! - `stage`: the iterative methods, one per file;
 //! - `strategy`: the order of the stages; `reference`: methods for comparison;
@@ -46,6 +47,7 @@
 //!
 #![doc = include_str!("escalation.md")]
 
+pub mod batch;
 mod entry;
 mod history;
 mod linear;

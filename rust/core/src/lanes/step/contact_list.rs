@@ -7,8 +7,8 @@ use crate::contact::Contact;
 use crate::lanes::contacts::Sight;
 use crate::lanes::forecast::Forecast;
 use crate::lanes::joint_slots::JointRow;
-use crate::lanes::problem::{ContactProblem, Triple};
 use crate::scalar::{Lane, LaneMask};
+use crate::solver::batch::problem::{ContactProblem, Triple};
 
 impl<T: Lane> Block<T> {
     pub(super) fn detect(&mut self, problems: &mut [ContactProblem]) {

@@ -2,7 +2,7 @@
 //!
 //! The formulas are those of [`crate::integrator::moreau_jean`] with explicit gyroscopic terms and
 //! inelastic contact. A step has three parts, between which its contact problems are solved with
-//! those of other blocks ([`super::queue`]):
+//! those of other blocks ([`crate::solver::batch::queue`]):
 //!
 //! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
 //! 2. [`Block::conclude`] — the new velocity and configuration, energy audit, and where contacts
@@ -32,7 +32,6 @@ use super::contacts::Contacts;
 use super::ground::Ground;
 use super::joint_slots::JointRow;
 use super::machine::Machine;
-use super::problem::{MAX_CONTACTS, Triple};
 use super::rows::Rows;
 use super::yielding::Yields;
 use crate::integrator::{StepOptions, StepReport, WarmStart};
@@ -43,6 +42,7 @@ use crate::multibody::{
 };
 use crate::sand::RutMap;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::solver::batch::problem::{MAX_CONTACTS, Triple};
 use crate::system::drives::Drives;
 use crate::system::sand::SandContact;
 

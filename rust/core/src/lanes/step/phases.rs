@@ -6,11 +6,11 @@ use super::balance::{Balance, Conditions, Correction, Energies, select_both};
 use super::{Block, Fallback, Next, State, own_momentum};
 use crate::contact::clusters_of;
 use crate::integrator::{Phase, Probe, Stabilisation, StepReport};
-use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
 use crate::multibody::Model;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::solver::batch::problem::ContactProblem;
 use crate::system::extent::Turning;
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques

@@ -6,10 +6,10 @@ use super::balance::select_both;
 use super::{Block, Fallback, State, own_momentum};
 use crate::integrator::carried_velocity::{Carried, Moving};
 use crate::integrator::position_projection::FARTHEST;
-use crate::lanes::problem::ContactProblem;
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
 use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::solver::batch::problem::ContactProblem;
 use crate::system::extent::{displacement, tolerated};
 
 /// Sweeps before pivoting, of machines with many contacts: a problem of six cylinders on hills with

@@ -4,9 +4,9 @@
 //! The base's block is whole. A joint has its row and its column with the base and with the joints
 //! that carry it. Elimination from the leaves to the root fills nothing in.
 
+use super::pattern::BASE;
 use super::pattern::Pattern;
 use super::problem::Triple;
-use crate::multibody::model::BASE;
 use crate::scalar::Lane;
 
 /// A number for each velocity of the base.

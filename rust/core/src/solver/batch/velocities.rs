@@ -8,7 +8,7 @@
 //! Bᵀ (Zᵀ Z + D + α I) C y + γ y = r
 //! ```
 //!
-//! are those of [`super::equations`]. `Bᵀ (D + α I) C + γ` is diagonal; with its inverse G (zero
+//! are those of [`super::blocks`]. `Bᵀ (D + α I) C + γ` is diagonal; with its inverse G (zero
 //! for unknowns that a mode eliminates) and the machine's change of velocity `w = Z C y`
 //!
 //! ```text
@@ -22,13 +22,13 @@
 
 use std::sync::Arc;
 
-use super::equations::Block;
+use super::blocks::Block;
+use super::loaded::{Loaded, solve_one};
+use super::pattern::BASE;
 use super::pattern::Pattern;
 use super::problem::ContactProblem;
-use super::system::{Loaded, solve_one};
 use super::tree_matrix::{Base, Columns, TreeMatrix, product};
 use crate::law::coulomb::ContactMode;
-use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{Few, Mode, System, Triple};
 
@@ -394,25 +394,32 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::lanes::equations::DenseSystem;
-    use crate::lanes::machine::Machine;
-    use crate::lanes::problem::{MAX_CONTACTS, MAX_DENSE, block};
-    use crate::multibody::{Model, ModelDescription};
     use crate::scalar::Single;
+    use crate::solver::batch::blocks::DenseSystem;
+    use crate::solver::batch::problem::{DENSE_BLOCKS, MAX_CONTACTS, MAX_DENSE, block};
     use crate::solver::pivoting::rests;
     use proptest::prelude::*;
 
-    pub(in crate::lanes) fn pattern() -> Arc<Pattern> {
-        let mut description = ModelDescription::rover();
-        for wheel in &mut description.wheels {
-            wheel.width = Some(0.1);
-        }
-        let model = Model::from_description(description).unwrap();
-        Arc::clone(Machine::of(&model).unwrap().pattern(0))
+    /// Of a rover with six wheels of two slots each, four of them steered, on rockers and bogies.
+    fn pattern() -> Arc<Pattern> {
+        let wheels: [&[usize]; 6] = [
+            &[6, 7, 8],
+            &[6, 9, 10],
+            &[6, 9, 11, 12],
+            &[13, 14, 15],
+            &[13, 16, 17],
+            &[13, 16, 18, 19],
+        ];
+        let path = |wheel: &[usize]| (0..BASE).chain(wheel.iter().copied()).collect();
+        let paths: Vec<Vec<usize>> = wheels
+            .iter()
+            .flat_map(|own| [path(own), path(own)])
+            .collect();
+        Arc::new(Pattern::new(20, &paths).unwrap())
     }
 
     /// A problem of the first slots of the rover with both forms of its operator.
-    pub(in crate::lanes) fn problem(
+    pub(in crate::solver::batch) fn problem(
         pattern: &Arc<Pattern>,
         numbers: &mut impl Iterator<Item = f64>,
     ) -> ContactProblem {
@@ -459,7 +466,7 @@ pub(super) mod tests {
             let token = Single::best();
             let pattern = pattern();
             let problem = problem(&pattern, &mut numbers.iter().copied());
-            let mut dense = DenseSystem::<f64, MAX_DENSE>::new(token);
+            let mut dense = DenseSystem::<f64, MAX_DENSE, DENSE_BLOCKS>::new(token);
             let mut own = VelocitySystem::<f64, MAX_CONTACTS>::new(token);
             dense.load(0, &problem);
             prop_assert_eq!(own.load(0, &problem).count(), MAX_DENSE);

@@ -3,19 +3,21 @@
 //! A lane takes the next problem when its own is done, so that the cost follows the mean of the
 //! steps and not the largest. No lane's bits depend on its neighbours.
 
-use super::dry_equations::{DrySystem, PLACES};
-use super::equations::DenseSystem;
-use super::large_equations::LargeSystem;
-use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_LARGE};
-use super::system::Loaded;
-use super::velocity_equations::VelocitySystem;
+use super::blocks::DenseSystem;
+use super::dry::{DrySystem, PLACES};
+use super::loaded::Loaded;
+use super::problem::{
+    ContactProblem, DENSE_BLOCKS, LARGE_BLOCKS, MAX_CONTACTS, MAX_DENSE, MAX_LARGE,
+};
+use super::velocities::VelocitySystem;
 use crate::problem::{Answered, ContactScales, Magnitudes, Redundancy};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 
 /// Most steps of a solve: those of the first attempt and of all further ones.
 pub const MAX_ITERATIONS: usize =
-    <DenseSystem<f64, MAX_DENSE> as Loaded<f64, MAX_DENSE>>::MAX_STEPS * (1 + FURTHER_ALPHAS.len());
+    <DenseSystem<f64, MAX_DENSE, DENSE_BLOCKS> as Loaded<f64, MAX_DENSE>>::MAX_STEPS
+        * (1 + FURTHER_ALPHAS.len());
 
 /// What a problem has on its diagonal beside the machine's operator, relative to the mean diagonal,
 /// from which on its answer is unique and the smallest `α` serves.
@@ -50,13 +52,14 @@ pub(super) trait ProblemSource {
 }
 
 /// Lanes for problems with their whole operator.
-pub(super) type DenseSolver<T, const C: usize> = LaneSolver<T, C, DenseSystem<T, C>>;
+pub(super) type DenseSolver<T, const C: usize, const B: usize> =
+    LaneSolver<T, C, DenseSystem<T, C, B>>;
 
 /// Lanes for those with dry joints.
 pub(super) type DrySolver<T> = LaneSolver<T, PLACES, DrySystem<T>>;
 
 /// Lanes for those of many rigid discs.
-pub(super) type LargeSolver<T> = LaneSolver<T, MAX_LARGE, LargeSystem<T>>;
+pub(super) type LargeSolver<T> = DenseSolver<T, MAX_LARGE, LARGE_BLOCKS>;
 
 /// Lanes for problems with a factored operator.
 pub(super) type FactoredSolver<T> = LaneSolver<T, MAX_CONTACTS, VelocitySystem<T, MAX_CONTACTS>>;

@@ -2,7 +2,7 @@
 //!
 //! A dry joint has one unknown, the tangential impulse x of a joint that sticks; its normal impulse
 //! follows from its normal row alone, and one that slides has the friction that belongs to it
-//! ([`crate::contact::joint_friction`]). With the contacts' system A of [`super::equations`], the
+//! ([`crate::contact::joint_friction`]). With the contacts' system A of [`super::blocks`], the
 //! columns U and rows V of the joints, and `S = W_tt + α 1`
 //!
 //! ```text
@@ -12,9 +12,9 @@
 //!
 //! The contacts have the first places, the joints those behind.
 
-use super::equations::{Block, Factors, backward, backward_row, factorise, forward, velocities};
+use super::blocks::{Block, Factors, backward, backward_row, factorise, forward, velocities};
+use super::loaded::{Loaded, solve_one};
 use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_DENSE, MAX_DRY, block};
-use super::system::{Loaded, solve_one};
 use crate::law::coulomb::ContactMode;
 use crate::scalar::Lane;
 use crate::solver::pivoting::{Few, Mode, System, Triple};
@@ -334,8 +334,8 @@ impl<T: Lane> Loaded<T, PLACES> for DrySystem<T> {
 mod tests {
     use super::*;
     use crate::contact::joint_friction;
-    use crate::lanes::equations::DenseSystem;
     use crate::scalar::Single;
+    use crate::solver::batch::blocks::DenseSystem;
     use proptest::prelude::*;
 
     const CONTACTS: usize = 5;
@@ -384,7 +384,7 @@ mod tests {
             let token = Single::best();
             let mut numbers = numbers.iter().copied().cycle();
             let problem = problem(&mut numbers);
-            let mut dense = DenseSystem::<f64, MAX_DENSE>::new(token);
+            let mut dense = DenseSystem::<f64, MAX_DENSE, DENSE_BLOCKS>::new(token);
             let mut own = DrySystem::<f64>::new(token);
             dense.load(0, &problem);
             own.load(0, &problem);

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use crate::multibody::model::BASE;
+/// Number of velocities of a free root, with which every path of its tree starts.
+pub const BASE: usize = 6;
 
 /// The branch-induced sparsity of a matrix `1 + Z K Zᵀ` over the velocities of a machine
 /// (Featherstone 2008, ch. 6): all entries of the base's six velocities, and (k, a) and (a, k) for

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, LargeSolver, ProblemSource};
 use super::pattern::Pattern;
-use super::problem::{ContactProblem, MAX_CONTACTS, MAX_DENSE, MAX_DRY};
+use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_CONTACTS, MAX_DENSE, MAX_DRY, block};
 use crate::problem::Residual;
 use crate::scalar::Lane;
 use crate::solver::SolverOptions;
@@ -68,8 +68,8 @@ impl ContactProblem {
 /// `k / size`.
 pub struct Queue<T: Lane> {
     token: T::Token,
-    few: Box<DenseSolver<T, FEW>>,
-    many: Box<DenseSolver<T, MAX_DENSE>>,
+    few: Box<DenseSolver<T, FEW, { block(FEW, 0) }>>,
+    many: Box<DenseSolver<T, MAX_DENSE, DENSE_BLOCKS>>,
     dry: Box<DrySolver<T>>,
     large: Option<Box<LargeSolver<T>>>,
     /// Those of problems with factors, by pattern.

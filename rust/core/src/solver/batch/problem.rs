@@ -24,6 +24,9 @@ pub const MAX_UNKNOWNS: usize = 3 * MAX_CONTACTS;
 /// Blocks of the lower triangle of `W` without dry joints.
 pub const DENSE_BLOCKS: usize = block(MAX_DENSE, 0);
 
+/// Blocks of the lower triangle of the operator of most contacts that factors give.
+pub(super) const LARGE_BLOCKS: usize = block(MAX_LARGE, 0);
+
 /// Index of block (i, j), `j <= i`, in [`ContactProblem::W`].
 #[inline(always)]
 #[must_use]
@@ -107,8 +110,25 @@ impl Factored {
 
     /// Numbers of a contact's Z, and whether they are those of all velocities.
     #[inline(always)]
-    pub(super) fn shape(&self) -> (usize, bool) {
+    pub(crate) fn shape(&self) -> (usize, bool) {
         (self.pattern.as_deref()).map_or((0, false), |own| (own.stride(), own.is_whole()))
+    }
+
+    /// Block (i, j) of W, of a pattern that has all entries, 1/kg.
+    #[inline(always)]
+    pub(super) fn block(&self, i: usize, j: usize) -> [f64; 9] {
+        if i == j {
+            return self.diagonal[i];
+        }
+        let stride = self.shape().0;
+        let row = |contact: usize| &self.Z[contact * stride..][..stride];
+        let mut w = [0.0; 9];
+        for (x, y) in row(i).iter().zip(row(j)) {
+            for k in 0..9 {
+                w[k] += x[k / 3] * y[k % 3];
+            }
+        }
+        w
     }
 
     /// Entry of W, 1/kg.
@@ -149,7 +169,7 @@ impl Factored {
     }
 
     /// Makes room for the contacts of a machine.
-    pub(super) fn adopt(&mut self, pattern: &Arc<Pattern>) {
+    pub(crate) fn adopt(&mut self, pattern: &Arc<Pattern>) {
         if !(self.pattern.as_ref()).is_some_and(|own| Arc::ptr_eq(own, pattern)) {
             self.pattern = Some(Arc::clone(pattern));
             self.Z.resize(MAX_CONTACTS * pattern.stride(), [0.0; 3]);

@@ -12,10 +12,10 @@
 //! equations, whatever the condition of `W + α I`. Rows are not exchanged; that leaves the number
 //! of steps as it is.
 
-use super::problem::{ContactProblem, DENSE_BLOCKS, block};
-use super::system::{Loaded, solve_one};
+use super::loaded::{Loaded, solve_one};
+use super::problem::{ContactProblem, MAX_DENSE, block};
 use crate::law::coulomb::ContactMode;
-use crate::scalar::Lane;
+use crate::scalar::{Lane, MAX_LANES};
 use crate::solver::pivoting::{Few, Mode, System, Triple};
 
 /// A 3 x 3 block, row-major.
@@ -273,20 +273,48 @@ fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
     }
 }
 
-/// Operators with all their blocks; a contact's place is its number.
+/// Operators with all their blocks; a contact's place is its number. `B`: blocks of the lower
+/// triangle of `W`.
+///
+/// Up to [`MAX_DENSE`] contacts come with `W`, and every place is used. More are those of machines
+/// with thin rigid wheels that push or tow each other: their contacts are more than the velocities
+/// can tell apart, and the law decides by slips of 1e-12 m/s, which systems in the velocities
+/// ([`super::velocities`]) do not resolve. They come with factors of `W`.
 #[derive(Clone, Debug)]
-pub(super) struct DenseSystem<T: Lane, const C: usize> {
-    W: [Block<T>; DENSE_BLOCKS],
+pub(super) struct DenseSystem<T: Lane, const C: usize, const B: usize> {
+    W: Box<[Block<T>; B]>,
     pub(super) q: [Triple<T>; C],
-    factors: Factors<T, C>,
+    factors: Box<Factors<T, C>>,
+    /// Number of each lane's contacts, and the places in use.
+    counts: [usize; MAX_LANES],
+    n: usize,
 }
 
-impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
+/// Many of something, made without a copy on the stack.
+fn boxed<X: Clone, const N: usize>(x: X) -> Box<[X; N]> {
+    let Ok(all) = vec![x; N].into_boxed_slice().try_into() else {
+        unreachable!("invariant: it has this length")
+    };
+    all
+}
+
+impl<T: Lane, const C: usize, const B: usize> DenseSystem<T, C, B> {
+    /// Whether every place is used, whatever the problems.
+    const IS_WHOLE: bool = C <= MAX_DENSE;
+
+    /// Number of places.
+    #[inline(always)]
+    fn n(&self) -> usize {
+        if Self::IS_WHOLE { C } else { self.n }
+    }
+}
+
+impl<T: Lane, const C: usize, const B: usize> System<T, Few<C>> for DenseSystem<T, C, B> {
     type Places = std::ops::Range<usize>;
 
     #[inline(always)]
     fn places(&self) -> Self::Places {
-        0..C
+        0..self.n()
     }
 
     #[inline(always)]
@@ -296,23 +324,24 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
 
     #[inline(always)]
     fn velocities(&mut self, p: &[Triple<T>; C], u: &mut [Triple<T>; C]) {
-        velocities(&self.W, C, &self.q, p, u);
+        velocities(&self.W, self.n(), &self.q, p, u);
     }
 
     #[inline(always)]
     fn factorise(&mut self, alpha: T, modes: &[Mode<T>; C]) -> bool {
-        factorise(&self.W, C, alpha, modes, &mut self.factors);
+        factorise(&self.W, self.n(), alpha, modes, &mut self.factors);
         true
     }
 
     #[inline(always)]
     fn solve(&mut self, modes: &[Mode<T>; C], r: &mut [Triple<T>; C]) {
-        for k in 0..C {
+        let n = self.n();
+        for k in 0..n {
             r[k] = modes[k].across(r[k]);
         }
-        forward(&self.factors, C, r);
-        backward(&self.factors, C, r);
-        for k in 0..C {
+        forward(&self.factors, n, r);
+        backward(&self.factors, n, r);
+        for k in 0..n {
             r[k] = modes[k].impulse(r[k]);
         }
     }
@@ -329,30 +358,50 @@ impl<T: Lane, const C: usize> System<T, Few<C>> for DenseSystem<T, C> {
     }
 }
 
-impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
+impl<T: Lane, const C: usize, const B: usize> Loaded<T, C> for DenseSystem<T, C, B> {
     const MAX_STEPS: usize = 80;
 
     #[inline(always)]
     fn new(token: T::Token) -> Self {
+        const { assert!(B == block(C, 0)) };
         let zero = T::splat(token, 0.0);
         Self {
-            W: [[zero; 9]; DENSE_BLOCKS],
+            W: boxed([zero; 9]),
             q: [[zero; 3]; C],
-            factors: [[[zero; 9]; C]; C],
+            factors: boxed([[zero; 9]; C]),
+            counts: [0; MAX_LANES],
+            n: 0,
         }
     }
 
     #[inline(always)]
     fn load(&mut self, lane: usize, problem: &ContactProblem) -> Self::Places {
         let n = problem.n_contacts;
-        let blocks = self.W.iter_mut().zip(&problem.W).take(block(C, 0));
-        for (b, (own, w)) in blocks.enumerate() {
-            let is_used = b < block(n, 0);
-            for k in 0..9 {
-                own[k].set(lane, if is_used { w[k] } else { 0.0 });
+        if Self::IS_WHOLE {
+            for (b, (own, w)) in self.W.iter_mut().zip(&problem.W).enumerate() {
+                let is_used = b < block(n, 0);
+                for k in 0..9 {
+                    own[k].set(lane, if is_used { w[k] } else { 0.0 });
+                }
+            }
+            return 0..C;
+        }
+        let before = std::mem::replace(&mut self.counts[lane], n);
+        self.n = self.counts.iter().fold(0, |most, own| most.max(*own));
+        for i in 0..n.max(before) {
+            for j in 0..=i {
+                let w = if i < n {
+                    problem.factored.block(i, j)
+                } else {
+                    [0.0; 9]
+                };
+                let own = &mut self.W[block(i, j)];
+                for k in 0..9 {
+                    own[k].set(lane, w[k]);
+                }
             }
         }
-        0..C
+        0..n.max(before)
     }
 
     #[inline(always)]
@@ -367,6 +416,9 @@ impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
 
     #[inline(always)]
     fn least_pivot(&self, lane: usize) -> f64 {
+        if !Self::IS_WHOLE {
+            return 0.0;
+        }
         let mut most = 0.0_f64;
         for k in 0..C {
             let inverse = &self.factors[k][k];
@@ -379,11 +431,48 @@ impl<T: Lane, const C: usize> Loaded<T, C> for DenseSystem<T, C> {
 
     #[inline(always)]
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9] {
-        &problem.W[block(contact, contact)]
+        if Self::IS_WHOLE {
+            &problem.W[block(contact, contact)]
+        } else {
+            &problem.factored.diagonal[contact]
+        }
     }
 
     #[inline(always)]
     fn free_velocity_mut(&mut self, place: usize) -> &mut Triple<T> {
         &mut self.q[place]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::Single;
+    use crate::solver::batch::pattern::Pattern;
+    use crate::solver::batch::problem::{DENSE_BLOCKS, LARGE_BLOCKS, MAX_CONTACTS, MAX_LARGE};
+    use crate::solver::batch::velocities::tests::problem;
+    use std::sync::Arc;
+
+    #[test]
+    fn the_operator_of_the_factors_is_that_of_the_problem() {
+        let mut numbers = (1..).map(|k: u32| (f64::from(k) * 0.618).fract() - 0.5);
+        let pattern = Arc::new(Pattern::whole(12, MAX_CONTACTS));
+        let problem = problem(&pattern, &mut numbers);
+        let token = Single::best();
+        let mut dense = DenseSystem::<f64, MAX_DENSE, DENSE_BLOCKS>::new(token);
+        let mut large = DenseSystem::<f64, MAX_LARGE, LARGE_BLOCKS>::new(token);
+        dense.load(0, &problem);
+        assert_eq!(large.load(0, &problem), 0..MAX_DENSE);
+        let mut p = [[0.0; 3]; MAX_LARGE];
+        for x in p.iter_mut().take(MAX_DENSE).flatten() {
+            *x = numbers.next().unwrap();
+        }
+        let (few, _) = p.split_first_chunk().unwrap();
+        let mut u = ([[0.0; 3]; MAX_DENSE], [[0.0; 3]; MAX_LARGE]);
+        dense.velocities(few, &mut u.0);
+        large.velocities(&p, &mut u.1);
+        for (a, b) in u.0.iter().flatten().zip(u.1.iter().flatten()) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
     }
 }

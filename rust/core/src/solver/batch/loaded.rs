@@ -2,9 +2,9 @@
 
 use super::problem::ContactProblem;
 use crate::law::coulomb::ContactMode;
+use crate::law::one_contact::solve_one_contact;
 use crate::scalar::Lane;
 use crate::solver::pivoting::{Few, System, Triple};
-use crate::solver::solve_one_contact;
 
 /// Systems of at most `C` contacts, each of a lane's own problem.
 pub(super) trait Loaded<T: Lane, const C: usize>: System<T, Few<C>> + Sized {
