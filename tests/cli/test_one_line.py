@@ -405,6 +405,15 @@ def test_rover_alone_says_what_to_try_first() -> None:
         assert word in output
 
 
+@pytest.mark.parametrize("columns", [60, 80])
+def test_the_first_page_fits_the_terminal(columns: int) -> None:
+    """Lines of commands with commands of their own were 107 characters long, and broke in mid-word on 80 columns."""
+    lines = rover(COLUMNS=str(columns)).output.splitlines()
+    begin = lines.index("Drive and watch:")
+    assert max(map(len, lines[begin:])) <= columns
+    assert all(re.match(r"  \w+ +\S| {12}\S|$|\S", line) for line in lines[begin:])
+
+
 @pytest.mark.takes_long("runs the first commands that a user sees")
 def test_the_first_steps_run_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

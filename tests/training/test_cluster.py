@@ -1,8 +1,10 @@
 """Training and evaluation on Ray: the page of the manual on a cluster of two nodes, and what Ray's workers get."""
 
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import cloudpickle
@@ -10,6 +12,9 @@ import gymnasium as gym
 import pytest
 from commands import error_of
 from scripts_run import note
+
+from rover_gym.cli.train_command import NEEDED
+from rover_gym.extras import PROJECTS
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "training" / "examples" / "rllib.py"
@@ -42,6 +47,13 @@ def test_without_ray_the_error_names_the_extra(command: str, monkeypatch: pytest
     error = error_of(command, "--ray", "auto")
     assert error == "error: ray is not installed: pip install 'rover-gym[rllib]'\n"
     assert not list(tmp_path.iterdir())
+
+
+def test_the_extra_of_ray_installs_what_a_training_on_a_cluster_imports() -> None:
+    """`rover train --ray` in an environment of the extra `rllib` alone asked for TensorBoard, which it had not."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    installed = [re.split(r"[^\w-]", wanted)[0] for wanted in project["optional-dependencies"]["rllib"]]
+    assert {PROJECTS.get(package, package).lower() for package in NEEDED} <= set(installed)
 
 
 @pytest.mark.nightly(
