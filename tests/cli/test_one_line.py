@@ -384,6 +384,8 @@ def test_a_slope_below_the_friction_angle_is_no_matter() -> None:
         ("drive --terrain nope.tif", "nope.tif: No such file"),
         ("grains plate --ball-radius 0", "--ball-radius: must be above 0"),
         ("grains plate --sinkage -1", "--sinkage: must be above 0"),
+        ("grains plate --balls 100 --width 0.15 --depth 0.15 --radius 0.03", "bed: must be more than 0.0336 m deep"),
+        ("grains plate --balls 320 --width 0.14 --depth 0.14 --radius 0.03", "--sinkage: must be at most"),
         ("grains wheel --slip 2", "--slip: must be below 1"),
         ("grains wheel --slip-angle 100", "--slip-angle: must be at most 90"),
     ],
