@@ -52,6 +52,8 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
         browser.get_log("performance")  # what the browser's own first tab did
         browser.get(server.address)
         await_that(lambda: "solver converged" in text(browser, "clock"), "a state")
+        # The state comes before the scene is built; tests that came first, as they may, looked at nothing.
+        await_that(lambda: browser.find_elements(By.CSS_SELECTOR, "#root canvas[data-drawn]") != [], "a picture")
         yield Live(browser, loop, server, folder)
     finally:
         browser.quit()
@@ -203,12 +205,12 @@ def test_the_scene_shows_the_ground_and_the_curves_are_drawn(live: Live) -> None
     warm = (red > 1.3 * green) & (green > blue)
     assert GROUND_COLOUR[0] > 1.3 * GROUND_COLOUR[1]
     assert warm[image.shape[0] // 2 :].mean() > 0.3
-    drawn = live.browser.execute_script(
+    colours = (
         "return [...document.querySelectorAll('#charts canvas')].map((canvas) => new Set(canvas.getContext('2d')"
         ".getImageData(0, 0, canvas.width, canvas.height).data).size);"
     )
-    assert len(drawn) == 4
-    assert min(drawn) > 10
+    assert len(live.browser.execute_script(colours)) == 4
+    await_that(lambda: min(live.browser.execute_script(colours)) > 10, "curves")
 
 
 @pytest.mark.nightly("tests/browser/test_live_page.py::test_a_key_moves_the_rover_and_its_release_stops_it")

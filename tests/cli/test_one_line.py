@@ -384,6 +384,8 @@ def test_a_slope_below_the_friction_angle_is_no_matter() -> None:
         ("drive --terrain nope.tif", "nope.tif: No such file"),
         ("grains plate --ball-radius 0", "--ball-radius: must be above 0"),
         ("grains plate --sinkage -1", "--sinkage: must be above 0"),
+        ("grains plate --balls 100 --width 0.15 --depth 0.15 --radius 0.03", "bed: must be more than 0.0336 m deep"),
+        ("grains plate --balls 320 --width 0.14 --depth 0.14 --radius 0.03", "--sinkage: must be at most"),
         ("grains wheel --slip 2", "--slip: must be below 1"),
         ("grains wheel --slip-angle 100", "--slip-angle: must be at most 90"),
     ],
@@ -403,6 +405,15 @@ def test_rover_alone_says_what_to_try_first() -> None:
         assert command in output
     for word in ("rover COMMAND -h", "rover --install-completion", *get_command(app).commands):
         assert word in output
+
+
+@pytest.mark.parametrize("columns", [60, 80])
+def test_the_first_page_fits_the_terminal(columns: int) -> None:
+    """Lines of commands with commands of their own were 107 characters long, and broke in mid-word on 80 columns."""
+    lines = rover(COLUMNS=str(columns)).output.splitlines()
+    begin = lines.index("Drive and watch:")
+    assert max(map(len, lines[begin:])) <= columns
+    assert all(re.match(r"  \w+ +\S| {12}\S|$|\S", line) for line in lines[begin:])
 
 
 @pytest.mark.takes_long("runs the first commands that a user sees")

@@ -89,6 +89,8 @@ def test_one_wheel_serves_every_python_and_the_archive_holds_the_sources() -> No
 
 
 @wheels
+@pytest.mark.takes_long("installs the wheel and drives")
+@pytest.mark.timeout(3600)
 def test_from_installing_to_the_first_episode(place: Path) -> None:
     """With Python's own `venv` and `pip`, as a newcomer has them; the environment itself does not count.
 
@@ -109,6 +111,8 @@ def test_from_installing_to_the_first_episode(place: Path) -> None:
 
 
 @wheels
+@pytest.mark.takes_long("installs the wheel and drives")
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("version", PYTHONS)
 def test_the_wheel_drives_under_every_python(version: str, place: Path) -> None:
     found = shutil.which(f"python{version}")
@@ -121,7 +125,8 @@ def test_the_wheel_drives_under_every_python(version: str, place: Path) -> None:
 
 
 @wheels
-@pytest.mark.timeout(1200)
+@pytest.mark.takes_long("installs an extra and tries it")
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("extra", [extra for extra in PROMISES if extra])
 def test_an_extra_keeps_its_promise_alone(extra: str, place: Path) -> None:
     uv("venv", "--quiet", "--python", sys.executable, str(place / "venv"))
@@ -131,7 +136,8 @@ def test_an_extra_keeps_its_promise_alone(extra: str, place: Path) -> None:
 
 
 @wheels
-@pytest.mark.timeout(2400)
+@pytest.mark.takes_long("installs Ray and trains")
+@pytest.mark.timeout(7200)
 def test_an_extra_trains_and_evaluates_on_two_nodes_of_ray(place: Path) -> None:
     uv("venv", "--quiet", "--python", sys.executable, str(place / "venv"))
     python = python_of(place / "venv")

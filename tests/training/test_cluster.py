@@ -1,8 +1,10 @@
 """Training and evaluation on Ray: the page of the manual on a cluster of two nodes, and what Ray's workers get."""
 
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import cloudpickle
@@ -10,6 +12,9 @@ import gymnasium as gym
 import pytest
 from commands import error_of
 from scripts_run import note
+
+from rover_gym.cli.train_command import NEEDED
+from rover_gym.extras import PROJECTS
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "training" / "examples" / "rllib.py"
@@ -44,10 +49,17 @@ def test_without_ray_the_error_names_the_extra(command: str, monkeypatch: pytest
     assert not list(tmp_path.iterdir())
 
 
+def test_the_extra_of_ray_installs_what_a_training_on_a_cluster_imports() -> None:
+    """`rover train --ray` in an environment of the extra `rllib` alone asked for TensorBoard, which it had not."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    installed = [re.split(r"[^\w-]", wanted)[0] for wanted in project["optional-dependencies"]["rllib"]]
+    assert {PROJECTS.get(package, package).lower() for package in NEEDED} <= set(installed)
+
+
 @pytest.mark.nightly(
     "tests/training/test_cluster.py::test_a_worker_of_ray_that_has_not_imported_the_package_finds_the_environment"
 )
-@pytest.mark.timeout(1800)
+@pytest.mark.timeout(7200)  # seven minutes on two idle cores, of which a busy machine leaves a tenth
 def test_the_page_holds_on_two_nodes_though_workers_are_lost(tmp_path: Path) -> None:
     if not RAY.is_file():
         pytest.skip(f"{RAY} is not there: make ray")

@@ -121,6 +121,12 @@ def test_a_run_is_never_overwritten_and_its_figures_are_events(config: Path, tmp
     assert (folder / "arcs.npz").read_bytes() == before
 
 
+def test_a_run_without_a_round_cannot_be_resumed_and_the_error_says_what_to_do(config: Path, tmp_path: Path) -> None:
+    """A training that was interrupted in its first round was answered with "is not there" and a file of ours."""
+    error = error_of("train", config, "--output", tmp_path / "run", "--workers", 1, "--resume")
+    assert error == f"error: --resume: no round has ended there: train without resuming, got '{tmp_path / 'run'}'\n"
+
+
 def test_a_long_training_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between two evaluations, for minutes, a training printed nothing."""
     monkeypatch.setattr("rover_gym.learning.arc_recipe.SILENCE", 0.0)

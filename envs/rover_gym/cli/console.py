@@ -6,7 +6,9 @@ import json
 import math
 import os
 import re
+import shutil
 import signal
+import textwrap
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -407,7 +409,8 @@ FIRST_STEPS = (
 
 
 def say_first_steps(program: Any) -> None:
-    """Prints the first steps and all commands of the program, a line each."""
+    """Prints the first steps and all commands of the program, in lines that fit the terminal."""
+    width = max(40, shutil.get_terminal_size().columns)
     typer.echo(f"rover-gym {__version__}: a six-wheel Mars rover in a nonsmooth simulator\n\nTry first:\n")
     for command, meaning in FIRST_STEPS:
         typer.echo(f"  {command}\n      {meaning}")
@@ -415,8 +418,9 @@ def say_first_steps(program: Any) -> None:
     for name, command in program.commands.items():
         summary = (command.help or "").split("\n\n")[0].split(":")[0].rstrip(".")
         below = ", ".join(getattr(command, "commands", {}))
-        line = f"  {name:<9} {summary}" + (f": {below}" if below else "")
-        panels.setdefault(command.rich_help_panel, []).append(line)
+        text = f"{name:<9} {summary}" + (f": {below}" if below else "")
+        lines = textwrap.wrap(text, width, initial_indent=" " * 2, subsequent_indent=" " * 12)
+        panels.setdefault(command.rich_help_panel, []).extend(lines)
     for panel, lines in panels.items():
         typer.echo("\n".join(["", f"{panel}:", *lines]))
-    typer.echo("\nOptions of a command: rover COMMAND -h. Completion by the Tab key: rover --install-completion.")
+    typer.echo("\nOptions of a command: rover COMMAND -h\nCompletion by the Tab key: rover --install-completion")

@@ -302,6 +302,11 @@ class _Drives:
         return episode
 
 
+def _times(factor: float) -> str:
+    """A real-time factor in a table; below 10 with two digits, since a planner is slower than time."""
+    return f"{factor:.0f} x" if factor >= 9.5 else f"{factor:.2g} x"
+
+
 def _table(results: Sequence[Episode], title: str) -> Table:
     table = Table(title=title, title_justify="left")
     for heading in ("seed", "success", "distance", "time", "energy", "slip", "real time"):
@@ -314,7 +319,7 @@ def _table(results: Sequence[Episode], title: str) -> Table:
             f"{episode.time:.2f} s",
             f"{episode.energy:.0f} J",
             f"{episode.slip:.2%}",
-            f"{episode.real_time_factor:.0f} x",
+            _times(episode.real_time_factor),
         )
     if len(results) > 1:
         table.add_section()
@@ -322,13 +327,13 @@ def _table(results: Sequence[Episode], title: str) -> Table:
             "mean",
             f"{sum(episode.success for episode in results)} of {len(results)}",
             *(
-                form.format(np.mean([getattr(episode, name) for episode in results]))
+                form(np.mean([getattr(episode, name) for episode in results]))
                 for name, form in (
-                    ("distance", "{:.2f} m"),
-                    ("time", "{:.2f} s"),
-                    ("energy", "{:.0f} J"),
-                    ("slip", "{:.2%}"),
-                    ("real_time_factor", "{:.0f} x"),
+                    ("distance", "{:.2f} m".format),
+                    ("time", "{:.2f} s".format),
+                    ("energy", "{:.0f} J".format),
+                    ("slip", "{:.2%}".format),
+                    ("real_time_factor", _times),
                 )
             ),
         )

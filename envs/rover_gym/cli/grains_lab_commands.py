@@ -10,6 +10,7 @@ from rover_gym.cli.console import (
     AsJson,
     Results,
     Row,
+    one_line,
     plain_errors,
     progress_bar,
     row,
@@ -89,7 +90,10 @@ def plate(
     options = given.options
     number("sinkage", sinkage, above=0.0)
     bed = given.bed()
-    with status("pushing the plate"):
+    # `--depth` is the bed's.
+    told = {"depth": "--sinkage", "plate_friction": "--tool-friction"}
+    told |= {name: f"--{name}" for name in ("radius", "speed", "samples")}
+    with status("pushing the plate"), one_line(told):
         points = plate_test(
             bed,
             radius,

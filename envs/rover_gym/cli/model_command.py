@@ -10,7 +10,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table
+from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table, tidy
 from rover_gym.cli.options import complete_model
 from rover_gym.cli.paths import check_paths
 from rover_gym.cli.usage import WholeHelp
@@ -177,7 +177,7 @@ def _statics(statics: Statics) -> list[str]:
     is_bare = math.isinf(statics.clearance)
     turning = "" if math.isinf(statics.turning_radius) else f", radius from {statics.turning_radius:.3g} m"
     return [
-        f"at rest: roll {roll:.2f}°, pitch {pitch:.2f}°, largest velocity {statics.rest_speed:.1e}",
+        tidy(f"at rest: roll {roll:.2f}°, pitch {pitch:.2f}°, largest velocity {statics.rest_speed:.1e}"),
         f"wheelbase {statics.wheelbase:.4g} m, track {statics.track:.4g} m",
         f"clearance: {'no limit, since only wheels touch' if is_bare else f'{statics.clearance:.3g} m'}",
         f"turning centre: {statics.turning_centre}{turning}",

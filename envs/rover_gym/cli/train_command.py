@@ -26,8 +26,10 @@ from rover_gym.validation import refuse
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
 
-
 SEEDS = ("--seeds", "--seed")
+
+#: Optional packages that a training imports, from the extra `train` or, on a cluster, from `rllib`.
+NEEDED = ("yaml", "stable_baselines3", "tensorboard")
 
 #: Files of a run that a user may have named as an input.
 WRITTEN = (ARCS_FILE, f"best/{ARCS_FILE}", "config.yaml")
@@ -90,14 +92,14 @@ def train(
     'anywhere' trains for all rovers and grounds, 'longer' goes on with four million decisions, 'rocks' trains for the
     built-in rover among rocks in two CPU minutes.
 
-    Needs the extra `train`.
+    Needs the extra `train`, with `--ray` the extra `rllib`.
 
     Checkpoints, the learning curve (`curve.csv`), TensorBoard's events (`tensorboard`), the network at the end
     (`arcs.npz`) and the one that did best in the evaluations (`best`) are in the run's folder. A run is never
     overwritten. Several seeds end with a table.
     """
-    for package in ("yaml", "stable_baselines3", "tensorboard"):
-        require(package, "train")
+    for package in NEEDED:
+        require(package, "train" if ray is None else "rllib")
     if ray is not None:
         require("ray", "rllib")
     from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra

@@ -95,7 +95,7 @@ class ArcTraining:
         self.state: dict[str, Any] = {"rounds": 0, "decisions": 0, "cpu_seconds": 0.0, "best": -1.0}
         if resume:
             if not state_file.is_file():
-                refuse(OptionError, "resume", str(state_file), "is not there")
+                refuse(OptionError, "resume", str(folder), "no round has ended there: train without resuming")
             before = read_arc_config(folder / "config.yaml")
             if before.parsed() != config.parsed():
                 refuse(OptionError, "scenes", sorted(config.scenes), "must be those of the training that is to go on")

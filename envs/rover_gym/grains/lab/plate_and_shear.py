@@ -96,8 +96,11 @@ def plate_test(
     depth, speed = number("depth", depth, above=0.0), number("speed", speed, above=0.0)
     samples, friction = whole("samples", samples, at_least=1), number("plate_friction", plate_friction, at_least=0.0)
     surface, largest = bed.surface, 2.0 * float(bed.radius.max())
-    if depth > surface - 2.0 * largest:
-        most = surface - 2.0 * largest
+    most = surface - 2.0 * largest
+    if most <= 0.0:
+        reason = f"must be more than {2.0 * largest:.3g} m deep, two of its largest balls, for a plate: add balls"
+        refuse(OptionError, "bed", float(f"{surface:.3g}"), reason)
+    if depth > most:
         refuse(OptionError, "depth", depth, f"must be at most {most:.3g} m in this bed: two balls above its floor")
     top = clear_height(bed, 0.5 * bed.width, 0.5 * bed.depth, radius)
     way = top - surface + depth
