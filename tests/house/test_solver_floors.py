@@ -14,6 +14,7 @@ FLOORS = [
     {"local"},
     {"linear"},
     {"pivoting"},
+    {"batch"},
     {"scratch"},
     {"stage"},
     {"reference", "strategy"},

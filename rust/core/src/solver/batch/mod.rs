@@ -1,7 +1,7 @@
 //! The friction-contact problems of many machines at once, each in a lane of its own.
 //!
-//! - [`problem`]: a problem with `W` or with its factors; [`pattern`]: which velocities a contact of
-//!   a machine moves, so which entries of the factors are not zero;
+//! - [`problem`]: a problem with `W` or with its factors; [`pattern`]: which velocities a contact
+//!   of a machine moves, so which entries of the factors are not zero;
 //! - `blocks`: the linear system of a Newton step with the whole operator; `dry`: with joints that
 //!   rub, one unknown each; `velocities`, `tree_matrix`: set up in the machine's velocities;
 //!   `loaded`: how problems enter them;

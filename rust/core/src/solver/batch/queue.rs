@@ -16,7 +16,7 @@ use super::pattern::Pattern;
 use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_CONTACTS, MAX_DENSE, MAX_DRY, block};
 use crate::problem::Residual;
 use crate::scalar::Lane;
-use crate::solver::SolverOptions;
+use crate::solver::options::SolverOptions;
 
 pub use super::lane_solver::MAX_ITERATIONS;
 
