@@ -183,8 +183,8 @@ def test_overlays_show_what_the_rover_sees_and_those_of_a_planner_wait_for_one(l
         key(live.browser, "keydown", letter)
         frames(live.browser, 6)
     key(live.browser, "keydown", "p")
-    live.browser.execute_script("document.getElementById('message').style.visibility = '';")  # `picture` has hidden it
-    await_that(lambda: "choose scan" in text(live.browser, "message"), "the reason")
+    said = "return document.getElementById('message').textContent;"  # it is soon hidden again
+    await_that(lambda: "choose scan" in live.browser.execute_script(said), "the reason")
     choose(live.browser, "driver", "scan")
     await_that(lambda: not {"plan", "scan"} & set(live.browser.execute_script(grey)), "plan and scan")
     choose(live.browser, "driver", "hand")
