@@ -23,6 +23,7 @@ pub(super) struct Groups {
 
 /// What is known of a group.
 #[derive(Clone, Copy, Debug, Default)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub(super) struct Group {
     /// Number of its contacts.
     pub n_contacts: usize,
