@@ -14,7 +14,7 @@
 //!   e = 0 and Coulomb's law are homogeneous in the velocity, so both still hold. With restitution
 //!   the rebounds are slower than Newton's law says, which the report's residual contains.
 //! - Clusters that touch each other are judged together, and apart from all others
-//!   ([`super::groups`]): neither energies nor corrections of other groups count.
+//!   (`super::groups`): neither energies nor corrections of other groups count.
 //! - Where nothing outside touches a group only the motion relative to its mass centre is scaled,
 //!   so the linear momentum is kept. Contacts among its own parts feel relative velocities alone.
 //!   Free flight conserves energy too: without any contact s may be above 1.

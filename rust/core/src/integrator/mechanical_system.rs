@@ -138,7 +138,7 @@ pub trait MechanicalSystem {
     /// Current number of velocities.
     fn nv(&self) -> usize;
 
-    /// Number of clusters, see [`super::groups`]; by default the system is one.
+    /// Number of clusters, see `super::groups`; by default the system is one.
     fn n_clusters(&self) -> usize {
         1
     }

@@ -7,7 +7,7 @@
 //!
 //! A wheel lying flat touches with its whole rim. Two more rim points, 120 degrees to either side
 //! of the lowest, then support it. Their gap is `n·c + d + R |w| / 2`, so they come in continuously
-//! as the wheel tips over. Where `|w|` is below [`FLAT`], the first point is the end of the wheel's
+//! as the wheel tips over. Where `|w|` is below `FLAT`, the first point is the end of the wheel's
 //! spoke: the lowest point would run around the rim with every tremor, away from its own force.
 
 use nalgebra::Vector3;
