@@ -206,7 +206,10 @@ fn a_flat_shape_rests_half_over_an_edge_and_on_two_walls() {
 }
 
 /// Ignored because it takes minutes: `make test-all` runs it, and the test above, which always
-/// runs, has the supports where bodies fell through. It has not been seen to pass yet.
+/// runs, has the supports where bodies fell through. It fails in 13 cases: in ten a wheel that
+/// yields lies flat and trembles, since its lowest point runs from the force there; a drum falls
+/// from a corner 2 mm from its mass centre, as mesh and as map, and one slides whose rim is tangent
+/// to the walls' sides.
 #[test]
 #[ignore = "tests/physics/surfaces/supports.rs::a_flat_shape_rests_half_over_an_edge_and_on_two_walls"]
 fn every_flat_shape_rests_on_an_edge_two_walls_a_slot_a_corner_and_spikes() {

@@ -8,9 +8,15 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
 use crate::multibody::Mechanism;
+use crate::multibody::mechanism::BASE;
 use crate::multibody::model::Loop;
-use crate::solver::batch::pattern::Pattern;
+use crate::solver::batch::pattern::{self, Pattern};
 use crate::solver::batch::problem::MAX_CONTACTS;
+
+const _: () = assert!(
+    BASE == pattern::BASE,
+    "the solver's paths begin with a free root"
+);
 
 /// The clusters of a machine.
 #[derive(Clone, Debug, PartialEq)]
