@@ -70,6 +70,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         system.begin_balance(start);
         ws.v.copy_from_slice(start.v);
         let (mut report, is_settled) = settle(system, options, start, warm_start, ws, probe);
+        ws.leaves_open = false;
         let verdict = if is_settled {
             move_to_the_end(system, options, start, ws);
             close_end(system, ws, &mut report);
@@ -107,6 +108,9 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
 }
 
 /// Newton's iteration on the forces at the end of the step: its report, and whether it settled.
+///
+/// The loads that the motion leaves open are found in the last iterate alone, which the contraction
+/// so far predicts.
 fn settle<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -124,6 +128,7 @@ fn settle<S: MechanicalSystem>(
     let mut revisions = 0;
     let mut unsolved = 0;
     let mut last_change = f64::INFINITY;
+    ws.leaves_open = true;
     for iteration in 0..options.newton_max_iterations {
         let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe) else {
             break;
@@ -152,8 +157,16 @@ fn settle<S: MechanicalSystem>(
         // Converged, or as far as rounding allows: the change is small and no longer shrinks.
         let is_small = change <= options.newton_tolerance * size;
         let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
+        let expected = change * (change / last_change);
+        let left_open = ws.leaves_open && report.n_contacts > 0;
+        ws.leaves_open = last_change.is_infinite() || expected > options.newton_tolerance * size;
         last_change = change;
         if is_small || is_rounding {
+            let is_open = left_open && system.open_problem(&ws.q_free, &ws.mu).is_some();
+            if is_open && iteration + 1 < options.newton_max_iterations {
+                ws.leaves_open = false;
+                continue;
+            }
             if revisions < MOST_REVISIONS && system.revise(start, &ws.v) {
                 revisions += 1;
                 last_change = f64::INFINITY;

@@ -49,6 +49,8 @@ pub struct Scratch<Q, C> {
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
     pub(super) redundancy: Redundancy,
+    /// Whether impulses that the motion leaves open stay as the solver finds them.
+    pub(super) leaves_open: bool,
     pub(super) audited: Audited<Q>,
     /// Groups of touching clusters.
     pub(super) groups: Groups,
@@ -217,6 +219,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             u_position: room(),
             solver: SolverWorkspace::default(),
             redundancy: Redundancy::default(),
+            leaves_open: false,
             audited: Audited::new(q.clone(), nv),
             groups: Groups::default(),
             gyroscopic: Vec::new(),

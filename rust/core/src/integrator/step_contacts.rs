@@ -426,6 +426,7 @@ fn solve_problem<S: MechanicalSystem>(
     );
     ws.work_spent += solved.work;
     if solved.is_converged()
+        && !ws.leaves_open
         && let Some(problem) = system.open_problem(&ws.q_free, &ws.mu)
     {
         let tolerance = options.solver.tolerance;
@@ -509,8 +510,9 @@ pub(super) fn solve_group<S: MechanicalSystem>(
         Level::Velocity => 0.0,
         Level::Position(compliance) => compliance,
     };
-    let is_settled =
-        matches!(level, Level::Velocity) && system.open_problem(&ws.q_free, &ws.mu).is_some();
+    let is_settled = matches!(level, Level::Velocity)
+        && !ws.leaves_open
+        && system.open_problem(&ws.q_free, &ws.mu).is_some();
     let redundancy = is_settled.then_some(&mut ws.redundancy);
     let report = island.solve(
         &problem,

@@ -10,6 +10,9 @@ impl<T: Lane> Contacts<T> {
     /// Lanes in which a cluster leads its group.
     #[inline(always)]
     pub(super) fn leads(&self, cluster: usize) -> T::Mask {
+        if self.joined() == 0 {
+            return T::mask(self.token, u32::MAX >> (32 - T::LANES));
+        }
         let mut lanes = 0;
         for lane in 0..T::LANES {
             lanes |= u32::from(self.leader(cluster, lane) == cluster) << lane;
