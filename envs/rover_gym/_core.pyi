@@ -1120,6 +1120,7 @@ class StepReport:
     @property
     def energy_released(self) -> float:
         """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
+        The sum over a run is no more than they held at its start.
 
         Wheels are elastic if the model gives them a `stiffness`. The energy of their springs is
         part of neither the kinetic nor the potential energy. The wheel's force is constant over a

@@ -229,6 +229,25 @@ def test_both_ends_of_a_rigid_cylinder_share_its_load() -> None:
     assert np.abs(sim.wheel_forces - other.wheel_forces).max() < 1e-6 * weight
 
 
+def test_cylinders_that_fell_on_a_slope_bear_the_same_whatever_the_solver() -> None:
+    """From the impact on, some solvers kept an answer with wheels wedged against each other that slipped aside."""
+    description = RoverModel().replace(wheel_stiffness=0.0).to_dict()
+    for wheel in description["wheels"]:
+        wheel.update(width=0.08, stiffness=0.0)
+    model, ground = RoverModel.from_dict(description), slope(0.1, 0.25)
+    start = model.resting_pose(ground, (0.0, 0.0), 0.3)
+    start[1] += 0.01
+    forces = []
+    for solver in SOLVERS:
+        sim = Simulation(model, ground, friction=0.8, solver=solver)
+        sim.set_state(start)
+        report = sim.step(40)
+        assert report.status == "converged"
+        assert report.undetermined_loads == 12
+        forces.append(sim.wheel_forces)
+    assert np.ptp(forces, axis=0).max() < 1e-6 * 9.81 * model.mass
+
+
 def test_contacts_that_yield_are_determined() -> None:
     model = RoverModel.named("skid-steered")
     sim = Simulation(model)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym.mechanics import HeightField, RoverModel, Simulation
+from rover_gym.mechanics import HeightField, Plane, RoverModel, Simulation, SphereField
 
 RADIUS = 0.1
 
@@ -213,3 +213,23 @@ def test_readings_across_a_rover_that_turns_over_waves_seldom_stand_at_the_limit
             normal, along, across = sim.wheel_forces.T
             at_limit.append(np.hypot(along, across) > 0.699 * normal)
     assert np.mean(at_limit) < 0.2
+
+
+@pytest.mark.parametrize("variant", ["linearised", "newton"])
+@pytest.mark.parametrize("restitution", [0.0, 0.7])
+def test_wheels_that_are_thrown_onto_rocks_give_off_no_more_than_they_took(restitution: float, variant: str) -> None:
+    """A rebound's impulse became a deflection, and wheels gave off a sixth of the energy of a tumbling rover."""
+    rng = np.random.default_rng(5)
+    for _ in range(6):
+        rocks = SphereField(rng.uniform((-2, -0.3, -2), (2, 0.1, 2), (40, 3)), rng.uniform(0.05, 0.3, 40), Plane())
+        step = float(rng.choice([2e-3, 5e-3, 2e-2]))
+        sim = Simulation(terrain=rocks, restitution=restitution, time_step=step, variant=variant)
+        q, v = np.zeros(sim.model.nq), np.zeros(sim.model.nv)
+        q[1], v[:6] = 1.0, rng.normal(0.0, 3.0, 6)
+        v[1] = -1.0
+        sim.set_state(q, v)
+        most = sim.energy().total
+        given = np.cumsum([sim.step().energy_released for _ in range(int(1.0 / step))])
+        assert given.max() <= 1e-12 * most
+        # A wheel that bounces does not yield.
+        assert restitution > 0.0 or given.min() < -1e-3

@@ -264,8 +264,8 @@ def test_a_commercial_vehicle_drives_and_turns_over_rocks(tmp_path, name):
     assert sim.q[0] > 3.5
     heading = sim.q[4]
     sim.set_wheel_torques(torques(model, -1e4, 1e4))
-    assert sim.step(80).is_converged
-    assert sim.q[4] - heading > 0.5
+    assert sim.step(200).is_converged
+    assert sim.q[4] - heading > 0.7  # it stands on a few rocks: how fast it turns depends on which
     assert sim.deepest_overlap > -2e-3
 
 

@@ -31,6 +31,7 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::carried_velocity::Carried;
+use super::elastic_energy::{find_stored, find_stored_after, held};
 use super::excess::{Balance, Excess};
 use super::groups::Group;
 use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
@@ -39,7 +40,7 @@ use super::report::StepReport;
 use super::scratch::ScratchOf;
 use super::step_contacts::{contact_work, place};
 use super::warm_start::WarmStart;
-use super::work::{Ledger, Work};
+use super::work::Ledger;
 use crate::scalar::Vec3;
 
 /// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
@@ -110,11 +111,13 @@ impl<F: Fn(&Group) -> bool> Audit<F> {
         report: &mut StepReport,
     ) -> Verdict {
         system.normalise(&mut ws.end);
+        ws.elastic.iter_mut().for_each(Vec::clear);
         if ws.before.is_empty() {
             system.work(options, start, &ws.v, &mut ws.work);
             return Verdict::Sound;
         }
         ws.audited.energies.clear();
+        find_stored(system, options, warm_start, ws);
         weigh(system, options, start, ws);
         let mut verdict = Verdict::Sound;
         let mut judged = std::mem::take(&mut ws.judged);
@@ -211,7 +214,7 @@ impl<F: Fn(&Group) -> bool> Audit<F> {
                 shorten(system, ws, share, number);
             }
             if excess.is_left(self.gain) {
-                found.work = hold_back(system, options, start, ws, number);
+                hold_back(system, options, start, ws, (number, &mut *found));
             }
         }
         GroupVerdict::Corrected
@@ -235,14 +238,15 @@ enum GroupVerdict {
 ///
 /// Something stopped such a step before its end: the machine jammed while the actuators' work was
 /// counted to the end, or a contact closed on its way up. The largest fraction σ of the
-/// displacement that the energy allows is kept; σ = 0 is always allowed. Returns the work over it.
+/// displacement that the energy allows is kept; σ = 0 is always allowed. The work and what contacts
+/// that yield give off are those over it.
 fn hold_back<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
     ws: &mut ScratchOf<S>,
-    number: usize,
-) -> Work {
+    (number, found): (usize, &mut Balance),
+) {
     let before = ws.groups.energy(&ws.before, number);
     let (h, theta) = (options.time_step, options.theta);
     let d = S::DIMENSION.components();
@@ -256,7 +260,7 @@ fn hold_back<S: MechanicalSystem>(
     for k in 0..MOST_SHORTENINGS {
         system.energies(options, &ws.end, &ws.v, &mut ws.after);
         let after = ws.groups.energy(&ws.after, number);
-        let excess = after.above(&before) - share * work.total();
+        let excess = after.above(&before) - share * (work.total() + found.released);
         if excess <= 0.0 {
             break;
         }
@@ -281,7 +285,37 @@ fn hold_back<S: MechanicalSystem>(
         system.normalise(&mut ws.end);
         ws.return_ends(system, |own, _| own != number);
     }
-    work.times(share)
+    found.work = work.times(share);
+    found.released *= share;
+    let [before, after] = &mut ws.elastic;
+    for (cluster, (before, after)) in before.iter().zip(after).enumerate() {
+        if ws.groups.of_cluster(cluster) == number {
+            *after = share * *after + (1.0 - share) * before;
+        }
+    }
+    relax::<S>(options, ws, number);
+}
+
+/// Lowers the impulses of a group's contacts that yield until the deflections which they say are
+/// those of the energy stored. More would push the machine again in the next step, and it would be
+/// held back for ever.
+fn relax<S: MechanicalSystem>(options: &StepOptions, ws: &mut ScratchOf<S>, number: usize) {
+    let d = S::DIMENSION.components();
+    let is_own =
+        |ws: &ScratchOf<S>, i: usize| ws.groups.of_contact(i) == number && ws.yielding[i].is_soft();
+    let own = (0..ws.yielding.len()).filter(|i| is_own(ws, *i));
+    let said: f64 = own.map(|i| held::<S>(options, ws, i).before).sum();
+    let share = (ws.groups.sum(&ws.elastic[0], number) / said)
+        .sqrt()
+        .min(1.0);
+    for i in 0..ws.yielding.len() {
+        if is_own(ws, i) {
+            let mut p = [0.0; 3];
+            p[..d].copy_from_slice(&ws.p[d * i..][..d]);
+            p = ws.yielding[i].relaxed(options.time_step, share, p);
+            ws.p[d * i..][..d].copy_from_slice(&p[..d]);
+        }
+    }
 }
 
 /// Carries the velocity `ws.v` of each group that a projection displaced, by its part of `ws.dv`,
@@ -354,7 +388,8 @@ fn balance<S: MechanicalSystem>(
     let before = ws.groups.energy(&ws.before, number);
     let after = ws.groups.energy(&ws.after, number);
     let work = ws.groups.sum(&ws.work, number);
-    let released = supplied_by_contacts::<S>(options, ws, number);
+    let [start, end] = (ws.elastic.each_ref()).map(|all| ws.groups.sum(all, number));
+    let released = start - end;
     let both = |energy: &MechanicalEnergy| [energy.kinetic, energy.potential];
     let fall = options.gravity.norm() * options.time_step;
     let ends = [both(&before), both(&after)];
@@ -373,25 +408,8 @@ fn balance<S: MechanicalSystem>(
     }
 }
 
-/// Energy that the step may gain by contacts of a group that yield, J.
-fn supplied_by_contacts<S: MechanicalSystem>(
-    options: &StepOptions,
-    ws: &ScratchOf<S>,
-    number: usize,
-) -> f64 {
-    let d = S::DIMENSION.components();
-    let laws = ws.yielding.iter().enumerate();
-    laws.filter(|(i, law)| law.is_soft() && ws.groups.of_contact(*i) == number)
-        .map(|(i, law)| {
-            let mut p = [0.0; 3];
-            p[..d].copy_from_slice(&ws.p[d * i..][..d]);
-            law.supplied(options.time_step, [ws.u_before[d * i], ws.u[d * i]], p)
-        })
-        .sum()
-}
-
-/// The same, after the velocity of the group and its displacement are shortened while the excess is
-/// a large part of the kinetic energy.
+/// The balance, after the velocity of the group and its displacement are shortened while the excess
+/// is a large part of the kinetic energy.
 fn shortened_balance<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -421,6 +439,7 @@ fn shortened_balance<S: MechanicalSystem>(
             }
         }
         weigh(system, options, start, ws);
+        find_stored_after(system, options, ws, number);
         found = balance::<S>(options, ws, number);
     }
     found

@@ -43,6 +43,7 @@
 pub mod accuracy;
 pub(crate) mod carried_velocity;
 pub mod contact_modes;
+mod elastic_energy;
 pub mod energy_audit;
 pub mod error;
 pub(crate) mod excess;

@@ -419,6 +419,8 @@ pub(super) fn finish<S: MechanicalSystem>(
     *time += options.time_step;
     let is_persistent = note_persistent::<S>(ws);
     warm_start.remember(&ws.contacts, d, &ws.p);
+    warm_start.forget(&ws.bounces);
+    warm_start.stored.clone_from(&ws.elastic[1]);
     warm_start.persistent.clear();
     if is_persistent {
         warm_start.persistent.resize(system.nv(), 0.0);

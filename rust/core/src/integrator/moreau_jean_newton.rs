@@ -110,7 +110,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
 /// Newton's iteration on the forces at the end of the step: its report, and whether it settled.
 ///
 /// The loads that the motion leaves open are found in the last iterate alone, which the contraction
-/// so far predicts.
+/// so far predicts, or which is the last one allowed.
 fn settle<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -128,7 +128,7 @@ fn settle<S: MechanicalSystem>(
     let mut revisions = 0;
     let mut unsolved = 0;
     let mut last_change = f64::INFINITY;
-    ws.leaves_open = true;
+    ws.leaves_open = options.newton_max_iterations > 1;
     for iteration in 0..options.newton_max_iterations {
         let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe) else {
             break;
@@ -159,7 +159,8 @@ fn settle<S: MechanicalSystem>(
         let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
         let expected = change * (change / last_change);
         let left_open = ws.leaves_open && report.n_contacts > 0;
-        ws.leaves_open = last_change.is_infinite() || expected > options.newton_tolerance * size;
+        let will_end = last_change.is_finite() && expected <= options.newton_tolerance * size;
+        ws.leaves_open = !will_end && iteration + 2 < options.newton_max_iterations;
         last_change = change;
         if is_small || is_rounding {
             let is_open = left_open && system.open_problem(&ws.q_free, &ws.mu).is_some();

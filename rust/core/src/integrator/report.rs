@@ -70,7 +70,8 @@ pub struct StepReport {
     /// contacts that persist. 0 among grains and planar soils, which are not audited.
     pub energy_lost: f64,
     /// Energy that contacts which yield gave off, all steps together, J; negative where they stored
-    /// some. See [`crate::law::compliance::Yielding::supplied`].
+    /// some. What they hold is remembered, so the sum over any run is no more than they held at its
+    /// start. See [`crate::law::compliance::Held`].
     pub energy_released: f64,
     /// Energy that position projection added against gravity and springs, beyond the actuators'
     /// work on the way, all steps together, J.

@@ -36,6 +36,10 @@ pub struct Scratch<Q, C> {
     pub(super) mu: Vec<f64>,
     /// Law of each contact along its normal; empty if all are rigid.
     pub(super) yielding: Vec<Yielding>,
+    /// Contacts that would yield and bounce; empty where nothing yields.
+    pub(super) bounces: Vec<bool>,
+    /// Energy in contacts that yield before and after the step, as [`WarmStart::stored`].
+    pub(super) elastic: [Vec<f64>; 2],
     pub(super) p: Vec<f64>,
     pub(super) p_last: Vec<f64>,
     pub(super) u: Vec<f64>,
@@ -208,6 +212,8 @@ impl<Q: Clone, C> Scratch<Q, C> {
             q_free: room(),
             mu: Vec::with_capacity(n),
             yielding: Vec::new(),
+            bounces: Vec::new(),
+            elastic: [Vec::new(), Vec::new()],
             p: room(),
             p_last: room(),
             u: room(),
@@ -241,6 +247,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
     /// `n`: clusters.
     pub(super) fn fit(&mut self, nv: usize, n: usize) {
         self.work_spent = 0;
+        self.leaves_open = false; // a panic may have left it
         self.island.begin(n);
         self.work.resize(n, Work::default());
         for stored in &mut self.stored {

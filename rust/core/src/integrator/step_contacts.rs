@@ -157,6 +157,7 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
     system.assemble(&ws.contacts, v_before, &mut ws.u_before);
     let yields = system.compliant_mass(0).is_some();
     ws.yielding.clear();
+    ws.bounces.clear();
     warm_start.recall(&ws.contacts, d, &mut ws.p);
     if yields {
         yield_under_load(system, options, warm_start, ws);
@@ -169,6 +170,7 @@ pub(super) fn assemble_contacts<S: MechanicalSystem>(
 /// Where a cluster remembers no contact, each of its contacts may bear its weight.
 ///
 /// A contact with restitution is rigid in the step in which it closes, and Newton's law bounces it.
+/// Its impulse says nothing of a deflection: `ws.bounces`, it is not remembered.
 fn yield_under_load<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -184,8 +186,9 @@ fn yield_under_load<S: MechanicalSystem>(
         before[..d].copy_from_slice(&ws.p[d * i..][..d]);
         let is_new = before[0] == 0.0;
         let bounces = is_new && system.normal_shift(options, contact, 1.0) > 0.0;
-        let compliance = system.compliance(contact, &ws.v).filter(|_| !bounces);
-        let law = compliance.map(|compliance| {
+        let compliance = system.compliance(contact, &ws.v);
+        ws.bounces.push(bounces && compliance.is_some());
+        let law = compliance.filter(|_| !bounces).map(|compliance| {
             let [cluster, _] = system.clusters_of(&contact.key());
             let mut known = warm_start.impulses.iter();
             let is_known = known.any(|(key, _)| system.clusters_of(key).contains(&cluster));

@@ -18,6 +18,9 @@ pub struct WarmStart<K = ContactKey> {
     /// velocities of a group of clusters of which a contact was new, separated or in impact, and
     /// empty if no group persisted.
     pub persistent: Vec<f64>,
+    /// Energy that contacts which yield stored at the end of the last step, J, by cluster; that
+    /// between two stands at the first of their group. Empty if it is not known.
+    pub stored: Vec<f64>,
 }
 
 impl<K> Default for WarmStart<K> {
@@ -33,6 +36,7 @@ impl<K> WarmStart<K> {
         Self {
             impulses: Vec::with_capacity(n_contacts),
             persistent: Vec::with_capacity(nv),
+            stored: Vec::new(),
         }
     }
 
@@ -48,6 +52,7 @@ impl<K> WarmStart<K> {
     pub fn clear(&mut self) {
         self.impulses.clear();
         self.persistent.clear();
+        self.stored.clear();
     }
 }
 
@@ -105,6 +110,14 @@ impl<K: Copy + Ord> WarmStart<K> {
             (c.key(), impulse)
         });
         self.impulses.extend(remembered);
+    }
+
+    /// Forgets the impulses of some contacts, in the order of detection.
+    pub(super) fn forget(&mut self, which: &[bool]) {
+        let forgotten = self.impulses.iter_mut().zip(which);
+        for ((_, p), _) in forgotten.filter(|(_, which)| **which) {
+            *p = [0.0; 3];
+        }
     }
 }
 

@@ -76,7 +76,8 @@ impl<T: Lane> Yields<T> {
             let wheel = machine.wheels.get(w)?; // none of a stop or a spare slot
             let tread = wheel.tread?;
             let parts = (wheel.body, wheel.axle, wheel.radius);
-            Some(tread.rolling(poses.travel(machine, parts, |k| v[k])))
+            let n = contacts.slot(slot).n;
+            Some(tread.rolling(poses.rolling(machine, parts, n, |k| v[k])))
         };
         let mut spring = of(contacts.part(slot));
         if spring.is_some() {
@@ -120,23 +121,25 @@ impl<T: Lane> Yields<T> {
         }
     }
 
-    /// Energy that the contacts of each cluster give off in a step of `h`, J, added to `out`; see
-    /// [`crate::integrator::energy_audit`].
+    /// What the contacts of each cluster hold over a `step`, its length (s) and the scheme's θ,
+    /// added to `out`, J; see [`crate::integrator::energy_audit`].
     #[inline(always)]
-    pub fn supplied(
+    pub fn held(
         &self,
         contacts: &Contacts<T>,
-        h: T,
+        step: (T, T),
         p: &[Triple<T>],
-        u: &[Triple<T>],
-        u_before: &[Triple<T>],
-        out: &mut [T],
+        [u_before, u]: [&[Triple<T>]; 2],
+        out: [&mut [T]; 3],
     ) {
+        let [before, most, given] = out;
         for &slot in contacts.used().iter().filter(|_| !self.is_empty()) {
             let law = &self.laws[slot];
-            let given = law.supplied(h, [u_before[slot][0], u[slot][0]], p[slot]);
-            let given = T::select(law.is_soft(), given, self.zero);
-            contacts.add(slot, given, out);
+            let own = law.held(step, [u_before[slot], u[slot]], p[slot]);
+            let only = |x: T| T::select(law.is_soft(), x, self.zero);
+            contacts.add(slot, only(own.before), before);
+            contacts.add(slot, only(own.most), most);
+            contacts.add(slot, only(own.given), given);
         }
     }
 }

@@ -52,13 +52,19 @@ pub struct Tread {
 }
 
 impl Tread {
-    /// The contact of a wheel that travels at a speed V (m/s) over its tread.
+    /// The contact of a wheel that travels at a speed V (m/s) over its tread; `lean`: squared
+    /// cosine of the angle between its axle and the contact's normal.
+    ///
+    /// A tread yields along its radius, of whose deflection and force the normal sees the sine: it
+    /// is stiffer by 1/sin², and a wheel that lies flat is all but rigid.
     #[inline(always)]
     #[must_use]
-    pub fn rolling<T: Lane>(&self, travel: T) -> Compliance<T> {
+    pub fn rolling<T: Lane>(&self, [travel, lean]: [T; 2]) -> Compliance<T> {
+        let one = travel.like(1.0);
+        let upright = one / (one - lean).max(travel.like(LYING));
         Compliance {
-            stiffness: travel.like(self.stiffness),
-            damping: travel.like(self.damping),
+            stiffness: travel.like(self.stiffness) * upright,
+            damping: travel.like(self.damping) * upright,
             tangential: travel.like(self.tangential_ratio * self.stiffness),
             fading: travel * travel.like(1.0 / self.relaxation_length),
             slack: travel.like(SLACK * self.radius),
@@ -94,15 +100,44 @@ pub struct Yielding<T = f64> {
     pub unexplained: T,
     /// k, N/m.
     stiffness: T,
-    /// 1/(h² k_T), 1/kg; 0 where the last step is not known.
+    /// 1/(h² k_T), 1/kg; and that of the last step's force, 0 where it is not known.
+    spring: T,
     tangential: T,
     /// Tangential impulse at the start, N s.
     friction: [T; 2],
+    /// Normal impulse at the start, N s.
+    load: T,
+    /// Deflection at the start of the step, m.
+    start: T,
+}
+
+/// What the springs of contacts hold over a step, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Held<T = f64> {
+    /// At its start, if nothing else says it.
+    pub before: T,
+    /// The most that they may hold at its end.
+    pub most: T,
+    /// What they gave: work of the impulse, and what slip took.
+    pub given: T,
+}
+
+impl<T: Lane> Held<T> {
+    /// At the end, if they held `before` at the start: what they did not give, no less than nothing
+    /// and no more than the deflection says.
+    #[inline(always)]
+    #[must_use]
+    pub fn after(&self, before: T) -> T {
+        (before - self.given).min(self.most).max(before.like(0.0))
+    }
 }
 
 /// Deflection that counts as elastic whatever the forces, as a share of the wheel's radius: 1e-6 m
 /// for the built-in rover's wheels.
 const SLACK: f64 = 1e-5;
+
+/// Least squared sine of the angle between a wheel's axle and the normal for its stiffness.
+const LYING: f64 = 1e-4;
 
 /// Share of the spring along the surface that acts where the last step is not known and the contact
 /// hardly rolls. It makes loads unique; a rover parked across a slope of 10 degrees creeps by 0.1
@@ -185,6 +220,9 @@ impl<T: Lane> Compliance<T> {
         let by_force = (force + damping * u_N).max(zero).min(force) / stiffness;
         let elastic = (h.like(2.0) * deflection).min(by_force);
         let known = gap.max(-(elastic + slack));
+        let pressed = weight / (h * stiffness);
+        let start = ((one - theta) * moved - known).max(zero);
+        let start = T::select(unknown, start.min(pressed.max(-known)), start);
         let weight = h * stiffness + damping;
         let diagonal = one / (h * weight);
         // The damper acts on the deflection, which begins when the gap is closed.
@@ -210,8 +248,11 @@ impl<T: Lane> Compliance<T> {
             gap: known,
             unexplained: gap - known,
             stiffness,
+            spring,
             tangential,
             friction,
+            load: force * h,
+            start,
         }
     }
 }
@@ -226,8 +267,11 @@ impl<T: Lane> Yielding<T> {
             gap: zero,
             unexplained: zero,
             stiffness: zero,
+            spring: zero,
             tangential: zero,
             friction: [zero; 2],
+            load: zero,
+            start: zero,
         }
     }
 
@@ -249,8 +293,11 @@ impl<T: Lane> Yielding<T> {
             gap: only(self.gap),
             unexplained: only(self.unexplained),
             stiffness: only(self.stiffness),
+            spring: only(self.spring),
             tangential: only(self.tangential),
             friction: self.friction.map(only),
+            load: only(self.load),
+            start: only(self.start),
         }
     }
 
@@ -272,23 +319,47 @@ impl<T: Lane> Yielding<T> {
         slip - (self.diagonal[1] - self.tangential) * (p[1] * p[1] + p[2] * p[2])
     }
 
-    /// Energy that a step of `h` may gain by the contact, J. `u_N`: normal velocities before and
-    /// after; `p`: impulse.
+    /// What the springs hold over a step of `h` with the scheme's θ. `u`: velocities before and
+    /// after; `p`: impulse, N s.
     ///
-    /// It is what the springs give off, negative where they store energy. The normal force is that
-    /// at the end of the step and acts over all of it: where it does more work, `p_N (u_N + u_N⁺) /
-    /// 2`, that counts. What leaves the contact with the tread is not given off.
+    /// The energy at the start is a function of the pose that the law begins with. The law's own
+    /// deflection at the end leads the pose by `(1 − θ) h u⁺`, and the springs may hold what either
+    /// says. The deflection along the surface is that of `p_T`, or where it grows evenly over the
+    /// step that of `θ p_T + (1 − θ) p_T⁻`. A contact without a force holds nothing. Where the last
+    /// step is not known, the force along the surface was the same part of the load.
     #[inline(always)]
     #[must_use]
-    pub fn supplied(&self, h: T, u_N: [T; 2], p: [T; 3]) -> T {
+    pub fn held(&self, (h, theta): (T, T), u: [[T; 3]; 2], p: [T; 3]) -> Held<T> {
         let (zero, half) = (h.like(0.0), h.like(0.5));
-        let before = self.gap.min(zero);
-        let after = (self.gap + h * u_N[1]).min(zero);
-        let released = half * self.stiffness * (before * before - after * after);
-        let work = half * p[0] * (u_N[0] + u_N[1]);
-        let [t, b] = self.friction;
-        let sheared = (t * t + b * b) - (p[1] * p[1] + p[2] * p[2]);
-        released.max(work) + half * self.tangential * sheared
+        let is_known = zero.lt(self.tangential);
+        let moved = h * u[1][0];
+        let deepest = (-(self.gap + moved))
+            .max(-(self.gap + theta * moved))
+            .max(zero);
+        let mut before = self.stiffness * self.start * self.start;
+        let mut most = self.stiffness * deepest * deepest;
+        let share = (self.load / p[0].max(h.like(f64::MIN_POSITIVE))).min(h.like(1.0));
+        for (last, force) in self.friction.iter().zip([p[1], p[2]]) {
+            let last = T::select(is_known, *last, share * force);
+            let after = last + theta * (force - last);
+            before += self.spring * last * last;
+            most += self.spring * (after * after).max(force * force);
+        }
+        let work = |k: usize| p[k] * (u[0][k] + u[1][k]);
+        let work = half * ((work(0) + work(1)) + work(2));
+        Held {
+            before: half * before,
+            most: T::select(zero.lt(p[0]), half * most, zero),
+            given: work - self.slip_work(u[1], p),
+        }
+    }
+
+    /// The impulse `p` of a step of `h`, at most that of a `share` of the deflection at its start.
+    #[must_use]
+    pub fn relaxed(&self, h: T, share: T, p: [T; 3]) -> [T; 3] {
+        let zero = h.like(0.0);
+        let pressed = h * self.stiffness * (-self.gap).max(zero);
+        [share * p[0].min(pressed), share * p[1], share * p[2]]
     }
 }
 
@@ -311,7 +382,7 @@ mod tests {
         let gap = -load / TREAD.stiffness;
         let before = [load * h, before[0], before[1]];
         TREAD
-            .rolling(travel)
+            .rolling([travel, 0.0])
             .over((h, 0.5), gap, 0.0, before, (false, 0.0))
     }
 
@@ -359,7 +430,7 @@ mod tests {
     #[test]
     fn without_a_last_step_a_wheel_is_in_steady_rolling() {
         let (travel, h, u) = (0.8, 5e-3, [1e-3, 0.0]);
-        let spring = TREAD.rolling(travel);
+        let spring = TREAD.rolling([travel, 0.0]);
         let law = spring.over((h, 0.5), -2e-4, 0.0, [0.0; 3], (true, 1.0));
         let stiffness = TREAD.stiffness * TREAD.tangential_ratio * TREAD.relaxation_length;
         let p = sticking(&law, u);
@@ -368,7 +439,7 @@ mod tests {
 
     #[test]
     fn two_equal_sides_yield_twice_as_much() {
-        let own: Compliance = TREAD.rolling(0.3);
+        let own: Compliance = TREAD.rolling([0.3, 0.0]);
         let both = Compliance::in_series(Some(own), Some(own)).unwrap();
         assert!((both.stiffness / own.stiffness - 0.5).abs() < 1e-15);
         assert!((both.tangential / own.tangential - 0.5).abs() < 1e-15);
@@ -393,7 +464,9 @@ mod tests {
             let [t, b] = sticking(&law, u);
             let p = [0.0, t, b];
             let taken = -(t * u[0] + b * u[1]);
-            let stored = -law.supplied(h, [0.0, 0.0], p);
+            let spring = 1.0 / (h * h * TREAD.tangential_ratio * TREAD.stiffness);
+            let energy = |p: [f64; 2]| 0.5 * spring * (p[0] * p[0] + p[1] * p[1]);
+            let stored = energy([t, b]) - energy(before);
             let booked = -law.slip_work([0.0, u[0], u[1]], p);
             let size = taken.abs() + stored.abs() + booked.abs();
             prop_assert!(booked >= -1e-12 * size);

@@ -41,15 +41,17 @@ pub struct Pose<T> {
 }
 
 impl<T: Lane> Poses<T> {
-    /// Speed at which a wheel's point of contact travels over its tread, R |ω·s|, m/s. `wheel`: its
-    /// body, its unit axle in the body's frame, its radius, m; `v`: each velocity.
+    /// Speed at which a wheel's point of contact travels over its tread, R |ω·s|, m/s, and (s·n)²
+    /// with the contact's normal n. `wheel`: its body, its unit axle s in the body's frame, its
+    /// radius, m; `v`: each velocity.
     #[inline(always)]
-    pub(crate) fn travel(
+    pub(crate) fn rolling(
         &self,
         mechanism: &Mechanism,
         (body, axle, radius): (usize, [f64; 3], f64),
+        n: Vec3<T>,
         v: impl Fn(usize) -> T,
-    ) -> T {
+    ) -> [T; 2] {
         let s = self.bodies[body].R.times_shared(axle);
         let mut spin = match mechanism.base_of(body) {
             Some(first) => Vec3::new(v(first + 3), v(first + 4), v(first + 5)).dot(s),
@@ -58,7 +60,8 @@ impl<T: Lane> Poses<T> {
         for mover in mechanism.movers(body) {
             spin += self.motions[mover.motion].axis.dot(s) * v(mover.velocity);
         }
-        spin.abs() * s.x.like(radius)
+        let lean = s.dot(n);
+        [spin.abs() * s.x.like(radius), lean * lean]
     }
 
     /// Room for a mechanism.

@@ -58,7 +58,7 @@ pub(crate) use operator::{Storage, dot};
 pub(crate) use passivity::passive_share;
 pub(crate) use prepared::{Prepared, Proximal};
 pub use redundancy::undetermined_loads;
-pub(crate) use redundancy::{Answered, Redundancy};
+pub(crate) use redundancy::{Answered, Redundancy, Settled};
 pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
 pub use residual::{Residual, evaluate, evaluate_into};
 pub use rolling::RollingContact;

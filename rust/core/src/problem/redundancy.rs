@@ -18,7 +18,8 @@
 //!
 //! - [`Redundancy::settle`] replaces an answer by the least one: an elimination with the largest
 //!   pivots finds N, a projection the least y. Only if that leaves a cone, Newton's method on the
-//!   dual problem follows (Qi and Sun 1993).
+//!   dual problem follows (Qi and Sun 1993). An answer that creeps where another one rests gives
+//!   way to it.
 //! - [`Redundancy::settle_problem`] does so for all groups of contacts of a problem.
 //! - [`undetermined_loads`] counts the contacts concerned.
 //!
@@ -58,6 +59,17 @@ pub(crate) struct Answered<'a, B: Fn(usize, usize) -> [f64; 9]> {
     pub u: &'a [f64],
     /// Speed up to which a contact is at rest: what the tolerance leaves, m/s.
     pub still: f64,
+}
+
+/// What has become of an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Settled {
+    /// Its impulses are determined by the motion.
+    Unchanged,
+    /// The least impulses of the same motion.
+    Least,
+    /// The least impulses of another answer: its contacts all have the velocity 0.
+    AtRest,
 }
 
 /// Finds impulses that the motion leaves open; memory for it.
@@ -117,17 +129,23 @@ fn subtract_fixed<const N: usize>(x: &mut [f64], factor: f64, y: &[f64]) {
 
 impl Redundancy {
     /// Replaces the impulses `p` by the least ones that cause the same motion. Contacts outside
-    /// `contacts` keep theirs. True if some were open.
+    /// `contacts` keep theirs.
+    ///
+    /// Where contacts creep, the problem may have another answer in which all of them rest. That is
+    /// taken: a machine at rest stays there whatever the solver and its start.
     #[inline(always)]
     pub(crate) fn settle<B: Fn(usize, usize) -> [f64; 9]>(
         &mut self,
         answered: &Answered<'_, B>,
         contacts: impl Iterator<Item = usize> + Clone,
         p: &mut [f64],
-    ) -> bool {
-        self.find(answered, contacts, p);
+    ) -> Settled {
+        if creep(answered, contacts.clone(), p) && self.rest(answered, contacts.clone(), p) {
+            return Settled::AtRest;
+        }
+        self.find(answered, contacts, p, false);
         if self.open.is_empty() {
-            return false;
+            return Settled::Unchanged;
         }
         self.read(answered.d, p);
         self.project();
@@ -135,6 +153,56 @@ impl Redundancy {
             self.stay_within(answered.d);
         }
         self.write(answered.d, p);
+        Settled::Least
+    }
+
+    /// Replaces the impulses `p` by the least ones under which all contacts rest, if these are open
+    /// and within the cones.
+    #[cold]
+    fn rest<B: Fn(usize, usize) -> [f64; 9]>(
+        &mut self,
+        answered: &Answered<'_, B>,
+        contacts: impl Iterator<Item = usize> + Clone,
+        p: &mut [f64],
+    ) -> bool {
+        let (d, still) = (answered.d, answered.still);
+        self.find(answered, contacts, p, true);
+        if self.open.is_empty() || self.touching.iter().any(|own| own.kind != Kind::Rests) {
+            return false;
+        }
+        self.read(d, p);
+        // The impulses by unknowns with a pivot that end the creep: C' W C y = -u.
+        self.assemble(answered);
+        let (stride, rank) = (stride(self.n), self.pivots.len());
+        let (row, t) = (&mut self.row, &mut self.t);
+        row.clear();
+        t.clear();
+        for &i in &self.pivots {
+            row.extend(self.pivots.iter().map(|j| self.A[i * stride + j]));
+            t.push(-answered.u[d * self.touching[i / d].contact + i % d]);
+        }
+        cholesky(row, rank);
+        forward(row, rank, t);
+        backward(row, rank, t);
+        for (change, &pivot) in t.iter().zip(&self.pivots) {
+            self.start[pivot] += change;
+        }
+        let is_met = self.open.iter().all(|&i| {
+            let change = t.iter().zip(&self.pivots);
+            let change: f64 = change.map(|(t, j)| self.A[i * stride + j] * t).sum();
+            (answered.u[d * self.touching[i / d].contact + i % d] + change).abs() <= still
+        });
+        if !is_met {
+            return false;
+        }
+        self.project();
+        if !self.is_within(d) {
+            self.stay_within(d);
+            if !self.is_within(d) {
+                return false;
+            }
+        }
+        self.write(d, p);
         true
     }
 
@@ -145,7 +213,7 @@ impl Redundancy {
         contacts: impl Iterator<Item = usize> + Clone,
         p: &[f64],
     ) -> usize {
-        self.find(answered, contacts, p);
+        self.find(answered, contacts, p, false);
         let (n, rank) = (self.n, self.pivots.len());
         let mut is_open = vec![false; n];
         for (f, &open) in self.open.iter().enumerate() {
@@ -159,7 +227,7 @@ impl Redundancy {
         self.touching.iter().zip(ends).filter(open).count()
     }
 
-    /// Finds the null vectors of the contacts that may bear something.
+    /// Finds the null vectors of the contacts that may bear something; `rests`: as if none slid.
     #[inline(always)]
     #[allow(clippy::needless_pass_by_value)] // an iterator that is cloned
     fn find<B: Fn(usize, usize) -> [f64; 9]>(
@@ -167,6 +235,7 @@ impl Redundancy {
         answered: &Answered<'_, B>,
         contacts: impl Iterator<Item = usize> + Clone,
         p: &[f64],
+        rests: bool,
     ) {
         let Answered {
             d, mu, u, still, ..
@@ -193,7 +262,7 @@ impl Redundancy {
             let slip = (own[1..].iter().map(|u| u * u).sum::<f64>()).sqrt();
             let kind = if mu[i] == 0.0 {
                 Kind::Slides([1.0, 0.0, 0.0])
-            } else if slip > still {
+            } else if slip > still && !(rests && !is_joint) {
                 if is_joint {
                     continue;
                 }
@@ -526,6 +595,26 @@ impl Touching {
     }
 }
 
+/// Whether contacts slide, but no faster than a tenth of the speed that the largest impulse stops,
+/// and none parts.
+#[inline(always)]
+fn creep<B: Fn(usize, usize) -> [f64; 9]>(
+    answered: &Answered<'_, B>,
+    contacts: impl Iterator<Item = usize>,
+    p: &[f64],
+) -> bool {
+    const SLOW: f64 = 0.1;
+    let Answered { d, u, still, .. } = *answered;
+    let (mut fastest, mut parts, mut stopped) = (0.0_f64, false, 0.0_f64);
+    for i in contacts {
+        let own = &u[d * i..][..d];
+        parts |= own[0] > still;
+        fastest = fastest.max(own[1..].iter().map(|u| u * u).sum::<f64>().sqrt());
+        stopped = stopped.max((answered.block)(i, i)[0] * p[d * i]);
+    }
+    !parts && fastest > still && fastest < SLOW * stopped
+}
+
 /// A slide that the impulse and the slip name: both point the same way.
 #[inline(always)]
 fn slide(mu: f64, block: &[f64; 9], p: &[f64], u: &[f64]) -> Kind {
@@ -630,7 +719,7 @@ impl Redundancy {
         for group in 0..groups.len() {
             let members = (group..groups.len()).filter(|i| groups[*i] == group);
             if (1..=MOST_SETTLED).contains(&members.clone().count()) {
-                is_changed |= self.settle(&answered, members, p);
+                is_changed |= self.settle(&answered, members, p) != Settled::Unchanged;
             }
         }
         let mut found = None;

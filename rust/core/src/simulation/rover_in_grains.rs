@@ -278,11 +278,13 @@ impl RoverInGrains {
                 .map(|(k, p)| (CompositeKey::Touch(*k), *p)),
         );
         self.warm_start.persistent.clear();
+        self.warm_start.stored.clone_from(&rover.warm_start.stored);
     }
 
     fn part_warm_starts(&self, rover: &mut RoverSimulation, bed: &mut GrainSimulation<3>) {
         rover.warm_start.clear();
         bed.warm_start.clear();
+        rover.warm_start.stored.clone_from(&self.warm_start.stored);
         for (key, p) in &self.warm_start.impulses {
             match key {
                 CompositeKey::Grains(key) | CompositeKey::Touch(key) => {

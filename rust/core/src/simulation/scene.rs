@@ -160,7 +160,10 @@ impl<S: Scene> Snapshot<S> {
     pub(super) fn is_sound(&self, nv: usize) -> bool {
         let warm = &self.warm_start;
         let impulses = warm.impulses.iter().flat_map(|(_, p)| p);
-        let mut numbers = self.state.v.iter().chain(&warm.persistent).chain(impulses);
+        let mut numbers = (self.state.v.iter())
+            .chain(&warm.persistent)
+            .chain(&warm.stored)
+            .chain(impulses);
         self.state.v.len() == nv
             && [0, nv].contains(&warm.persistent.len())
             && self.state.time.is_finite()

@@ -296,7 +296,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         let (model, poses) = (self.model, self.parts.kinematics.poses());
         let of = |part: Part| {
             let (tread, wheel) = part.tread(model)?;
-            Some(tread.rolling(poses.travel(model.mechanism(), wheel, |k| v[k])))
+            let n = contact.frame.n.into();
+            Some(tread.rolling(poses.rolling(model.mechanism(), wheel, n, |k| v[k])))
         };
         Compliance::in_series(of(contact.part), contact.other.and_then(|own| of(own.part)))
     }

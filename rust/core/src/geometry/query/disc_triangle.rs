@@ -181,7 +181,13 @@ pub fn nearest_at_edge(disc: &Disc, edge: &Edge, base: &Vector3<f64>) -> Surface
 #[inline]
 fn between(disc: &Disc, edge: &Edge, start: &Vector3<f64>, whole: &Bracket) -> SurfacePoint {
     let [first, second] = &edge.normals;
-    if whole.low >= 0.0 {
+    if whole.low >= 0.0 && whole.high <= 0.0 {
+        // Both may be maxima, or one a minimum that rounding tilts.
+        let ends = edge
+            .normals
+            .map(|n| rim_point_over(disc, &n, start, NEAREST));
+        ends[usize::from(ends[1].gap > ends[0].gap)]
+    } else if whole.low >= 0.0 {
         rim_point_over(disc, first, start, NEAREST)
     } else if whole.high <= 0.0 {
         rim_point_over(disc, second, start, NEAREST)

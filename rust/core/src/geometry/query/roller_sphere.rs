@@ -94,9 +94,11 @@ impl<'a> Seen<'a> {
         let along = self.along.clamp(-half, *half);
         let inward = self.outward * (out - self.away) + core.axle * (along - self.along);
         let distance = inward.norm();
-        // On the edge itself it pushes the wheel back, and not over.
+        // On a face it pushes along the axle, on the edge itself back, and not over.
         let n = if distance > NO_DIRECTION {
             inward / distance
+        } else if self.away < core.radius {
+            core.axle * -1.0_f64.copysign(self.along)
         } else {
             -self.outward
         };

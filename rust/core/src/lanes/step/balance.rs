@@ -34,6 +34,8 @@ pub(super) struct Energies<T: Lane> {
     pub of_drives: Vec<Work<T>>,
     pub of_sand: Vec<T>,
     pub released: Vec<T>,
+    /// What wheels that yield hold before and after the step, and what they gave.
+    pub elastic: [Vec<T>; 3],
     /// Sums over the contacts.
     pub of_contacts: [Vec<T>; 4],
     /// Masses, kg, and numbers and lanes on their way from group to cluster.
@@ -57,6 +59,7 @@ impl<T: Lane> Default for Energies<T> {
             of_drives: Vec::new(),
             of_sand: Vec::new(),
             released: Vec::new(),
+            elastic: std::array::from_fn(|_| Vec::new()),
             of_contacts: std::array::from_fn(|_| Vec::new()),
             mass: Vec::new(),
             stored: [Vec::new(), Vec::new()],
@@ -81,6 +84,7 @@ impl<T: Lane> Energies<T> {
             of_drives: vec![Work::none(T::splat(token, 0.0)); n],
             of_sand: zeros(),
             released: zeros(),
+            elastic: std::array::from_fn(|_| zeros()),
             of_contacts: std::array::from_fn(|_| zeros()),
             mass: zeros(),
             stored: [zeros(), zeros()],

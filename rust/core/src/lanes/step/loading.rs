@@ -25,8 +25,9 @@ impl<T: Lane> Block<T> {
         self.drives.set_lane(lane, joints, rover.command);
         self.drives.set_work(lane, rover.drive_work);
         self.time.set(lane, *rover.time);
-        let memory = &mut self.memories[lane].impulses;
-        memory.clone_from(&rover.warm_start.impulses);
+        let memory = &mut self.memories[lane];
+        memory.impulses.clone_from(&rover.warm_start.impulses);
+        memory.stored.clone_from(&rover.warm_start.stored);
         let persistent = &rover.warm_start.persistent;
         for (own, x) in self.persistent.iter_mut().zip(persistent) {
             own.set(lane, *x);
@@ -78,10 +79,9 @@ impl<T: Lane> Block<T> {
             *x = own.get(lane);
         }
         *rover.time = self.time.get(lane);
-        rover
-            .warm_start
-            .impulses
-            .clone_from(&self.memories[lane].impulses);
+        let memory = &self.memories[lane];
+        rover.warm_start.impulses.clone_from(&memory.impulses);
+        rover.warm_start.stored.clone_from(&memory.stored);
         rover.warm_start.persistent.clear();
         if self.any(&self.has_persistent).get(lane) {
             let persistent = self.persistent.iter().zip(&self.cluster_of);

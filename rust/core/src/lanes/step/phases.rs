@@ -8,6 +8,7 @@ use crate::contact::clusters_of;
 use crate::integrator::{Phase, Probe, Stabilisation, StepReport};
 use crate::lanes::rows::Answer;
 use crate::lanes::sweeps::write_start;
+use crate::law::compliance::Held;
 use crate::multibody::Model;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::batch::problem::ContactProblem;
@@ -385,20 +386,13 @@ impl<T: Lane> Block<T> {
             self.gather(&mut balances, number, |own| &mut own.stored);
         }
         self.balances = balances;
-        own.released.fill(zero);
-        if !self.yields.is_empty() {
-            let (contacts, before) = (&self.contacts, &self.rows.u_before);
-            let released = &mut own.released;
-            (self.yields).supplied(contacts, h, &self.p, &self.u, before, released);
-        }
+        self.weigh_treads(&mut own);
         for (cluster, mass) in own.mass.iter_mut().enumerate() {
             *mass = self.inertias.mass_of(&self.machine, cluster);
         }
         self.find_touch(&mut own.in_touch);
         self.find_ground(&mut own.on_ground);
-        for sums in [&mut own.released, &mut own.mass] {
-            self.contacts.gather(sums);
-        }
+        self.contacts.gather(&mut own.mass);
         let nobody = T::mask(self.token, 0);
         let conserves = self.options.theta <= 0.5;
         let fall = self.gravity.norm() * h;
@@ -421,6 +415,52 @@ impl<T: Lane> Block<T> {
         self.fall_back(Fallback::Energy, is_lost);
         if is_corrected.any() {
             self.weigh_ends();
+        }
+    }
+
+    /// `own.released`: what the wheels that yield give off, by group.
+    fn weigh_treads(&mut self, own: &mut Energies<T>) {
+        own.released.fill(self.number(0.0));
+        if self.yields.is_empty() {
+            return;
+        }
+        let step = self.time_step();
+        let contacts = &self.contacts;
+        for sums in &mut own.elastic {
+            sums.fill(self.number(0.0));
+        }
+        let both = [&self.rows.u_before[..], &self.u];
+        let sums = own.elastic.each_mut().map(|sums| &mut sums[..]);
+        (self.yields).held(contacts, step, &self.p, both, sums);
+        for (cluster, known) in own.number.iter_mut().enumerate() {
+            *known = self.number(f64::INFINITY);
+            for (lane, memory) in self.memories[..T::LANES].iter().enumerate() {
+                if memory.stored.len() == own.released.len() {
+                    known.set(lane, memory.stored[cluster]);
+                }
+            }
+        }
+        // By cluster, as the general step does it.
+        let [before, after, given] = &mut own.elastic;
+        for (cluster, before) in before.iter_mut().enumerate() {
+            let known = own.number[cluster];
+            *before = T::select(known.is_finite(), known, *before);
+            let own = Held {
+                before: *before,
+                most: after[cluster],
+                given: given[cluster],
+            };
+            after[cluster] = own.after(*before);
+        }
+        for (lane, memory) in self.next_memories[..T::LANES].iter_mut().enumerate() {
+            memory.stored.clear();
+            (memory.stored).extend(after.iter().map(|after| after.get(lane)));
+        }
+        for sums in [&mut *before, &mut *after] {
+            contacts.gather(sums);
+        }
+        for (released, (before, after)) in own.released.iter_mut().zip(before.iter().zip(&*after)) {
+            *released = *before - *after;
         }
     }
 

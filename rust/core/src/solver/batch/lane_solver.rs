@@ -10,7 +10,7 @@ use super::problem::{
     ContactProblem, DENSE_BLOCKS, LARGE_BLOCKS, MAX_CONTACTS, MAX_DENSE, MAX_LARGE,
 };
 use super::velocities::VelocitySystem;
-use crate::problem::{Answered, ContactScales, Magnitudes, Redundancy};
+use crate::problem::{Answered, ContactScales, Magnitudes, Redundancy, Settled};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 
@@ -305,8 +305,12 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             u: &problem.u[..3 * n],
             still,
         };
-        if self.redundancy.settle(&answered, 0..n, &mut p[..3 * n]) {
+        let settled = self.redundancy.settle(&answered, 0..n, &mut p[..3 * n]);
+        if settled != Settled::Unchanged {
             problem.p[..3 * n].copy_from_slice(&p[..3 * n]);
+        }
+        if settled == Settled::AtRest {
+            problem.u[..3 * n].fill(0.0);
         }
     }
 

@@ -143,7 +143,8 @@ impl<T: Lane> Tangent<T> {
         let of = |part: Part| {
             let (tread, wheel) = part.tread(scene.model)?;
             let (mechanism, poses) = (scene.model.mechanism(), &self.poses_middle);
-            let own = tread.rolling(poses.travel(mechanism, wheel, |k| self.v[k]));
+            let n = self.contacts[i].place.n;
+            let own = tread.rolling(poses.rolling(mechanism, wheel, n, |k| self.v[k]));
             Some(Compliance {
                 stiffness: own.stiffness * Dual::new(one, self.d_stiffness),
                 damping: own.damping * Dual::new(one, self.d_damping),
