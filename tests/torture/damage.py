@@ -115,14 +115,12 @@ def attempt(
 def use(ledger: Ledger, what: str, sim: Any) -> None:
     """A few steps of a simulation that was accepted: finite, or a `StepError`."""
 
-    def run() -> None:
-        for _ in range(5):
-            sim.step()
-            state = (sim.position, sim.velocity) if isinstance(sim, SoilSimulation) else (sim.q, sim.v)
-            if not all(np.isfinite(part).all() for part in state):
-                ledger.find(f"{what}: not finite after a step")
-
-    attempt(ledger, what, run)
+    for _ in range(5):
+        if attempt(ledger, what, sim.step) is None:
+            return
+        state = (sim.position, sim.velocity) if isinstance(sim, SoilSimulation) else (sim.q, sim.v)
+        if not all(np.isfinite(part).all() for part in state):
+            ledger.find(f"{what}: not finite after a step")
 
 
 def runs(random: Random, ledger: Ledger) -> None:

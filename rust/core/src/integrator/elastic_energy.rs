@@ -24,7 +24,9 @@ pub(super) fn find_stored<S: MechanicalSystem>(
     }
     let n = system.n_clusters();
     let mut elastic = std::mem::take(&mut ws.elastic);
-    elastic.iter_mut().for_each(|all| all.resize(n, 0.0));
+    for all in &mut elastic {
+        all.resize(n, 0.0);
+    }
     let [before, after] = &mut elastic;
     if warm_start.stored.len() == n {
         before.clone_from(&warm_start.stored);

@@ -262,7 +262,7 @@ impl Redundancy {
             let slip = (own[1..].iter().map(|u| u * u).sum::<f64>()).sqrt();
             let kind = if mu[i] == 0.0 {
                 Kind::Slides([1.0, 0.0, 0.0])
-            } else if slip > still && !(rests && !is_joint) {
+            } else if slip > still && (is_joint || !rests) {
                 if is_joint {
                     continue;
                 }
