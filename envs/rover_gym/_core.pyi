@@ -3676,7 +3676,7 @@ def solve_friction_contact(
         max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
         initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
         budget: Largest amount of work, in operations rather than time: a unit is one multiplication
-            and addition in a product with W. The default is 3e8 units, about 0.3 s, for up to 48
+            and addition in a product with W. The default is 3e8 units, about 0.3 s, for up to 64
             contacts, 1.2e9 for up to 200, and proportional to the square of their number beyond.
             When the budget is spent, the solver stops with the status "budget_exhausted".
         history: Whether to record the residuals of the iterations.

@@ -114,13 +114,13 @@ pub struct SolverOptions {
 }
 
 impl SolverOptions {
-    /// Work allowed by default: 3e8, about 0.3 s on a processor of 2024, for up to 48 contacts,
+    /// Work allowed by default: 3e8, about 0.3 s on a processor of 2024, for up to 64 contacts,
     /// 1.2e9 for up to 200, and more in proportion to the square of the contacts beyond, as a
     /// sparse factorisation of a pile takes more. Of 22 400 steps in which heaps of 27 and 64 boxes
     /// pile up, 3e8 for up to 100 contacts leaves six unsolved, 1.2e9 none.
     #[must_use]
     pub fn usual_budget(n_contacts: usize) -> u64 {
-        const FEW: usize = 48;
+        const FEW: usize = 64;
         const OF_FEW: u64 = 300_000_000;
         const OF_A_HEAP: u64 = 1_200_000_000;
         const PER_PAIR: u64 = 30_000;
