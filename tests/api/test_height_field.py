@@ -601,3 +601,28 @@ def test_a_wheel_three_centimetres_deep_in_a_spiky_map_is_not_thrown() -> None:
         assert gap > -DEPTH - SAMPLED
         sim.step()
         assert np.linalg.norm(sim.q[:3] - q[:3]) < 1.5 * DEPTH
+
+
+def test_the_gap_of_a_tilted_wheel_in_the_air_does_not_jump_over_steep_ground() -> None:
+    """A slope beside the wheel, nearer than what is under it, was seen or not as the wheel turned by 1e-9."""
+    model = RoverModel()
+    shares = np.linspace(0.0, 2e-3, 9)
+    compared = 0
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        spacing = 0.25 if seed % 2 else 0.1
+        heights = rng.normal(size=(81, 81)) * 0.2
+        ground = HeightField(heights, spacing, (-40.0 * spacing, -40.0 * spacing))
+        for _ in range(15):
+            q = np.zeros(model.nq)
+            q[:3] = rng.uniform(-1, 1), rng.uniform(0, 0.8), rng.uniform(-1, 1)
+            q[3:6] = rng.uniform(-0.8, 0.8), rng.uniform(-3, 3), rng.uniform(-0.8, 0.8)
+            q[6:] = rng.uniform(-0.4, 0.4, model.nq - 6)
+            way = rng.normal(size=model.nq)
+            way /= np.linalg.norm(way)
+            gaps = np.array([model.wheel_gaps(q + s * way, ground) for s in shares])
+            in_the_air = gaps.min(axis=0) > 0.0
+            # No point of a wheel is further than 2 m from the trunk's origin.
+            assert np.abs(np.diff(gaps[:, in_the_air], axis=0)).max(initial=0.0) < 3.0 * shares[1]
+            compared += int(in_the_air.sum())
+    assert compared > 300

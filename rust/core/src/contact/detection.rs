@@ -667,6 +667,9 @@ fn visit_nearer(
             take(id, &on_surface(&point));
         }
         if gap <= ahead {
+            if is_surface && !is_soft && gap > CLOSE * radius {
+                look_all_around(shape, base, terrain, gap, visit);
+            }
             return;
         }
         ahead = if is_surface {
@@ -675,6 +678,41 @@ fn visit_nearer(
             2.0 * ahead + radius
         };
     }
+}
+
+/// Visits points of a surface that are nearer to a wheel above it than a gap (m), each nearer than
+/// those before.
+///
+/// The other searches are for what is about to touch: of a face they know what is over it and over
+/// no other one. From well above steep ground the nearest place may be in a face that the wheel is
+/// not over.
+#[cold]
+fn look_all_around(
+    shape: &PlacedShape<'_>,
+    base: &Vector3<f64>,
+    terrain: &dyn Terrain,
+    mut gap: f64,
+    visit: &mut impl FnMut(u32, &SurfacePoint),
+) {
+    let within = shape.bound() + gap;
+    terrain.visit_near(&(base + shape.centre()), within, &mut |id, piece| {
+        let mut take = |point: &SurfacePoint| {
+            if is_lowest(point.feature) && point.gap < gap && point.gap >= 0.0 {
+                gap = point.gap;
+                visit(id, &on_surface(point));
+            }
+        };
+        match piece {
+            Primitive::Plane(_) | Primitive::Sphere(_) => {}
+            Primitive::Face(face) => {
+                let low = dispatch::lowest_on_plane(shape, &face.plane, base);
+                if face.has(&(base + low.point - low.n * low.gap)) {
+                    take(&low);
+                }
+            }
+            piece => visit_on_surface(shape, (terrain, id, piece), base, f64::INFINITY, take),
+        }
+    });
 }
 
 /// How far beyond a wheel's rim a search on a surface looks first, in radii: its pieces are many,

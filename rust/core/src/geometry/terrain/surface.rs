@@ -81,6 +81,16 @@ impl Face {
         self.walls.iter().all(|wall| wall.admits(x))
     }
 
+    /// Whether a point of the face's plane (world, m) is in it.
+    #[must_use]
+    pub fn has(&self, x: &Vector3<f64>) -> bool {
+        let [a, b, c] = self.corners(x);
+        let n = self.plane.normal();
+        let turns =
+            [[a, b], [b, c], [c, a]].map(|[from, to]| n.dot(&(to - from).cross(&(x - from))));
+        turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
+    }
+
     /// Its corners, world, m; `near` (world, m): a place near them, for accuracy.
     #[must_use]
     pub fn corners(&self, near: &Vector3<f64>) -> [Vector3<f64>; 3] {
