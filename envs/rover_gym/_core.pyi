@@ -4,6 +4,7 @@ SI units and radians everywhere. World frame: x forward, y up, z to the right. W
 listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Protocol, TypeAlias, final, overload
 
@@ -18,7 +19,7 @@ from rover_gym.models import file_writing, model_files
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
 _Observation: TypeAlias = npt.NDArray[np.float32]
-_Terrains: TypeAlias = "Sequence[Terrain]"
+_Terrains: TypeAlias = "Sequence[Terrain | str | os.PathLike[str]] | str | os.PathLike[str]"
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
 _MaterialRow: TypeAlias = tuple[str, str, float, float]
@@ -1120,12 +1121,11 @@ class StepReport:
     @property
     def energy_released(self) -> float:
         """Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
-        The sum over a run is no more than they held at its start.
 
         Wheels are elastic if the model gives them a `stiffness`. The energy of their springs is
-        part of neither the kinetic nor the potential energy. The wheel's force is constant over a
-        step; the resulting error in its work is included, and cancels when a wheel comes to rest
-        again.
+        part of neither the kinetic nor the potential energy. It is an account: a step enters what
+        the wheels took from the machine, up to what their deflections can hold, and the sum over a
+        run is no more than they held at its start.
         """
     @property
     def undetermined_loads(self) -> int:
@@ -1489,8 +1489,9 @@ class Simulation(AnySimulation):
     are free.
 
     Args:
-        model: The machine; the built-in rover by default.
-        terrain: A terrain, or a list of several; flat ground at height 0 by default.
+        model: The machine, a name of the gallery, or a file; the built-in rover by default.
+        terrain: A terrain, the file of a map or a mesh, or a list of several; flat ground at height
+            0 by default.
         gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
         friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
         restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
@@ -1518,14 +1519,15 @@ class Simulation(AnySimulation):
             three options cannot be given beside it.
 
     Raises:
-        ModelError: `model` is not a RoverModel.
-        TerrainError: `terrain` is not a terrain.
+        ModelError: `model` is none of these, or its file does not contain a model.
+        TerrainError: `terrain` is none of these, or its file is damaged.
+        OSError: A file cannot be read.
         OptionError: An option is out of range, or must not be given beside `accuracy`.
     """
 
     def __new__(
         cls,
-        model: RoverModel | None = None,
+        model: RoverModel | str | os.PathLike[str] | None = None,
         terrain: Terrain | _Terrains | None = None,
         *,
         gravity: npt.ArrayLike | None = None,

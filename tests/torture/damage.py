@@ -114,7 +114,6 @@ def attempt(
 
 def use(ledger: Ledger, what: str, sim: Any) -> None:
     """A few steps of a simulation that was accepted: finite, or a `StepError`."""
-
     for _ in range(5):
         if attempt(ledger, what, sim.step) is None:
             return

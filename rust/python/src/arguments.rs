@@ -88,6 +88,11 @@ impl<'py> Given<'py> {
     }
 }
 
+/// Whether an argument is a text or an `os.PathLike`.
+pub fn is_path(given: &Bound<'_, PyAny>) -> Result<bool> {
+    Ok(given.is_instance_of::<PyString>() || given.hasattr("__fspath__")?)
+}
+
 /// Values by name: keyword arguments, or a mapping that was given as one argument.
 pub struct Named<'py> {
     given: Bound<'py, PyMapping>,

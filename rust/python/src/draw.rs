@@ -18,7 +18,7 @@ use crate::options::SolverWords;
 use crate::reading::points;
 use crate::shared::{Release, Watch};
 use crate::simulation::{Origin, Simulation};
-use crate::terrain;
+use crate::terrain::{self, Terrain};
 
 /// Distribution of the episodes of a task.
 ///
@@ -263,8 +263,8 @@ fn sand_distribution(sand: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result
     let wrong = || refused(sand, kind, field, "a list of one or more SoftGround");
     let mut soils = Vec::new();
     for one in sand.try_iter().map_err(|_| wrong())? {
-        match terrain::parse(&one?)? {
-            DrawnGround::Soft(soft, _) => soils.push(soft),
+        match one?.cast::<Terrain>().map(|one| one.get().ground.clone()) {
+            Ok(DrawnGround::Soft(soft, _)) => soils.push(soft),
             _ => return Err(wrong()),
         }
     }

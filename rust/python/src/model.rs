@@ -91,6 +91,17 @@ impl RoverModel {
         Ok(Arc::new(model?).into())
     }
 
+    /// The model that an argument means: an object, a name of the gallery, or a file.
+    pub fn opened(given: &Bound<'_, PyAny>, field: &str) -> Result<Self> {
+        if let Ok(own) = given.extract::<Self>() {
+            return Ok(own);
+        }
+        let models = given.py().import("rover_gym.models.lookup")?;
+        let found = models.call_method1("as_model", (field, given))?;
+        let own = found.extract::<Self>();
+        own.map_err(|_| refused(given, Kind::Model, field, "a RoverModel"))
+    }
+
     fn placed(&self, q: &Bound<'_, PyAny>, coordinates: Coordinates) -> Result<Placed> {
         let chart = coordinates.chart();
         let q = vector(q, Kind::State, "q")?;

@@ -98,12 +98,11 @@ pub struct StepReport {
     #[pyo3(get)]
     energy_lifted: f64,
     /// Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
-    /// The sum over a run is no more than they held at its start.
     ///
     /// Wheels are elastic if the model gives them a `stiffness`. The energy of their springs is
-    /// part of neither the kinetic nor the potential energy. The wheel's force is constant over a
-    /// step; the resulting error in its work is included, and cancels when a wheel comes to rest
-    /// again.
+    /// part of neither the kinetic nor the potential energy. It is an account: a step enters what
+    /// the wheels took from the machine, up to what their deflections can hold, and the sum over a
+    /// run is no more than they held at its start.
     #[pyo3(get)]
     energy_released: f64,
     /// Number of contacts whose impulses the motion of the last step does not determine.

@@ -37,8 +37,9 @@ use crate::{terrain, union};
 /// are free.
 ///
 /// Args:
-///     model: The machine; the built-in rover by default.
-///     terrain: A terrain, or a list of several; flat ground at height 0 by default.
+///     model: The machine, a name of the gallery, or a file; the built-in rover by default.
+///     terrain: A terrain, the file of a map or a mesh, or a list of several; flat ground at height
+///         0 by default.
 ///     gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
 ///     friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
 ///     restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
@@ -66,8 +67,9 @@ use crate::{terrain, union};
 ///         three options cannot be given beside it.
 ///
 /// Raises:
-///     ModelError: `model` is not a RoverModel.
-///     TerrainError: `terrain` is not a terrain.
+///     ModelError: `model` is none of these, or its file does not contain a model.
+///     TerrainError: `terrain` is none of these, or its file is damaged.
+///     OSError: A file cannot be read.
 ///     OptionError: An option is out of range, or must not be given beside `accuracy`.
 #[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
 pub struct Simulation {
@@ -147,8 +149,10 @@ impl Simulation {
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<PyClassInitializer<Self>> {
         let given = Named::keywords(py, options)?;
-        let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
-        let model = model.map_or_else(|| Arc::new(Model::gallery_rover()), |m| m.inner);
+        let model = match model.some() {
+            None => Arc::new(Model::gallery_rover()),
+            Some(given) => RoverModel::opened(&given, "model")?.inner,
+        };
         let terrain = match terrain {
             None => DrawnGround::Plane(Plane::ground()),
             Some(given) => terrain::parse(given)?,

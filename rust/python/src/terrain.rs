@@ -7,7 +7,7 @@ use pyo3::types::{PyList, PyTuple};
 use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Union as CoreUnion, ray};
 
-use crate::arguments::{Given, refused};
+use crate::arguments::{Given, is_path, refused};
 use crate::arrays::{Array, rows};
 use crate::errors::{Kind, Result};
 use crate::rays::{Met, met, rays};
@@ -29,16 +29,21 @@ impl Terrain {
     }
 }
 
-/// Any object as ground, a list or tuple as a union, or a `TerrainError`.
+/// Any object as ground, a path as the map or mesh in that file, a list or tuple as a union, or a
+/// `TerrainError`.
 pub fn parse(given: &Bound<'_, PyAny>) -> Result<DrawnGround> {
+    if is_path(given)? {
+        let maps = given.py().import("rover_gym.maps.map_files")?;
+        return parse(&maps.call_method1("open_terrain", (given,))?);
+    }
     if given.is_instance_of::<PyList>() || given.is_instance_of::<PyTuple>() {
         return union(given);
     }
     if let Ok(terrain) = given.cast::<Terrain>() {
         return Ok(terrain.get().ground.clone());
     }
-    let what = "a Plane, SphereField, HeightField, TriangleMesh, SoftGround or Union, or a list of \
-                them";
+    let what = "a Plane, SphereField, HeightField, TriangleMesh, SoftGround or Union, a file of a \
+                map or a mesh, or a list of them";
     Err(refused(given, Kind::Terrain, "terrain", what))
 }
 
