@@ -98,9 +98,9 @@ fn a_scant_budget_holds() {
 #[test]
 fn the_usual_budget_grows_with_the_contacts() {
     let usual = SolverOptions::usual_budget;
-    assert_eq!(usual(6), usual(48));
-    assert_eq!(4 * usual(48), usual(49));
-    assert_eq!(usual(49), usual(200));
+    assert_eq!(usual(6), usual(64));
+    assert_eq!(4 * usual(64), usual(65));
+    assert_eq!(usual(65), usual(200));
     assert_eq!(usual(400), 4 * usual(200));
     assert_eq!(SolverOptions::default().budget_of(400), usual(400));
     let given = SolverOptions {
