@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rover_gym.maps.fractal import fractal_map, pair
-from rover_gym.maps.map_files import read_map, read_mesh
-from rover_gym.mechanics import HeightField, Plane, SphereField, TerrainError, TriangleMesh
+from rover_gym.maps.map_files import open_terrain, read_map, read_mesh
+from rover_gym.mechanics import HeightField, Plane, SphereField, Terrain, TerrainError, TriangleMesh
 from rover_gym.validation import refuse, text_of_file
 
 #: Longest file of spheres, bytes.
@@ -130,3 +130,5 @@ SphereField.from_file = staticmethod(sphere_field_from_file)
 HeightField.from_file = staticmethod(height_field_from_file)
 HeightField.fractal = staticmethod(fractal_map)
 TriangleMesh.from_file = staticmethod(triangle_mesh_from_file)
+# Where the compiled module takes a terrain, it takes a file.
+Terrain._opened = staticmethod(open_terrain)  # type: ignore[attr-defined]

@@ -14,6 +14,7 @@ from rover_gym.files import write_whole
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.file_writing import write_mjcf, write_urdf
 from rover_gym.models.import_report import ImportReport
+from rover_gym.models.lookup import as_model
 from rover_gym.models.reading import read_mjcf, read_urdf
 from rover_gym.models.robot_tree import checked_path
 from rover_gym.validation import text_of_file
@@ -193,3 +194,5 @@ RoverModel.from_mjcf = staticmethod(from_mjcf)
 RoverModel.to_file = to_file
 RoverModel.to_urdf = write_urdf
 RoverModel.to_mjcf = write_mjcf
+# Where the compiled module takes a model, it takes a name or a file.
+RoverModel._opened = staticmethod(as_model)  # type: ignore[attr-defined]

@@ -96,8 +96,8 @@ impl RoverModel {
         if let Ok(own) = given.extract::<Self>() {
             return Ok(own);
         }
-        let models = given.py().import("rover_gym.models.lookup")?;
-        let found = models.call_method1("as_model", (field, given))?;
+        let class = given.py().get_type::<Self>();
+        let found = class.call_method1("_opened", (field, given))?;
         let own = found.extract::<Self>();
         own.map_err(|_| refused(given, Kind::Model, field, "a RoverModel"))
     }

@@ -33,8 +33,8 @@ impl Terrain {
 /// `TerrainError`.
 pub fn parse(given: &Bound<'_, PyAny>) -> Result<DrawnGround> {
     if is_path(given)? {
-        let maps = given.py().import("rover_gym.maps.map_files")?;
-        return parse(&maps.call_method1("open_terrain", (given,))?);
+        let class = given.py().get_type::<Terrain>();
+        return parse(&class.call_method1("_opened", (given,))?);
     }
     if given.is_instance_of::<PyList>() || given.is_instance_of::<PyTuple>() {
         return union(given);
