@@ -14,13 +14,12 @@ from PIL import Image
 
 import rover_gym
 from rover_gym.figures.style import STYLE
-from rover_gym.sensors import DepthCamera, LaserScanner, Mount
+from rover_gym.sensors import ColourCamera, DepthCamera, LaserScanner, Mount
 
 PICTURE = Path(__file__).parent / "sensors.png"
 SEED = 4
-CAMERA = DepthCamera(
-    mount=Mount(position=(0.75, 0.2, 0.0), pitch_deg=-14.0), width=320, height=240, view_deg=60.0, max_range=6.0
-)
+VIEW = {"mount": Mount(position=(0.75, 0.2, 0.0), pitch_deg=-14.0), "width": 320, "height": 240, "view_deg": 60.0}
+CAMERA = DepthCamera(max_range=6.0, **VIEW)
 SCANNER = LaserScanner(
     mount=Mount(position=(0.0, 1.2, 0.0)),
     rays=1440,
@@ -32,10 +31,10 @@ EYE, TARGET = (-3.5, 2.6, 1.6), (1.2, 0.2, 0.0)
 
 
 def main() -> None:
-    """Resets among rocks, measures, and draws the three views."""
+    """Resets among rocks, measures, and draws the four views."""
     env = gym.make(
         "RoverRocks-v0",
-        sensors=[CAMERA, SCANNER],
+        sensors=[CAMERA, ColourCamera(**VIEW), SCANNER],
         difficulty=2.0,
         rock_abundance=0.3,
         slope_deg=0.0,
@@ -46,15 +45,17 @@ def main() -> None:
     )
     observation, _ = env.reset(seed=SEED)
     with mpl.rc_context(STYLE):
-        figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12.0, 4.0), width_ratios=(1.05, 1.5, 1.3))
-        left.imshow(env.render())
-        left.set_title("the scene")
-        left.axis("off")
-        image = middle.imshow(observation["depth"], cmap="viridis_r", vmin=0.0, vmax=CAMERA.max_range)
-        middle.set_title("depth camera, 320 x 240")
-        middle.axis("off")
-        figure.colorbar(image, ax=middle, label="depth, m", shrink=0.8)
-        draw_scan(right, observation["scan"], env.unwrapped)
+        figure, ((scene, colour), (depth, scan)) = plt.subplots(2, 2, figsize=(9.0, 7.0), width_ratios=(1.2, 1.2))
+        scene.imshow(env.render())
+        scene.set_title("the scene")
+        colour.imshow(observation["colour"])
+        colour.set_title("colour camera, 320 x 240")
+        image = depth.imshow(observation["depth"], cmap="viridis_r", vmin=0.0, vmax=CAMERA.max_range)
+        depth.set_title("depth camera, 320 x 240")
+        for axes in (scene, colour, depth):
+            axes.axis("off")
+        figure.colorbar(image, ax=depth, label="depth, m", shrink=0.8)
+        draw_scan(scan, observation["scan"], env.unwrapped)
         memory = io.BytesIO()
         figure.savefig(memory)
         plt.close(figure)

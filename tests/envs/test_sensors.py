@@ -14,8 +14,10 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField, StateError
+from rover_gym.rendering import appearance as look
 from rover_gym.rotations import rotation_matrix, rotation_vector
 from rover_gym.sensors import (
+    ColourCamera,
     DepthCamera,
     HeadingSensor,
     InertialUnit,
@@ -35,6 +37,7 @@ NOISY: list[Sensor] = [
     InertialUnit(accelerometer_noise=2e-3, accelerometer_bias=(-0.05, 0.05), gyroscope_noise=2e-4, gyroscope_walk=1e-4),
     HeadingSensor(noise_deg=0.5, bias_deg=(-2.0, 2.0), rate=5.0, latency=(0.0, 0.2)),
     DepthCamera(width=12, height=8, noise=0.005, dropout=0.05, latency=0.1),
+    ColourCamera(width=6, height=4, noise=0.02, gain=(0.8, 1.2), rate=10.0),
     LaserScanner(rays=24, noise=0.01, bias=(-0.02, 0.02)),
 ]
 
@@ -265,6 +268,60 @@ def test_a_depth_image_is_measured_along_the_axis_and_read_from_the_top_left() -
     assert seen.min() < 4.0  # the rover itself, but not the trunk, which carries the camera
 
 
+def test_a_colour_image_shows_what_a_depth_image_measures_in_the_light_of_the_sun() -> None:
+    model = RoverModel()
+    rock = SphereField([[4.0, 5.8, -1.0]], [0.3], Plane())
+    moment = Moment(at_rest(model, terrain=rock), 0.0)
+    view: dict[str, Any] = {"mount": Mount(), "width": 40, "height": 30, "view_deg": 90.0, "sees_rover": False}
+    picture = one(ColourCamera(image="normalised", **view), moment)
+    depth = one(DepthCamera(max_range=90.0, **view), moment)
+    assert picture.shape == (30, 40, 3)
+    at = np.unravel_index(np.where(depth < 4.5, depth, np.inf).argmin(), depth.shape)  # on the rock
+    direction = ColourCamera(**view).directions[at]
+    normal = np.array([*(depth[at] * direction + [0.0, 5.0, 0.0] - [4.0, 5.8, -1.0])]) / 0.3
+    sky = np.array(look.BOUNCE_LIGHT) + (0.5 + 0.5 * normal[1]) * (np.array(look.SKY_LIGHT) - look.BOUNCE_LIGHT)
+    light = sky + max(0.0, normal @ look.SUN) * np.array(look.SUN_LIGHT)
+    np.testing.assert_allclose(picture[at], np.array(look.ROCK_COLOUR) * light, rtol=1e-6)
+    share = np.interp(np.degrees(np.arctan(14.5 / 20.0 / np.hypot(1.0, 0.5 / 20.0))), *np.array(look.SKY_BANDS).T)
+    blue = np.array(look.SKY_COLOUR) + share * (np.array(look.SKY_COLOUR_2) - look.SKY_COLOUR)
+    np.testing.assert_allclose(picture[0, 20], blue, rtol=1e-6)
+    np.testing.assert_allclose(picture[15, 0], look.SKY_COLOUR, atol=0.02)  # far ground fades into haze
+
+
+def test_a_colour_image_shows_rover_shadow_and_fields_of_the_ground() -> None:
+    moment = Moment(at_rest(RoverModel()), 0.0)
+    above: dict[str, Any] = {"mount": Mount(position=(0.0, 6.0, 0.0), pitch_deg=-90.0), "image": "normalised"}
+    camera: dict[str, Any] = {**above, "width": 161, "height": 161, "view_deg": 60.0}
+    with_rover, without = (one(ColourCamera(sees_rover=seen, **camera), moment) for seen in (True, False))
+    lit = np.array(look.SKY_LIGHT) + look.SUN[1] * np.array(look.SUN_LIGHT)
+    found = {tuple(colour) for colour in np.unique(np.round(without.reshape(-1, 3), 6), axis=0)}
+    assert found == {tuple(np.round(np.array(tone) * lit, 6)) for tone in (look.GROUND_COLOUR, look.GROUND_COLOUR_2)}
+    dark = np.array(look.GROUND_COLOUR) * look.SKY_LIGHT
+    shadow = np.isclose(with_rover, dark, atol=1e-6).all(axis=2)
+    depth = one(DepthCamera(max_range=20.0, **{k: v for k, v in camera.items() if k != "image"}), moment)
+    assert shadow.sum() > 20
+    assert (depth[shadow] > 10.9).all()  # the ground, 11 m below
+    body = depth < 10.0
+    changed = (with_rover != without).any(axis=2)
+    assert body.sum() > 50
+    assert changed[body].all()
+    aside = Mount(position=(0.0, 0.0, 4.0), heading_deg=90.0)
+    side = one(ColourCamera(mount=aside, width=120, height=90, view_deg=40.0, image="normalised"), moment)
+    grey = np.isclose(side / side.sum(axis=2, keepdims=True), 1.0 / 3.0, atol=0.05).all(axis=2)
+    assert (grey & (side.sum(axis=2) < 0.9)).sum() > 20, "wheels are dark, without a tint"
+
+
+def test_balls_of_a_pit_have_the_colour_of_sand() -> None:
+    class Balls:
+        radius = np.array([0.5])
+        position = np.array([[0.0, 3.0, 0.0]])
+
+    moment = Moment(at_rest(RoverModel()), 0.0, Balls())  # type: ignore[arg-type]
+    camera = ColourCamera(mount=Mount(pitch_deg=-90.0), width=1, height=1, sees_rover=False, image="normalised")
+    lit = np.array(look.SKY_LIGHT) + look.SUN[1] * np.array(look.SUN_LIGHT)
+    np.testing.assert_allclose(one(camera, moment)[0, 0], np.minimum(1.0, np.array(look.SAND_COLOUR) * lit), rtol=1e-9)
+
+
 def test_a_scan_turns_to_the_left_from_its_beginning() -> None:
     model = RoverModel()
     rock = SphereField([[0.0, 5.0, -3.0]], [0.5], Plane())
@@ -340,6 +397,13 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: DepthCamera(view_deg=180.0), "view_deg"),
     (lambda: DepthCamera(max_range=0.05), "max_range"),
     (lambda: DepthCamera(dropout=1.5), "dropout"),
+    (lambda: ColourCamera(image=None), "image"),  # type: ignore[arg-type]
+    (lambda: ColourCamera(image="rgb"), "image"),
+    (lambda: ColourCamera(noise=-0.1), "noise"),
+    (lambda: ColourCamera(max_range=0.0), "max_range"),
+    (lambda: ColourCamera(gain=(1.2, 0.8)), "gain"),
+    (lambda: ColourCamera(height=0), "height"),
+    (lambda: gym.make("Rover-v0", sensors=[ColourCamera(mount=Mount(solid="mast"))]), "mount.solid"),
     (lambda: DepthCamera(sees_rover=1), "sees_rover"),  # type: ignore[arg-type]
     (lambda: LaserScanner(elevations_deg=()), "elevations_deg"),
     (lambda: LaserScanner(elevations_deg=(0.0, 91.0)), "elevations_deg[1]"),

@@ -11,7 +11,7 @@ from refusals import refused
 import rover_gym.sensors
 import rover_gym.vector
 from rover_gym import OptionError, StateError
-from rover_gym.sensors import DepthCamera, InertialUnit, LaserScanner, SensorObservation
+from rover_gym.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner, SensorObservation
 
 SENSORS = [
     DepthCamera(width=6, height=4, noise=0.01, latency=(0.0, 0.1)),
@@ -100,13 +100,14 @@ def test_depth_is_an_image_if_asked_for(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["uint8", "channels_first"])
-def test_a_convolutional_network_of_stable_baselines_takes_the_image(kind: str) -> None:
+@pytest.mark.parametrize("camera", [DepthCamera, ColourCamera])
+def test_a_convolutional_network_of_stable_baselines_takes_the_image(camera: Any, kind: str) -> None:
     """`MultiInputPolicy` flattened depth in metres, and `NatureCNN` refused it."""
     sb3 = pytest.importorskip("rover_gym.vector.sb3")
     learners = pytest.importorskip("stable_baselines3")
     layers = pytest.importorskip("stable_baselines3.common.torch_layers")
 
-    rovers = sb3.RoverVecEnv(2, threads=1, sensors=[DepthCamera(width=48, height=40, image=kind)])
+    rovers = sb3.RoverVecEnv(2, threads=1, sensors=[camera(name="image", width=48, height=40, image=kind)])
     normalised: Any = {"normalize_images": False, "features_extractor_kwargs": {"normalized_image": True}}
     model = learners.PPO(
         "MultiInputPolicy",
@@ -119,8 +120,20 @@ def test_a_convolutional_network_of_stable_baselines_takes_the_image(kind: str) 
     )
     model.learn(4)
     extractors: Any = model.policy.features_extractor.extractors
-    assert isinstance(extractors["depth"], layers.NatureCNN)
+    assert isinstance(extractors["image"], layers.NatureCNN)
     assert not isinstance(extractors["state"], layers.NatureCNN)
+
+
+@pytest.mark.parametrize("kind", ["uint8", "normalised", "channels_first"])
+def test_colour_is_an_image_alone_and_in_vectors(kind: str) -> None:
+    camera = ColourCamera(width=48, height=40, image=kind)
+    env = gym.make("RoverRocks-v0", sensors=[camera])
+    seen, _ = env.reset(seed=1)
+    assert env.observation_space.contains(seen)
+    assert seen["colour"].shape == ((3, 40, 48) if kind == "channels_first" else (40, 48, 3))
+    assert seen["colour"].dtype == (np.uint8 if kind == "uint8" else np.float32)
+    vector = gym.make_vec("RoverRocks-v0", 2, sensors=[camera])
+    np.testing.assert_array_equal(vector.reset(seed=1)[0]["colour"][0], seen["colour"])
 
 
 def test_an_unknown_kind_of_image_is_refused() -> None:

@@ -25,7 +25,7 @@ from rover_gym.env.spec_json import as_json, terrain_from_json
 from rover_gym.mechanics import SoftGround
 from rover_gym.registration import ENVIRONMENTS
 from rover_gym.sand import named_soil
-from rover_gym.sensors import DepthCamera, InertialUnit, LaserScanner, Mount, WheelEncoders
+from rover_gym.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner, Mount, WheelEncoders
 
 HILL = np.outer(np.hanning(40), np.hanning(40))
 HOLE = np.where(HILL > 0.9, np.nan, HILL)
@@ -45,6 +45,7 @@ SENSORS = [
         mount=Mount(position=(0.1, 0.9, 0.0), pitch_deg=-5.0), rays=6, elevations_deg=(-20.0, 0.0), noise=0.02
     ),
     DepthCamera(width=4, height=3, latency=(0.0, 0.1), gain=(0.9, 1.1)),
+    ColourCamera(width=4, height=3, gain=(0.9, 1.1)),
     InertialUnit(rate=10.0, gyroscope_noise=1e-3),
     WheelEncoders(),
 ]

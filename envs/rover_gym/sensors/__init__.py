@@ -3,6 +3,8 @@
 import importlib
 import warnings
 
+from rover_gym.sensors.camera import Camera
+from rover_gym.sensors.colour_camera import ColourCamera
 from rover_gym.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.sensors.inertial_unit import InertialUnit
 from rover_gym.sensors.sensor import Mount, Sensor
@@ -15,6 +17,8 @@ from rover_gym.sensors.sensor_suite import (
 from rover_gym.sensors.wheel_encoders import HeadingSensor, MotorSensors, WheelEncoders
 
 __all__ = [
+    "Camera",
+    "ColourCamera",
     "DepthCamera",
     "HeadingSensor",
     "InertialUnit",

@@ -7,34 +7,13 @@ from functools import lru_cache
 import numpy as np
 
 from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.sensors.camera import Camera, as_image, check_image
 from rover_gym.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
 from rover_gym.validation import Range, flag, number, refuse, vector, whole
 
-#: Most pixels along a side, and the widest view, deg.
-MAX_PIXELS = 4096
-
-MAX_VIEW_DEG = 170.0
-
-
-#: Kinds of images.
-IMAGES = ("uint8", "normalised", "channels_first")
-
-
-def check_image(kind: object) -> None:
-    """Rejects a kind of image that is none of `IMAGES`, nor None."""
-    if kind is not None and not (isinstance(kind, str) and kind in IMAGES):
-        refuse(OptionError, "image", kind, f"must be None or one of {', '.join(IMAGES)}")
-
-
-def as_image(picture: Array, kind: str) -> Array:
-    """A picture (height, width, channels) of numbers from 0 to 1 as an image of a kind."""
-    if kind == "uint8":
-        return np.rint(255.0 * picture)
-    return np.moveaxis(picture, -1, 0) if kind == "channels_first" else picture
-
 
 @dataclass(frozen=True, kw_only=True)
-class DepthCamera(Sensor):
+class DepthCamera(Camera):
     """A depth image of ground, rocks and rover, cast ray by ray in the core; it needs no renderer.
 
     A reading is (height, width), m, or an image, if asked for. Each pixel has the depth at its centre along the optical
@@ -45,51 +24,36 @@ class DepthCamera(Sensor):
     * z**2` (Khoshelham and Elberink 2012), where `noise` is the standard deviation of the disparity divided by focal
     length times baseline.
 
+    Its place and its pixels are those of `Camera`.
+
     Args:
-        mount: Its pose; by default on the trunk, 0.6 m ahead and 0.4 m above its origin, 20 degrees down.
-        width: Columns of pixels.
-        height: Rows of pixels.
-        view_deg: Angle of view along a row, deg; pixels are square.
         min_range: Least depth, m.
         max_range: Greatest depth, m.
         noise: Standard deviation of a depth over its square, 1/m.
         gain: Depth measured over depth, or a range.
         dropout: Fraction of pixels that are lost in a sample, or a range.
-        sees_rover: Whether the collision shapes of the rover's other solids are seen.
         image: None for m. For an image, which shows 0 to `max_range`: "uint8" of shape (height, width, 1), from 0 to
             255; "normalised" of that shape, float32 from 0 to 1; or "channels_first", the same of shape
             (1, height, width).
     """
 
     name: str = "depth"
-    mount: Mount = field(default_factory=lambda: Mount(position=(0.6, 0.4, 0.0), pitch_deg=-20.0))
-    width: int = 64
-    height: int = 48
-    view_deg: float = 87.0
     min_range: float = 0.1
     max_range: float = 10.0
     noise: float = 0.0
     gain: float | Range = 1.0
     dropout: float | Range = 0.0
-    sees_rover: bool = True
     image: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_image(self.image)
-        whole("width", self.width, at_least=1, at_most=MAX_PIXELS)
-        whole("height", self.height, at_least=1, at_most=MAX_PIXELS)
-        number("view_deg", self.view_deg, above=0.0, at_most=MAX_VIEW_DEG)
+        if self.image is not None:
+            check_image(self.image)
         number("min_range", self.min_range, at_least=0.0)
         number("max_range", self.max_range, above=self.min_range)
         number("noise", self.noise, at_least=0.0)
-        flag("sees_rover", self.sees_rover)
         self._keep_ranges("gain", at_least=0.0)
         self._keep_ranges("dropout", at_least=0.0, at_most=1.0)
-
-    def check(self, model: RoverModel) -> None:
-        """Rejects a model without the mount's solid."""
-        self.mount.solid_of(model)
 
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:  # noqa: ARG002 - of every model
         """0 to `max_range`, (height, width); of an image 0 to 255 or to 1."""
@@ -109,11 +73,6 @@ class DepthCamera(Sensor):
         """Draws gain and dropout."""
         return {"gain": uniform(generator, self.gain), "dropout": uniform(generator, self.dropout)}
 
-    @property
-    def directions(self) -> Array:
-        """Directions of the pixels, (height, width, 3), in the sensor's frame, of length 1 along the optical axis."""
-        return _directions(self.width, self.height, self.view_deg).reshape(self.height, self.width, 3)
-
     def measure(
         self,
         moment: Moment,
@@ -123,7 +82,7 @@ class DepthCamera(Sensor):
         generator: np.random.Generator,
     ) -> tuple[Array, Values]:
         """Takes a depth image."""
-        along = _directions(self.width, self.height, self.view_deg)
+        along = self.directions.reshape(-1, 3)
         stretch = np.sqrt((along**2).sum(axis=1))
         farthest = self.max_range * float(stretch.max())
         depth = moment.distances(self.mount, along, farthest, sees_rover=self.sees_rover) / stretch
@@ -134,18 +93,6 @@ class DepthCamera(Sensor):
         measured = np.where(seen, np.clip(drawn["gain"] * depth + noise, 0.0, self.max_range), self.max_range)
         measured[nearer | lost(generator, float(drawn["dropout"]), depth.shape)] = 0.0
         return self._shown(measured.reshape(self.height, self.width)), memory
-
-
-@lru_cache(maxsize=8)
-def _directions(width: int, height: int, view_deg: float) -> Array:
-    wide = math.tan(0.5 * math.radians(view_deg))
-    right = wide * (2.0 * (np.arange(width) + 0.5) / width - 1.0)
-    up = wide / width * (height - 2.0 * (np.arange(height) + 0.5))
-    grid = np.empty((height, width, 3))
-    grid[..., 0], grid[..., 1], grid[..., 2] = 1.0, up[:, None], right[None, :]
-    directions = grid.reshape(-1, 3)
-    directions.setflags(write=False)
-    return directions
 
 
 def lost(generator: np.random.Generator, fraction: float, shape: tuple[int, ...]) -> np.ndarray:

@@ -6,6 +6,7 @@ from typing import Any
 
 from rover_gym.env.spec_json import named_object
 from rover_gym.mechanics import OptionError
+from rover_gym.sensors.colour_camera import ColourCamera
 from rover_gym.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.sensors.inertial_unit import InertialUnit
 from rover_gym.sensors.sensor import Mount, Sensor
@@ -14,7 +15,8 @@ from rover_gym.validation import known_keys, mapping, refuse
 
 #: The sensors that a mapping may name.
 SENSORS: Mapping[str, type[Sensor]] = {
-    cls.__name__: cls for cls in (DepthCamera, HeadingSensor, InertialUnit, LaserScanner, MotorSensors, WheelEncoders)
+    cls.__name__: cls
+    for cls in (ColourCamera, DepthCamera, HeadingSensor, InertialUnit, LaserScanner, MotorSensors, WheelEncoders)
 }
 
 

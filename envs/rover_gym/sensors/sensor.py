@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from typing import TypeAlias
@@ -141,7 +141,8 @@ class Moment:
         return self.simulation.poses()
 
     @cached_property
-    def _balls(self) -> SphereField | None:
+    def balls(self) -> SphereField | None:
+        """The balls around the rover; None without."""
         if self._grains is None or not len(self._grains.radius):
             return None
         return SphereField(self._grains.position, self._grains.radius)
@@ -162,12 +163,29 @@ class Moment:
             sees_rover: Whether rays hit the rover's other solids.
         """
         place, rotation = self.frame(mount)
-        along = directions @ rotation.T
-        without = mount.solid_of(self.model)
-        found, _ = self.simulation.cast_rays(place, along, max_range, parts=sees_rover, without=without)
-        if self._balls is not None:
-            found = np.minimum(found, self._balls.cast_rays(place, along, max_range)[0])
-        return found
+        without = (mount.solid_of(self.model),) if sees_rover else self.model.solid_names
+        return self.cast_rays(place, directions @ rotation.T, max_range, without)[0]
+
+    def cast_rays(
+        self, origins: Array, directions: Array, max_range: float, without: Sequence[str] = ()
+    ) -> tuple[Array, Array]:
+        """The first hits of rays with ground, balls and rover: distances (n,), m, and unit normals (n, 3).
+
+        A ray without a hit has an infinite distance and a nan normal.
+
+        Args:
+            origins: World frame, (3,) or (n, 3), m.
+            directions: World frame, (n, 3).
+            max_range: Largest distance, m.
+            without: Solids of the rover that are not seen.
+        """
+        parts = len(without) < len(self.model.solid_names)
+        found, normals = self.simulation.cast_rays(origins, directions, max_range, parts=parts, without=without)
+        if self.balls is not None:
+            distance, facing = self.balls.cast_rays(origins, directions, max_range)
+            nearer = distance < found
+            found, normals = np.where(nearer, distance, found), np.where(nearer[:, None], facing, normals)
+        return found, normals
 
 
 #: Properties of an episode, or memory between samples, by name.
