@@ -75,7 +75,7 @@ class ColourCamera(Camera):
         place, rotation = moment.frame(self.mount)
         directions = self.directions.reshape(-1, 3) @ rotation.T
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        names = moment.model.solid_names
+        names = tuple(moment.model.solid_names)
         unseen = (self.mount.solid_of(moment.model),) if self.sees_rover else names
         distance, normals = moment.cast_rays(place, directions, self.max_range, unseen)
         seen = np.isfinite(distance)
@@ -100,7 +100,8 @@ def _sky(directions: Array) -> Array:
     """Colours (n, 3) of the sky in unit directions (n, 3)."""
     elevation = np.degrees(np.arcsin(np.clip(directions[:, 1], -1.0, 1.0)))
     share = np.interp(elevation, *np.array(look.SKY_BANDS).T)[:, None]
-    return (1.0 - share) * np.array(look.SKY_COLOUR) + share * np.array(look.SKY_COLOUR_2)
+    colours: Array = (1.0 - share) * np.array(look.SKY_COLOUR) + share * np.array(look.SKY_COLOUR_2)
+    return colours
 
 
 def _ground_colours(moment: Moment, place: Array, along: Array, distance: Array) -> Array:
@@ -109,7 +110,7 @@ def _ground_colours(moment: Moment, place: Array, along: Array, distance: Array)
     tones = np.array((look.GROUND_COLOUR, look.GROUND_COLOUR_2) if sand_of(terrain) is None else look.SAND_GROUND)
     points = place + distance[:, None] * along
     fields = np.floor(points[:, [0, 2]] / look.TILE + 0.5).sum(axis=1) % 2.0
-    colour = tones[fields.astype(int)]
+    colour: Array = tones[fields.astype(int)]
     reach = float(distance.max()) + 1.0
     for spheres, shade in ((_rocks(terrain), look.ROCK_COLOUR), (moment.balls, look.SAND_COLOUR)):
         if spheres is not None:
