@@ -152,6 +152,10 @@ chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against
 	$(COMPARE).surface_scenes $(filter --quick,$(CHART))
 	$(if $(filter --quick,$(CHART)),,$(COMPARE).headlines)
 
+policies: $(STAMPS)/release ## success, time and energy of the package's policies: docs/comparison/policies.json, docs/policy-results.md (an hour)
+	PYTHONPATH=tests $(BIN)/python -m comparison.policies
+	$(COMPARE).headlines
+
 chart-gpu: $(STAMPS)/test $(MODULE) ## rovers a second and error on a graphics card, where there is one: docs/comparison/gpu.json, docs/many-rovers.md
 	PYTHONPATH=tests $(BIN)/python -m comparison.gpu_chart
 	$(COMPARE).headlines

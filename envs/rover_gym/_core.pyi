@@ -252,7 +252,10 @@ class RoverModel:
         """The description as nested dictionaries and lists, for `from_dict`."""
     @staticmethod
     def join(
-        models: Mapping[str, RoverModel], *, loops: Sequence[Mapping[str, Any]] | None = None, name: str | None = None
+        models: Mapping[str, RoverModel | str | os.PathLike[str]],
+        *,
+        loops: Sequence[Mapping[str, Any]] | None = None,
+        name: str | None = None,
     ) -> RoverModel:
         """Joins several machines to one model, in which they meet, push and tow each other.
 
@@ -2284,7 +2287,7 @@ class MirroredRoverSimulation(PlanarSimulation):
     """
 
     def __new__(
-        cls, ground: PlanarGround, *, model: RoverModel | None = None, **options: Any
+        cls, ground: PlanarGround, *, model: RoverModel | str | os.PathLike[str] | None = None, **options: Any
     ) -> MirroredRoverSimulation: ...
     @property
     def joints(self) -> list[list[str]]:

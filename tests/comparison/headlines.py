@@ -10,6 +10,7 @@ A page marks a number with the key that says where it is from, and a table with 
 | `cost SCENE ERROR CURVE` | CPU ms per simulated second at which a curve of `chart.json` reaches an error |
 | `least SCENE CURVE` | smallest error of the curve, cm |
 | `rollout ENGINE ROW` | us a step of `rollout.json` |
+| `policy SCENE; POLICY` | success in percent of `policies.json` |
 | `cell PAGE; ROW; COLUMN` | first number of a cell of a table that a command writes; ROW: its first cells, by slashes |
 
 A cost at an error is read off as `comparison.tables.cost_of` says. `--check` changes nothing, and fails if a page
@@ -24,7 +25,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from comparison import gpu_chart
+from comparison import gpu_chart, policies
 from comparison.presets import short_table
 from comparison.tables import cost_of, curve, number, short_reach
 
@@ -34,7 +35,10 @@ PAGES = (
     "README.md",
     "docs/comparison.md",
     "docs/many-rovers.md",
+    "docs/policies.md",
+    "docs/policy-results.md",
     "docs/sand.md",
+    "docs/tutorials/train-a-policy.md",
     "docs/validation.md",
     "docs/vector.md",
     "paper/paper.md",
@@ -46,7 +50,9 @@ TABLES = {
     "validation": "docs/tables/validation.md",
     "sand": "docs/validation/sand.md",
 }
-VALUE = re.compile(r"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:cost|least|rollout|cell) [^>]*?) -->)")
+VALUE = re.compile(
+    r"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:cost|least|rollout|cell|policy) [^>]*?) -->)"
+)
 TABLE = re.compile(r"(?P<begin><!-- table (?P<key>\w+) -->\n\n).*?(?P<end>\n\n<!-- end of table -->)", flags=re.DOTALL)
 
 
@@ -89,6 +95,9 @@ def value(key: str) -> str:
     if kind == "cell":
         page, row, column = (part.strip() for part in rest.split(";"))
         return cell(page, row, column)
+    if kind == "policy":
+        scene, _, policy = rest.partition("; ")
+        return policies.success(data(policies.FILE), scene, policy)
     if kind == "rollout":
         engine, row = rest.split(" ", 1)
         times = {line["row"]: line for line in data("rollout.json")["rows"]}
@@ -115,6 +124,12 @@ def table(key: str) -> str:
         return rollout_table()
     if key == "sand":
         return sand_table()
+    if key == "policies":
+        return policies.short_table(data(policies.FILE))
+    if key.startswith("policies_"):
+        return policies.table(data(policies.FILE), key.removeprefix("policies_"))
+    if key == "exploring":
+        return exploring_table()
     raise LookupError(f"no table {key}")
 
 
@@ -138,6 +153,37 @@ def sand_table() -> str:
         for angles in ("below 90°", "all", "all, published model"):
             cells = [cell("sand", f"{wheel} / {angles}", column) for column in columns]
             lines.append(f"| {wheel} wheel, {angles} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+#: Of the short table where a policy explores: its scene, and curves with the step at which each is quoted, s; None for
+#: the range of all steps.
+EXPLORED = "plane, 150 N m"
+EXPLORING = (
+    ("rover-gym, linearised", 0.005),
+    ("rover-gym, linearised", 0.002),
+    ("Drake, lagged, stiff", 0.002),
+    ("MuJoCo, discrete, elliptic", None),
+    ("MuJoCo, defaults", None),
+)
+
+
+def exploring_table() -> str:
+    """Errors and costs of some curves where a policy explores on the plane."""
+    lines = [f"| {EXPLORED}, a step of | error, CPU time |", "|---|---|"]
+    for name, step in EXPLORING:
+        all_points = [
+            point
+            for point in data("exploring.json")["points"]
+            if point["scene"] == EXPLORED and f"{point['engine']}, {point['variant']}" == name
+        ]
+        found = [point for point in all_points if "error" in point and step in (None, point["step"])]
+        errors = sorted(1e3 * point["error"] for point in found)
+        cost = number(min(point["cpu_ms_per_s"] for point in found))
+        if step is None:
+            lines.append(f"| {name}, any | {number(errors[0])} to {number(errors[-1])} mm, from {cost} ms/s |")
+        else:
+            lines.append(f"| {name}, {1e3 * step:g} ms | {number(errors[0])} mm, {cost} ms/s |")
     return "\n".join(lines)
 
 

@@ -20,8 +20,12 @@ from rover_gym.policy import (
     RoverCommandVectorEnv,
     RoverGoalEnv,
     RoverTrapEnv,
+    ScanPolicy,
+    summarise,
 )
 from rover_gym.policy import trap_env as trap
+from rover_gym.policy.comparison import other_ends
+from rover_gym.policy.evaluation import drive_each
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +75,17 @@ def test_who_backs_out_comes_free(env: RoverTrapEnv) -> None:
             assert terms["success"] == 10.0
             assert terms["failure"] == 0.0
     assert ends.count("free") >= 2
+
+
+def test_an_evaluation_counts_rovers_that_come_free() -> None:
+    """`rover evaluate --environment RoverTrap-v0` gave every policy 0%."""
+    env = gym.make("RoverTrap-v0", **ScanPolicy.arguments())
+    episodes = drive_each(env, ScanPolicy(env), range(2))
+    ends = [episode.end for episode in episodes]
+    assert "free" in ends
+    summary = summarise("scan", episodes)
+    assert summary.successes == ends.count("free") + ends.count("goal")
+    assert other_ends([summary]) == [] or "free" not in other_ends([summary])[0]
 
 
 def test_a_goal_beside_the_trap_is_a_success_too(env: RoverTrapEnv) -> None:

@@ -310,8 +310,9 @@ def test_wrong_machines_are_refused(change, message):
 @pytest.mark.parametrize(
     ("models", "loops", "message"),
     [
-        ([cart()], [], "models: must be RoverModels by name"),
-        ({"a": "cart"}, [], r"models\[a\]: must be a RoverModel"),
+        ([cart()], [], "models: must be models by name"),
+        ({"a": "crat"}, [], r"models\[a\]: .*crat"),
+        ({"a": 3}, [], r"models\[a\]: must be a RoverModel"),
         ({}, [], "solids: a model needs at least one solid"),
         ({"a": cart()}, [{"name": "pin"}], "missing field `kind`"),
         ({"a": cart()}, 3, "loops: must be a list of dictionaries"),

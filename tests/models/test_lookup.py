@@ -6,7 +6,7 @@ import pytest
 from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, TriangleMesh, Union
-from rover_gym.mechanics import ModelError, TerrainError
+from rover_gym.mechanics import Line, MirroredRoverSimulation, ModelError, TerrainError
 
 MESH = "v -9 0 -9\nv 9 0 -9\nv 9 0.5 9\nv -9 0.5 9\nf 3 2 1\nf 4 3 1\n"
 
@@ -34,6 +34,17 @@ def test_a_simulation_takes_names_and_files(tmp_path: Path, mesh: Path) -> None:
     assert (named.wheel_gaps(start, mesh) == named.wheel_gaps(start, ground)).all()
     both = Union([Plane(), mesh])
     assert both.heights([[0.0, 4.0]])[0] > 0.3
+
+
+def test_machines_are_joined_by_names_and_files(tmp_path: Path) -> None:
+    named = RoverModel.named("open-rover")
+    file = tmp_path / "machine.toml"
+    file.write_text(named.to_text())
+    joined = RoverModel.join({"a": named, "b": named})
+    assert RoverModel.join({"a": "open-rover", "b": file}) == joined
+    line = Line()
+    file.write_text(RoverModel().to_text())
+    assert MirroredRoverSimulation(line, model=file).joints == MirroredRoverSimulation(line).joints
 
 
 def test_what_is_neither_is_refused_by_its_name(tmp_path: Path) -> None:

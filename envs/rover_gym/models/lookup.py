@@ -19,12 +19,13 @@ ModelLike: TypeAlias = RoverModel | str | os.PathLike[str]
 KINDS = {".toml": "TOML", ".urdf": "URDF", ".xml": "MJCF", ".mjcf": "MJCF"}
 
 
-def open_model(name: object) -> RoverModel:
+def open_model(name: object, field: str = "model") -> RoverModel:
     """The model of the gallery with this name, or the one in this file.
 
     Args:
         name: A name of `RoverModel.names`, or a path that ends in .toml, .urdf, .xml or .mjcf. An .xml whose root is
             <robot> is a URDF.
+        field: Name of the argument, for messages.
 
     Returns:
         The model.
@@ -34,7 +35,7 @@ def open_model(name: object) -> RoverModel:
         OSError: The file cannot be read.
     """
     if not isinstance(name, (str, os.PathLike)):
-        refuse(ModelError, "model", name, "must be a name or a path")
+        refuse(ModelError, field, name, "must be a name or a path")
     path = Path(os.fsdecode(name))
     match _kind(path):
         case "URDF":
@@ -45,7 +46,7 @@ def open_model(name: object) -> RoverModel:
             return RoverModel.from_file(path)
     if str(path) not in RoverModel.names():
         known = f"a name ({', '.join(RoverModel.names())}) or a file that ends in {', '.join(KINDS)}"
-        refuse(ModelError, "model", str(path), f"must be {known}")
+        refuse(ModelError, field, str(path), f"must be {known}")
     return RoverModel.named(str(path))
 
 
@@ -64,7 +65,7 @@ def as_model(field: str, value: object) -> RoverModel:
         return value
     if not isinstance(value, (str, os.PathLike)):
         refuse(ModelError, field, value, "must be a RoverModel, a name of the gallery or a file")
-    return open_model(value)
+    return open_model(value, field)
 
 
 def read_robot(path: object, **options: Any) -> tuple[RoverModel, ImportReport]:

@@ -20,6 +20,7 @@ from rover_gym.models.lookup import ModelLike
 from rover_gym.policy.arc_forecast import FORECAST_FILE
 from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.evaluation import (
+    SUCCESSES,
     Episode,
     EvaluatedEpisode,
     IntervalEstimate,
@@ -167,7 +168,7 @@ def comparison_table(rows: Sequence[PolicySummary]) -> list[tuple[str, ...]]:
                 _cell(row.energy_per_metre, ".0f"),
                 _cell(row.slip, ".3f"),
                 _cell(row.tilt, ".2f"),
-                ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end != "goal"),
+                ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end not in SUCCESSES),
             )
         )
     kept = [i for i in range(len(table[0])) if i != 1 or any(row[1] for row in table[1:])]
@@ -199,7 +200,7 @@ def other_ends(rows: Sequence[PolicySummary]) -> list[str]:
     """A line for each policy that missed goals: how its other episodes ended."""
     lines = []
     for row in rows:
-        found = ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end != "goal")
+        found = ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end not in SUCCESSES)
         where = "" if row.difficulty is None else f" at difficulty {row.difficulty:g}"
         lines += [f"{row.policy}{where}, other ends: {found}"] if found else []
     return lines

@@ -19,7 +19,11 @@ from rover_gym.mechanics import OptionError
 from rover_gym.policy.named_policy import Policy, named_policy
 from rover_gym.validation import number, refuse, whole
 
+#: Ends of an episode that tables count even where there was none.
 ENDS = ("goal", "time", "high_centred", "roll_over", "left_field", "step_failed")
+
+#: Ends that are a success; a trapped rover that has come free has reached its aim.
+SUCCESSES = ("goal", "free")
 
 
 @dataclass(frozen=True)
@@ -136,8 +140,8 @@ class EvaluatedEpisode:
 
     @property
     def success(self) -> bool:
-        """Whether the goal was reached."""
-        return self.end == "goal"
+        """Whether the goal was reached, or in a trap the rover has come free."""
+        return self.end in SUCCESSES
 
 
 def drive_all(

@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use rover_core::contact::Part;
-use rover_core::integrator::ContactMode;
+use rover_core::law::mode::ContactMode;
 use rover_core::multibody::Model;
 use rover_core::simulation::{
     Linearisation as Core, LinearisationError, RoverSimulation, StepParameter, Trajectory,

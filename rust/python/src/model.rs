@@ -260,14 +260,14 @@ impl RoverModel {
     /// command likewise, and `machines` has the part of each.
     ///
     /// Args:
-    ///     models: Machines by name.
+    ///     models: Machines by name: objects, names of the gallery or files.
     ///     loops: Constraints between machines, dictionaries with the fields of a closed loop in a
     ///         model file. Between free machines `other_position` is required, and in a weld
     ///         `other_rotation`. None by default.
     ///     name: Name of the model; by default the machines' names.
     ///
     /// Raises:
-    ///     ModelError: `models` are not RoverModels by name, or a loop is invalid.
+    ///     ModelError: `models` are not models by name, or a loop is invalid.
     #[staticmethod]
     #[pyo3(signature = (models, *, loops = None, name = None))]
     fn join(
@@ -849,20 +849,12 @@ impl RoverModel {
 /// Descriptions of machines by their names.
 fn machines_by_name(models: &Bound<'_, PyAny>) -> Result<Vec<(String, ModelDescription)>> {
     let Ok(given) = models.cast::<PyMapping>() else {
-        return Err(refused(
-            models,
-            Kind::Model,
-            "models",
-            "RoverModels by name",
-        ));
+        return Err(refused(models, Kind::Model, "models", "models by name"));
     };
     let read = |item: Bound<'_, PyAny>| {
         let (name, model): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
         let name = text(&name, Kind::Model, "models")?;
-        let Ok(given) = model.extract::<RoverModel>() else {
-            let field = format!("models[{name}]");
-            return Err(refused(&model, Kind::Model, &field, "a RoverModel"));
-        };
+        let given = RoverModel::opened(&model, &format!("models[{name}]"))?;
         Ok((name, given.inner.description().clone()))
     };
     given.items()?.iter().map(read).collect()

@@ -7,7 +7,7 @@ use rover_core::nalgebra::Vector2;
 use rover_core::planar::{Ball, MirroredRover, PlanarWheel, TwoWheelRover};
 use std::sync::Arc;
 
-use crate::arguments::{Named, number, refused};
+use crate::arguments::{Named, number};
 use crate::errors::{Kind, Result};
 use crate::model::RoverModel;
 use crate::planar::{PlanarSimulation, pair};
@@ -159,8 +159,8 @@ pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Res
 ///
 /// Args:
 ///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.
-///     model: The machine, which must be symmetric about the trunk's x-y plane; the built-in rover
-///         by default.
+///     model: The machine: an object, a name of the gallery or a file. It must be symmetric about
+///         the trunk's x-y plane; the built-in rover by default.
 ///     **options: Options of `BallSimulation`.
 ///
 /// Raises:
@@ -185,11 +185,9 @@ impl MirroredRoverSimulation {
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<PyClassInitializer<Self>> {
         let given = Named::keywords(ground.py(), options)?;
-        let model = given.some("model")?.map(|model| {
-            let wrong = |_| refused(&model, Kind::Model, "model", "a RoverModel");
-            model.extract::<RoverModel>().map_err(wrong)
-        });
+        let model = given.some("model")?;
         let inner = model
+            .map(|model| RoverModel::opened(&model, "model"))
             .transpose()?
             .map_or_else(|| Arc::new(Model::gallery_rover()), |m| m.inner);
         let rover = MirroredRover::new(&inner).map_err(|e| border(Kind::Model, &e))?;

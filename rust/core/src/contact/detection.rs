@@ -10,7 +10,8 @@ use super::part::{Part, wheel_shape};
 use super::ways_out::{OverSurfaces, TOUCH, WaysOut};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
-    SurfacePoint, box_sphere, disc_sphere, dispatch, is_lowest, roller_sphere, sphere_sphere,
+    SurfacePoint, box_sphere, disc_sphere, disc_triangle, dispatch, is_lowest, roller_sphere,
+    sphere_sphere,
 };
 use crate::geometry::{
     Coverage, Disc, Neighbourhood, PlacedShape, Primitive, Roller, Sphere, SupportMap, Terrain,
@@ -388,8 +389,12 @@ pub(crate) fn visit_on_surface(
             let near = dispatch::point_at_vertex(shape, vertex, base);
             let is_pushing = near.gap <= reach && dispatch::pushes(vertex, shape, &near.n);
             let is_near = is_pushing && !is_covered(&near);
-            let within = || vertex.place - vertex.inward() * near.gap;
-            if is_near && (overlaps(&near) || terrain.is_inside(id, &within())) {
+            let within = || match shape {
+                PlacedShape::Disc(disc) => disc_triangle::pierced(disc, vertex, &near, base),
+                _ => Some(vertex.place - vertex.inward() * near.gap),
+            };
+            let pierces = || within().is_some_and(|place| terrain.is_inside(id, &place));
+            if is_near && (overlaps(&near) || pierces()) {
                 visit(&near);
             }
         }

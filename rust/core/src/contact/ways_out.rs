@@ -263,15 +263,24 @@ impl WaysOut {
         })
     }
 
-    /// The deepest point that counts, without its excess, and its piece, if any is deeper than
-    /// [`OverSurfaces::shallow`].
+    /// The deepest of the points that count, each without its excess, and its piece, if any is deeper
+    /// than [`OverSurfaces::shallow`].
     pub fn deepest(&mut self, part: &OverSurfaces<'_>) -> Option<(u32, SurfacePoint)> {
         if !self.has_deep {
             return None;
         }
         self.sift(part);
-        let (id, mut point) = *self.ways[..self.n].iter().flatten().next_back()?;
-        point.gap += part.excess((id, &part.terrain.primitive(id)), &point);
-        Some((id, point))
+        let mut deepest: Option<(u32, SurfacePoint)> = None;
+        // From the largest overlap on: the others are no deeper than they are.
+        for &(id, mut point) in self.ways[..self.n].iter().flatten().rev() {
+            if deepest.is_some_and(|(_, other)| other.gap <= point.gap) {
+                break;
+            }
+            point.gap += part.excess((id, &part.terrain.primitive(id)), &point);
+            if deepest.is_none_or(|(_, other)| point.gap < other.gap) {
+                deepest = Some((id, point));
+            }
+        }
+        deepest
     }
 }

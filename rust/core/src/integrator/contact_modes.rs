@@ -20,16 +20,7 @@
 //! Redundant contacts make the system singular. Any of its solutions gives the same du, so that of
 //! an elimination with complete pivoting is taken, with zeros where there is no pivot.
 
-/// What a contact does at the end of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ContactMode {
-    /// It transmits no impulse.
-    Open,
-    /// Neither its normal nor its tangential velocity can change.
-    Stick,
-    /// It stays closed and slides, with the friction of Coulomb's cone.
-    Slip,
-}
+use crate::law::mode::ContactMode;
 
 /// Velocity, relative to the largest at play, that counts as rounding.
 ///

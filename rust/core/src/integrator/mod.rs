@@ -65,7 +65,6 @@ pub mod warm_start;
 pub mod work;
 
 pub use accuracy::Accuracy;
-pub use contact_modes::ContactMode;
 pub use error::{OptionsError, StepError};
 pub use mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start, UnilateralContact};
 pub use options::{Stabilisation, StepOptions, Variant};

@@ -7,13 +7,11 @@
 
 use super::associated;
 use super::friction_law::FrictionLaw;
-use super::mode::Tangent;
+use super::mode::{ContactMode, Tangent};
 use super::one_contact::solve_one_contact;
 use super::signorini;
 use crate::cone::{project_on_disc, shortened, split, tangential_norm};
 use crate::spatial::space::dot;
-
-pub use super::mode::ContactMode;
 
 /// De Saxcé's modified velocity `ũ = u + μ|u_T| n`, m/s.
 ///
@@ -99,7 +97,7 @@ impl<const D: usize> FrictionLaw<D> for Coulomb {
         let norm = tangential_norm(&z);
         let radius = self.0 * z[0];
         if self.0 <= 0.0 {
-            with(ContactMode::Slide)
+            with(ContactMode::Slip)
         } else if norm <= radius {
             with(ContactMode::Stick)
         } else {

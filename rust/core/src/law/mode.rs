@@ -1,4 +1,4 @@
-//! Open, stick or slide: the three states of a contact, and the law linearised in one of them.
+//! Open, stick or slip: the three states of a contact, and the law linearised in one of them.
 
 use crate::cone::tangential_norm;
 
@@ -11,7 +11,7 @@ pub enum ContactMode {
     /// No velocity, `u = 0` and `|p_T| ≤ μ p_N`.
     Stick,
     /// `u_N = 0` and `p_T = −μ p_N u_T/|u_T|`.
-    Slide,
+    Slip,
 }
 
 /// The law of one contact linearised in a mode: what Newton's method needs.
@@ -46,7 +46,7 @@ impl Tangent {
         let norm = tangential_norm(p);
         let along: f64 = p[1..].iter().zip(&u[1..]).map(|(p, u)| p * u).sum();
         Self {
-            mode: ContactMode::Slide,
+            mode: ContactMode::Slip,
             e: direction(p, norm),
             gamma: if norm > 0.0 {
                 (-along / (norm * norm)).max(0.0)
@@ -61,7 +61,7 @@ impl Tangent {
     #[must_use]
     pub fn along<const D: usize>(z: &[f64; D], norm: f64, gamma: f64) -> Self {
         Self {
-            mode: ContactMode::Slide,
+            mode: ContactMode::Slip,
             e: direction(z, norm),
             gamma,
         }

@@ -93,7 +93,7 @@ fn solve_within<const D: usize, const STEPS: usize>(
     }
     solution.impulse = frictionless::answer(W_NN, q);
     if mu <= 0.0 {
-        solution.mode = ContactMode::Slide;
+        solution.mode = ContactMode::Slip;
     } else if D == 2 {
         in_the_plane(W, q, mu, &mut solution);
     } else {
@@ -124,7 +124,7 @@ fn in_the_plane<const D: usize>(
     if denominator > W_hat {
         // On the cone exactly, not up to the rounding of the elimination.
         p[1] = (mu * p[0]).copysign(-q_hat);
-        solution.mode = ContactMode::Slide;
+        solution.mode = ContactMode::Slip;
         solution.kappa = denominator - W_hat;
     }
 }
@@ -303,7 +303,7 @@ fn in_space<const D: usize, const STEPS: usize>(
         start
     };
     let (_, _, b, det) = contact.at(kappa);
-    solution.mode = ContactMode::Slide;
+    solution.mode = ContactMode::Slip;
     solution.kappa = kappa;
     if det > 0.0 {
         contact.impulse(b, det, p);

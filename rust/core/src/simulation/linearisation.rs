@@ -13,7 +13,7 @@ use super::error::LinearisationError;
 use super::rover::RoverSimulation;
 use super::step_parameter::StepParameter;
 use crate::contact::Part;
-use crate::integrator::ContactMode;
+use crate::law::mode::ContactMode;
 
 /// The derivatives of a step, and how far they hold.
 #[derive(Clone, Debug)]

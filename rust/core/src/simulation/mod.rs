@@ -37,7 +37,7 @@
 //! [`crate::caught`], `pool`, [`crate::quantity`], [`crate::scalar`], [`crate::spatial`],
 //! [`crate::multibody`],
 //! [`crate::sand`], [`crate::geometry`], [`crate::contact`], [`crate::problem`],
-//! [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`],
+//! [`crate::law`], [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`],
 //! [`crate::lanes`].
 // Registers of other processors hold one rover: nothing there uses blocks of lanes.
 #![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]

@@ -220,6 +220,23 @@ pub fn nearest_at_vertex(disc: &Disc, vertex: &Vertex, base: &Vector3<f64>) -> S
     }
 }
 
+/// Where the line from a vertex into the ground crosses the face of a disc, world, m, if it does.
+///
+/// `near`: the point of [`nearest_at_vertex`].
+#[must_use]
+pub fn pierced(
+    disc: &Disc,
+    vertex: &Vertex,
+    near: &SurfacePoint,
+    base: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let inward = vertex.inward();
+    let way = near.gap / near.n.dot(&inward);
+    let place = vertex.place + inward * way;
+    let is_on_face = (place - base - disc.centre).norm_squared() <= disc.radius * disc.radius;
+    (way.is_finite() && way >= 0.0 && is_on_face).then_some(place)
+}
+
 /// Normals at an edge, from one to another, and the derivatives of the gap at both, up to a
 /// positive factor and with the sign reversed.
 struct Bracket {

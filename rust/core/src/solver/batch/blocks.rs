@@ -14,7 +14,7 @@
 
 use super::loaded::{Loaded, solve_one};
 use super::problem::{ContactProblem, MAX_DENSE, block};
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::scalar::{Lane, MAX_LANES};
 use crate::solver::pivoting::{Few, Mode, System, Triple};
 

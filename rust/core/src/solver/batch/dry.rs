@@ -15,7 +15,7 @@
 use super::blocks::{Block, Factors, backward, backward_row, factorise, forward, velocities};
 use super::loaded::{Loaded, solve_one};
 use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_DENSE, MAX_DRY, block};
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::scalar::Lane;
 use crate::solver::pivoting::{Few, Mode, System, Triple};
 

@@ -1,7 +1,7 @@
 //! How the problems of several rovers become the [systems](System) of their lanes.
 
 use super::problem::ContactProblem;
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::law::one_contact::solve_one_contact;
 use crate::scalar::Lane;
 use crate::solver::pivoting::{Few, System, Triple};

@@ -28,7 +28,7 @@ use super::pattern::BASE;
 use super::pattern::Pattern;
 use super::problem::ContactProblem;
 use super::tree_matrix::{Base, Columns, TreeMatrix, product};
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{Few, Mode, System, Triple};
 

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::problem::BlockSparseDelassus;
 use crate::solver::local::modes::{Linearised, n_unknowns};
 
@@ -141,7 +141,7 @@ fn reduce<const D: usize>(
     match i.mode {
         ContactMode::Open => return [[0.0; D]; D],
         ContactMode::Stick => {}
-        ContactMode::Slide => {
+        ContactMode::Slip => {
             let [e0, e1] = i.e;
             if D == 3 && mu_i > 0.0 {
                 rows[1] = std::array::from_fn(|c| e0 * rows[D - 1][c] - e1 * rows[1][c]);
@@ -156,7 +156,7 @@ fn reduce<const D: usize>(
     match j.mode {
         ContactMode::Open => return [[0.0; D]; D],
         ContactMode::Stick => {}
-        ContactMode::Slide => {
+        ContactMode::Slip => {
             let [e0, e1] = j.e;
             for row in &mut rows {
                 let along = if D == 2 {
@@ -289,7 +289,7 @@ impl BlockLu {
                             }
                         }
                     }
-                    if size == 2 && contact.mode == ContactMode::Slide {
+                    if size == 2 && contact.mode == ContactMode::Slip {
                         reduced[1][1] += contact.gamma;
                     }
                 }

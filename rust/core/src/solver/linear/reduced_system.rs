@@ -10,7 +10,7 @@
 
 use super::block_lu::BlockLu;
 use super::dense::{self, Chunk, LANES};
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal};
 use crate::solver::local::modes::{Linearised, Prediction, n_unknowns};
 use crate::solver::work::{self, Work};
@@ -79,7 +79,7 @@ fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> b
                     *x = 0.0;
                 }
             }
-            ContactMode::Slide => {
+            ContactMode::Slip => {
                 let wanted = mu * p[0];
                 let along = if D == 2 {
                     p[1] * contact.e[0]
@@ -156,7 +156,7 @@ fn assemble<const D: usize>(
         match (contact.mode, size) {
             (ContactMode::Open, _) => continue,
             (ContactMode::Stick, _) => assemble_rows(rows, mu, contacts, height, own, |w| w),
-            (ContactMode::Slide, 2) => {
+            (ContactMode::Slip, 2) => {
                 let across = |w: [[f64; D]; D]| {
                     let turned = std::array::from_fn(|c| e0 * w[D - 1][c] - e1 * w[1][c]);
                     [w[0], turned]
@@ -164,7 +164,7 @@ fn assemble<const D: usize>(
                 assemble_rows(rows, mu, contacts, height, own, across);
                 own[(contact.start + 1) * height + 1] += contact.gamma;
             }
-            (ContactMode::Slide, _) => {
+            (ContactMode::Slip, _) => {
                 assemble_rows(rows, mu, contacts, height, own, |w| [w[0]]);
             }
         }
@@ -203,7 +203,7 @@ fn assemble_rows<const D: usize, const R: usize>(
                     push(w.map(|row| row[c]));
                 }
             }
-            ContactMode::Slide => {
+            ContactMode::Slip => {
                 let w = reduce(rows.map(|row| row[j]));
                 let along = |row: [f64; D]| {
                     if D == 2 {
@@ -243,7 +243,7 @@ fn right_hand_side<const D: usize>(
                     rhs[contact.start + k] = -u_hat[k];
                 }
             }
-            ContactMode::Slide => {
+            ContactMode::Slip => {
                 rhs[contact.start] = -u_hat[0];
                 if D == 3 && data.mu[i] > 0.0 {
                     let [e0, e1] = contact.e;
@@ -274,7 +274,7 @@ fn apply<const D: usize>(
                     *x += y;
                 }
             }
-            ContactMode::Slide => {
+            ContactMode::Slip => {
                 let y_N = y[contact.start];
                 p[0] += y_N;
                 if mu <= 0.0 {

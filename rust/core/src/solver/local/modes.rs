@@ -6,9 +6,9 @@
 //! the projection cycles (measured: all recorded rover impacts in at most five steps). Neither
 //! depends on the order of the contacts.
 
-use crate::law::coulomb::{ContactMode, Coulomb};
+use crate::law::coulomb::Coulomb;
 use crate::law::friction_law::FrictionLaw;
-use crate::law::mode::Tangent;
+use crate::law::mode::{ContactMode, Tangent};
 use crate::law::one_contact::solve_one_contact;
 use crate::problem::{Prepared, Proximal};
 
@@ -42,8 +42,8 @@ pub(in crate::solver) fn n_unknowns<const D: usize>(mode: ContactMode, mu: f64) 
     match mode {
         ContactMode::Open => 0,
         ContactMode::Stick => D,
-        ContactMode::Slide if D == 3 && mu > 0.0 => 2,
-        ContactMode::Slide => 1,
+        ContactMode::Slip if D == 3 && mu > 0.0 => 2,
+        ContactMode::Slip => 1,
     }
 }
 
@@ -90,7 +90,7 @@ pub(in crate::solver) fn recall<const D: usize>(
     {
         let p: [f64; D] = std::array::from_fn(|k| p[k]);
         *contact = Linearised::of(Coulomb(mu).recall(&p, u), prediction.m);
-        prediction.slides |= contact.mode == ContactMode::Slide && mu > 0.0;
+        prediction.slides |= contact.mode == ContactMode::Slip && mu > 0.0;
         prediction.m += n_unknowns::<D>(contact.mode, mu);
     }
     prediction
@@ -125,7 +125,7 @@ pub(in crate::solver) fn predict<const D: usize>(
             Coulomb(mu).linearise(&p, &u_hat, rho)
         };
         prediction.changed |= next.mode != contact.mode;
-        prediction.slides |= next.mode == ContactMode::Slide && mu > 0.0;
+        prediction.slides |= next.mode == ContactMode::Slip && mu > 0.0;
         *contact = Linearised::of(next, prediction.m);
         prediction.m += n_unknowns::<D>(next.mode, mu);
     }

@@ -5,7 +5,7 @@ use super::mode_memory::weight;
 use super::modes::return_to_cone;
 use super::store::Store;
 use super::system::System;
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::scalar::{Lane, LaneMask};
 
 /// Factor by which `α` shrinks when a full step with the right modes gains nothing.

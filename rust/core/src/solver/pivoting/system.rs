@@ -2,7 +2,7 @@
 
 use super::modes::{Mode, Triple};
 use super::store::Store;
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::scalar::Lane;
 
 /// Problems `u = W p + q`, one a lane, and the linear systems of their modes.

@@ -6,7 +6,7 @@
 //! answer and the caller continues.
 
 use crate::cone::tangential_norm;
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::law::one_contact::estimate_one_contact;
 use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep};
@@ -44,7 +44,7 @@ fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &
         .all(|(contact, u)| match contact.mode {
             ContactMode::Stick => true,
             ContactMode::Open => u[0] > DECIDED * largest,
-            ContactMode::Slide => {
+            ContactMode::Slip => {
                 let slip: [f64; D] = std::array::from_fn(|k| u[k]);
                 tangential_norm(&slip) > DECIDED * largest
             }
@@ -165,7 +165,7 @@ pub(in crate::solver) fn solve<const D: usize>(
             .iter_mut()
             .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
         {
-            if contact.mode == ContactMode::Slide {
+            if contact.mode == ContactMode::Slip {
                 modes::set_slide::<D>(contact, p, u);
             }
         }

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use crate::law::coulomb::ContactMode;
+use crate::law::mode::ContactMode;
 use crate::law::one_contact::solve_one_contact;
 use crate::problem::{ContactScales, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
@@ -67,13 +67,13 @@ impl<const D: usize> PreparedSystem<'_, D> {
                 mode: match (mode.closed, mode.stick) {
                     (false, _) => ContactMode::Open,
                     (true, true) => ContactMode::Stick,
-                    (true, false) => ContactMode::Slide,
+                    (true, false) => ContactMode::Slip,
                 },
                 e: [mode.b[1], -mode.b[0]],
                 gamma: mode.gamma,
                 start: prediction.m,
             };
-            prediction.slides |= contact.mode == ContactMode::Slide && mu > 0.0;
+            prediction.slides |= contact.mode == ContactMode::Slip && mu > 0.0;
             prediction.m += n_unknowns::<D>(contact.mode, mu);
         }
         self.prediction = prediction;
