@@ -71,7 +71,8 @@ GROUPS: Mapping[str, Group] = {
                 *(_rover("open-rover", level) for level in (1.0, 1.5, 2.0)),
                 *(_rover(name, 1.0) for name in ("skid-steered", "four-steered", "mars-rover")),
             ]
-        )
+        ),
+        episodes=100,
     ),
     "tasks": Group(
         {
