@@ -265,14 +265,14 @@ class RoverModel:
         command likewise, and `machines` has the part of each.
 
         Args:
-            models: Machines by name.
+            models: Machines by name: objects, names of the gallery or files.
             loops: Constraints between machines, dictionaries with the fields of a closed loop in a
                 model file. Between free machines `other_position` is required, and in a weld
                 `other_rotation`. None by default.
             name: Name of the model; by default the machines' names.
 
         Raises:
-            ModelError: `models` are not RoverModels by name, or a loop is invalid.
+            ModelError: `models` are not models by name, or a loop is invalid.
         """
     @property
     def machines(self) -> dict[str, Machine]:
@@ -2275,8 +2275,8 @@ class MirroredRoverSimulation(PlanarSimulation):
 
     Args:
         ground: A `Line`, `Sine`, `Spline` or `Polyline`.
-        model: The machine, which must be symmetric about the trunk's x-y plane; the built-in rover
-            by default.
+        model: The machine: an object, a name of the gallery or a file. It must be symmetric about
+            the trunk's x-y plane; the built-in rover by default.
         **options: Options of `BallSimulation`.
 
     Raises:

@@ -151,6 +151,10 @@ def _drive(job: tuple[str, str, str]) -> str:
     return ", ".join(job)
 
 
+def _percent(one: Mapping[str, Any]) -> str:
+    return f"{100.0 * one['successes'] / one['episodes']:.1f}".removesuffix(".0")
+
+
 def table(data: Mapping[str, Any], name: str) -> str:
     """The table of a group, in Markdown."""
     heads = (
@@ -173,7 +177,7 @@ def table(data: Mapping[str, Any], name: str) -> str:
         cells = (
             "" if one["scene"] == last else one["scene"],
             f"`{one['policy']}`",
-            f"{100.0 * one['successes'] / one['episodes']:.1f}%",
+            f"{_percent(one)}%",
             f"{low:.1f} to {high:.1f}%",
             "" if one["time"] is None else f"{one['time']:.1f} s",
             f"{one['energy_per_metre']:.0f} J/m",
@@ -206,7 +210,7 @@ def success(data: Mapping[str, Any], scene: str, policy: str) -> str:
     """
     for one in data["rows"]:
         if (one["scene"], one["policy"]) == (scene, policy):
-            return f"{100.0 * one['successes'] / one['episodes']:.1f}".removesuffix(".0")
+            return _percent(one)
     raise LookupError(f"{FILE}: no {policy} on {scene}")
 
 

@@ -263,8 +263,8 @@ impl WaysOut {
         })
     }
 
-    /// The deepest of the points that count, each without its excess, and its piece, if any is deeper
-    /// than [`OverSurfaces::shallow`].
+    /// The deepest of the points that count, each without its excess, and its piece, if any is
+    /// deeper than [`OverSurfaces::shallow`].
     pub fn deepest(&mut self, part: &OverSurfaces<'_>) -> Option<(u32, SurfacePoint)> {
         if !self.has_deep {
             return None;
