@@ -128,7 +128,7 @@ fn a_block_slides_on_a_brushed_table_along_the_normal_of_the_ellipse() {
     );
     assert!(normal[0] * v + normal[1] * w < 0.0, "against the slip");
     let tangent = law.linearise(&p[0], &u[0], [1.0, 1.0]);
-    assert_eq!(tangent.mode, ContactMode::Slide);
+    assert_eq!(tangent.mode, ContactMode::Slip);
     assert!((tangent.e[0] * y - tangent.e[1] * x).abs() < 1e-9);
     let size = x.hypot(y);
     assert!(

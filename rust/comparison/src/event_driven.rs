@@ -22,8 +22,8 @@
 use std::cell::RefCell;
 
 use rover_core::integrator::{
-    Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, StateMut, StepError, StepOptions,
-    StepReport, StepStatus, UnilateralContact, WarmStart,
+    Dynamics, Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, StateMut, StepError,
+    StepOptions, StepReport, StepStatus, UnilateralContact, WarmStart,
 };
 use rover_core::law::newton_impact::rebound;
 use rover_core::nalgebra::{DMatrix, DVector};
@@ -118,11 +118,7 @@ impl<K> Reserve<K> {
 }
 
 /// Configuration and velocity after a part of the step, and what is about to end the motion there.
-type Reached<S> = (
-    <S as MechanicalSystem>::Configuration,
-    Vec<f64>,
-    Reserve<KeyOf<S>>,
-);
+type Reached<S> = (<S as Dynamics>::Configuration, Vec<f64>, Reserve<KeyOf<S>>);
 
 /// One step's view: system, options and the solver's scratch.
 struct Run<'a, S: MechanicalSystem> {

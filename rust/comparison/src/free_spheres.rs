@@ -7,7 +7,7 @@
 //! an attitude, spins in its own axes, and touches the plane with its corners.
 
 use rover_core::contact::{Activation, ContactFrame};
-use rover_core::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
+use rover_core::integrator::{Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact};
 use rover_core::system::grains::grid::Grid;
@@ -269,9 +269,8 @@ fn add_transposed(
     }
 }
 
-impl MechanicalSystem for SphereSystem<'_> {
+impl Dynamics for SphereSystem<'_> {
     type Configuration = Placement;
-    type Contact = SphereContact;
 
     const DIMENSION: Dimension = Dimension::Three;
 
@@ -314,6 +313,75 @@ impl MechanicalSystem for SphereSystem<'_> {
     fn place_end(&mut self, q: &Placement) {
         self.parts.end.clone_from(q);
     }
+
+    fn update_mass_matrix(&mut self, _options: &StepOptions) {
+        let n = self.bodies.count();
+        // Each sphere is like the others, and nothing here changes in a run.
+        if self.parts.roots.len() != n {
+            let masses = |body| self.bodies.masses(body);
+            self.parts.inverse_masses = (0..n).map(|b| masses(b).map(f64::recip)).collect();
+            self.parts.roots = (0..n).map(|b| masses(b).map(f64::sqrt)).collect();
+        }
+    }
+
+    fn factorise(&mut self, _options: &StepOptions) -> bool {
+        self.parts.roots.iter().flatten().all(|m| *m > 0.0)
+    }
+
+    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
+        let bodies = out.chunks_exact_mut(NV).zip(v.chunks_exact(NV));
+        for (body, (out, v)) in bodies.enumerate() {
+            let masses = self.bodies.masses(body);
+            for k in 0..NV {
+                out[k] = masses[k] * v[k];
+            }
+        }
+    }
+
+    fn half_solve(&self, y: &mut [f64]) {
+        for (y, roots) in y.chunks_exact_mut(NV).zip(&self.parts.roots) {
+            for k in 0..NV {
+                y[k] /= roots[k];
+            }
+        }
+    }
+
+    fn half_solve_back(&self, y: &mut [f64]) {
+        self.half_solve(y);
+    }
+
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
+        (0..self.bodies.count()).fold(0.0, |m, i| self.bodies.speed(y, i).max(m))
+    }
+}
+
+impl Forces for SphereSystem<'_> {
+    fn load(
+        &mut self,
+        options: &StepOptions,
+        _start: Start<'_, Placement>,
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        let h = options.time_step;
+        let weight = options.gravity * (self.bodies.kind.mass * h);
+        for y in y.chunks_exact_mut(NV) {
+            y[..3].copy_from_slice(weight.as_slice());
+            y[3..].fill(0.0);
+        }
+        if let Some(slab) = &self.bodies.slab {
+            let force = options.gravity * slab.mass + slab.push;
+            let omega = spin(v_mean, self.bodies.n);
+            let gyroscopic = slab.inertia().component_mul(&omega).cross(&omega);
+            let y = &mut y[NV * self.bodies.n..];
+            y[..3].copy_from_slice((force * h).as_slice());
+            y[3..].copy_from_slice((gyroscopic * h).as_slice());
+        }
+    }
+}
+
+impl Contacting for SphereSystem<'_> {
+    type Contact = SphereContact;
 
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<SphereContact>) {
         out.clear();
@@ -378,65 +446,6 @@ impl MechanicalSystem for SphereSystem<'_> {
             Some(slab) if contact.bodies[1].is_some_and(|b| b == self.bodies.n) => slab.friction,
             _ => options.friction_coefficient,
         }
-    }
-
-    fn update_mass_matrix(&mut self, _options: &StepOptions) {
-        let n = self.bodies.count();
-        // Each sphere is like the others, and nothing here changes in a run.
-        if self.parts.roots.len() != n {
-            let masses = |body| self.bodies.masses(body);
-            self.parts.inverse_masses = (0..n).map(|b| masses(b).map(f64::recip)).collect();
-            self.parts.roots = (0..n).map(|b| masses(b).map(f64::sqrt)).collect();
-        }
-    }
-
-    fn factorise(&mut self, _options: &StepOptions) -> bool {
-        self.parts.roots.iter().flatten().all(|m| *m > 0.0)
-    }
-
-    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        let bodies = out.chunks_exact_mut(NV).zip(v.chunks_exact(NV));
-        for (body, (out, v)) in bodies.enumerate() {
-            let masses = self.bodies.masses(body);
-            for k in 0..NV {
-                out[k] = masses[k] * v[k];
-            }
-        }
-    }
-
-    fn load(
-        &mut self,
-        options: &StepOptions,
-        _start: Start<'_, Placement>,
-        v_mean: &[f64],
-        y: &mut [f64],
-    ) {
-        let h = options.time_step;
-        let weight = options.gravity * (self.bodies.kind.mass * h);
-        for y in y.chunks_exact_mut(NV) {
-            y[..3].copy_from_slice(weight.as_slice());
-            y[3..].fill(0.0);
-        }
-        if let Some(slab) = &self.bodies.slab {
-            let force = options.gravity * slab.mass + slab.push;
-            let omega = spin(v_mean, self.bodies.n);
-            let gyroscopic = slab.inertia().component_mul(&omega).cross(&omega);
-            let y = &mut y[NV * self.bodies.n..];
-            y[..3].copy_from_slice((force * h).as_slice());
-            y[3..].copy_from_slice((gyroscopic * h).as_slice());
-        }
-    }
-
-    fn half_solve(&self, y: &mut [f64]) {
-        for (y, roots) in y.chunks_exact_mut(NV).zip(&self.parts.roots) {
-            for k in 0..NV {
-                y[k] /= roots[k];
-            }
-        }
-    }
-
-    fn half_solve_back(&self, y: &mut [f64]) {
-        self.half_solve(y);
     }
 
     fn assemble(&mut self, contacts: &[SphereContact], v: &[f64], u: &mut [f64]) {
@@ -504,9 +513,5 @@ impl MechanicalSystem for SphereSystem<'_> {
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled_sparse(&self.parts.W, q, mu)
-    }
-
-    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
-        (0..self.bodies.count()).fold(0.0, |m, i| self.bodies.speed(y, i).max(m))
     }
 }

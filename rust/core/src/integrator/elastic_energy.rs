@@ -3,7 +3,8 @@
 //! It is remembered from step to step ([`WarmStart::stored`]), so what they give off over any time
 //! is no more than they took and had at its start.
 
-use super::mechanical_system::{KeyOf, MechanicalSystem, UnilateralContact};
+use super::contacting::{KeyOf, UnilateralContact};
+use super::mechanical_system::MechanicalSystem;
 use super::options::StepOptions;
 use super::scratch::ScratchOf;
 use super::warm_start::WarmStart;

@@ -31,10 +31,13 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::carried_velocity::Carried;
+use super::contacting::KeyOf;
+use super::dynamics::MechanicalEnergy;
 use super::elastic_energy::{find_stored, find_stored_after, held};
 use super::excess::{Balance, Excess};
+use super::forces::Start;
 use super::groups::Group;
-use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start};
+use super::mechanical_system::MechanicalSystem;
 use super::options::StepOptions;
 use super::report::StepReport;
 use super::scratch::ScratchOf;

@@ -1,7 +1,7 @@
 //! Energy balance of a step, and by how much it exceeds what was supplied.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use super::mechanical_system::MechanicalEnergy;
+use super::dynamics::MechanicalEnergy;
 use super::work::Work;
 use crate::scalar::{Lane, Vec3};
 

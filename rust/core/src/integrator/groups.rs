@@ -6,7 +6,9 @@
 //! corrects the velocity and how far positions are projected are decisions of a group: what happens
 //! in another one has no influence on it. A system with one cluster has one group.
 
-use super::mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, UnilateralContact};
+use super::contacting::{KeyOf, UnilateralContact};
+use super::dynamics::MechanicalEnergy;
+use super::mechanical_system::MechanicalSystem;
 use super::options::StepOptions;
 use super::warm_start::WarmStart;
 

@@ -13,7 +13,8 @@
 //! has what that needs of a step that was taken; `crate::system::tangent` differentiates.
 
 use super::contact_modes::{Answer, HeldLaw};
-use super::mechanical_system::{MechanicalSystem, UnilateralContact};
+use super::contacting::UnilateralContact;
+use super::mechanical_system::MechanicalSystem;
 use super::options::{Stabilisation, StepOptions};
 use super::scratch::ScratchOf;
 use super::step_contacts::{shift, softness};

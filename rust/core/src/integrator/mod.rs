@@ -43,10 +43,13 @@
 pub mod accuracy;
 pub(crate) mod carried_velocity;
 pub mod contact_modes;
+pub mod contacting;
+pub mod dynamics;
 mod elastic_energy;
 pub mod energy_audit;
 pub mod error;
 pub(crate) mod excess;
+pub mod forces;
 mod groups;
 pub(crate) mod held_step;
 mod island;
@@ -65,8 +68,11 @@ pub mod warm_start;
 pub mod work;
 
 pub use accuracy::Accuracy;
+pub use contacting::{Contacting, KeyOf, UnilateralContact};
+pub use dynamics::{Dynamics, MechanicalEnergy};
 pub use error::{OptionsError, StepError};
-pub use mechanical_system::{KeyOf, MechanicalEnergy, MechanicalSystem, Start, UnilateralContact};
+pub use forces::{Forces, Start};
+pub use mechanical_system::MechanicalSystem;
 pub use options::{Stabilisation, StepOptions, Variant};
 pub use probe::{NoProbe, Phase, Probe};
 pub use report::{StepReport, StepStatus};

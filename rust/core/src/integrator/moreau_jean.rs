@@ -17,10 +17,10 @@
 //! path of a turning rover lags by h/2 and its speed decays with h ω²/2: the error is five times
 //! larger on the flat drive of the tests.
 //!
-//! If the spin ([`MechanicalSystem::is_gyroscopic`]) or the energy audit ([`super::energy_audit`])
-//! requires it, the gyroscopic terms are implicit: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)`, where
-//! Δv includes the impulses of persistent contact. The scheme is then stable at any spin and any
-//! step.
+//! If the spin ([`super::dynamics::Dynamics::is_gyroscopic`]) or the energy audit
+//! ([`super::energy_audit`]) requires it, the gyroscopic terms are implicit:
+//! `bias = G + C(q_m, v_m) (v + (1−θ) Δv)`, where Δv includes the impulses of persistent contact.
+//! The scheme is then stable at any spin and any step.
 //!
 //! The PD controller of a held joint is implicit with an exponentially fitted θ_j
 //! ([`crate::system::fitted_theta`]), and stable at any gain and any step. The forecast
@@ -30,10 +30,12 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
+use super::contacting::KeyOf;
 use super::energy_audit::{Audit, GAIN, Verdict, carry_velocity, note_energy_before};
 use super::error::StepError;
+use super::forces::Start;
 use super::groups::Group;
-use super::mechanical_system::{KeyOf, MechanicalSystem, Start};
+use super::mechanical_system::MechanicalSystem;
 use super::options::StepOptions;
 use super::position_projection;
 use super::probe::{Phase, Probe};

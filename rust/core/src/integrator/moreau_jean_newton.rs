@@ -19,10 +19,12 @@
 //! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and
 //! the correction r as in [`super::moreau_jean`].
 
+use super::contacting::{KeyOf, UnilateralContact};
 use super::energy_audit::{Audit, GAIN, Verdict, note_energy_before};
 use super::error::StepError;
+use super::forces::{MOST_REVISIONS, Start};
 use super::groups::Group;
-use super::mechanical_system::{KeyOf, MOST_REVISIONS, MechanicalSystem, Start, UnilateralContact};
+use super::mechanical_system::MechanicalSystem;
 use super::moreau_jean::{MoreauJean, finish};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};

@@ -1,7 +1,8 @@
 //! The interface of a time-stepping scheme.
 
+use super::contacting::KeyOf;
 use super::error::StepError;
-use super::mechanical_system::{KeyOf, MechanicalSystem};
+use super::mechanical_system::MechanicalSystem;
 use super::options::StepOptions;
 use super::probe::Probe;
 use super::report::StepReport;

@@ -1,9 +1,11 @@
 //! Scratch of a step, common to all systems: vectors over velocities and over contacts.
 
+use super::contacting::{Contacting, UnilateralContact};
+use super::dynamics::{Dynamics, MechanicalEnergy};
 use super::excess::Balance;
 use super::groups::{Group, Groups};
 use super::island::{Island, left_of};
-use super::mechanical_system::{MechanicalEnergy, MechanicalSystem, UnilateralContact};
+use super::mechanical_system::MechanicalSystem;
 use super::work::Work;
 use crate::law::compliance::Yielding;
 use crate::problem::Redundancy;
@@ -124,8 +126,7 @@ impl<C: UnilateralContact + Clone> Whole<C> {
 }
 
 /// Scratch of a system's steps.
-pub type ScratchOf<S> =
-    Scratch<<S as MechanicalSystem>::Configuration, <S as MechanicalSystem>::Contact>;
+pub type ScratchOf<S> = Scratch<<S as Dynamics>::Configuration, <S as Contacting>::Contact>;
 
 /// A state whose energy is known: the end of a step is the start of the next.
 #[derive(Clone, Debug)]

@@ -1,8 +1,9 @@
 //! The contacts of a step: forecast, assembly, solve, and the gaps at the end.
 
+use super::contacting::{KeyOf, UnilateralContact};
 use super::groups::Group;
 use super::island::{Level, left_of, settle};
-use super::mechanical_system::{KeyOf, MechanicalSystem, UnilateralContact};
+use super::mechanical_system::MechanicalSystem;
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::StepReport;
@@ -484,7 +485,7 @@ pub(super) fn excuse_gaps<S: MechanicalSystem>(system: &S, ws: &mut ScratchOf<S>
     }
 }
 
-/// Solves the contacts of a group, as [`MechanicalSystem::solve`] does those of all.
+/// Solves the contacts of a group, as [`super::contacting::Contacting::solve`] does those of all.
 ///
 /// The answer is the same without the other groups. Its options are those of a problem of its size.
 pub(super) fn solve_group<S: MechanicalSystem>(

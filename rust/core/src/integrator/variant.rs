@@ -1,7 +1,8 @@
 //! The scheme of each variant.
 
+use super::contacting::KeyOf;
 use super::error::StepError;
-use super::mechanical_system::{KeyOf, MechanicalSystem};
+use super::mechanical_system::MechanicalSystem;
 use super::moreau_jean::MoreauJean;
 use super::moreau_jean_newton::MoreauJeanNewton;
 use super::options::{StepOptions, Variant};

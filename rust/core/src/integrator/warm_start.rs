@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::mechanical_system::{MechanicalSystem, UnilateralContact};
+use super::contacting::UnilateralContact;
+use super::mechanical_system::MechanicalSystem;
 use crate::contact::ContactKey;
 
 /// Number of remembered contacts from which bisection is tried before a linear search.

@@ -8,7 +8,7 @@ use super::fitted_theta::implicit_weight;
 use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
-    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
+    Contacting, Dynamics, Forces, MechanicalEnergy, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::multibody::MotorLine;
 use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
@@ -167,9 +167,8 @@ impl PlanarSystem<'_> {
     }
 }
 
-impl MechanicalSystem for PlanarSystem<'_> {
+impl Dynamics for PlanarSystem<'_> {
     type Configuration = Vec<f64>;
-    type Contact = PlanarContact;
 
     const DIMENSION: Dimension = Dimension::Two;
 
@@ -194,6 +193,156 @@ impl MechanicalSystem for PlanarSystem<'_> {
     fn place_end(&mut self, q: &Vec<f64>) {
         self.machine.place(q, &mut self.parts.end);
     }
+
+    fn update_mass_matrix(&mut self, options: &StepOptions) {
+        let parts = &mut *self.parts;
+        parts.matrices.set_mass(self.machine, &parts.middle);
+        let step = (options.time_step, options.theta);
+        for own in &mut parts.motors {
+            let inertia = *parts.matrices.inertia(own.motor.coordinate) / own.motor.gain.abs();
+            own.theta = implicit_weight(step, (own.line.slope(), 0.0), inertia);
+        }
+    }
+
+    fn factorise(&mut self, options: &StepOptions) -> bool {
+        let parts = &mut *self.parts;
+        for own in &parts.motors {
+            let damping = own.motor.gain.abs() * own.line.damping();
+            let inertia = parts.matrices.inertia(own.motor.coordinate);
+            *inertia += options.time_step * own.theta * damping;
+        }
+        parts.matrices.factorise()
+    }
+
+    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
+        self.parts.matrices.multiply_mass(v, out);
+    }
+
+    fn turning(&self, v: &[f64]) -> f64 {
+        self.machine.turning(v)
+    }
+
+    fn energies(
+        &mut self,
+        options: &StepOptions,
+        q: &Vec<f64>,
+        v: &[f64],
+        out: &mut Vec<MechanicalEnergy>,
+    ) {
+        out.clear();
+        out.push(self.machine.energy(q, v, &options.gravity.xy()));
+    }
+
+    fn half_solve(&self, y: &mut [f64]) {
+        self.parts.matrices.forward(y);
+    }
+
+    fn half_solve_back(&self, y: &mut [f64]) {
+        self.parts.matrices.backward(y);
+    }
+
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
+        self.machine.displacement(y)
+    }
+}
+
+impl Forces for PlanarSystem<'_> {
+    fn load(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Vec<f64>>,
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        self.load_at_end(options, start, start.v, v_mean, y);
+    }
+
+    fn choose_branches(&mut self, start: Start<'_, Vec<f64>>) {
+        let motors = &mut self.parts.motors;
+        motors.clear();
+        for (input, &torque) in self.inputs.iter().enumerate() {
+            if let Some(motor) = self.machine.motor(input) {
+                let mut own = Driven {
+                    input,
+                    motor,
+                    line: MotorLine::new(Single::Baseline),
+                    theta: 0.5,
+                };
+                own.line.set_lane(0, Some(&motor.motor), torque);
+                own.line.choose(own.rate(start.v));
+                motors.push(own);
+            }
+        }
+    }
+
+    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
+        let mut is_new = false;
+        for own in &mut self.parts.motors {
+            let rate = own.implicit_rate(start.v, v_end);
+            is_new |= own.line.revise(true, rate);
+        }
+        is_new
+    }
+
+    fn load_at_end(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Vec<f64>>,
+        v_end: &[f64],
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        self.set_torques(start.v, v_end);
+        let PlanarScratch {
+            middle, torques, ..
+        } = &mut *self.parts;
+        let gravity = options.gravity.xy();
+        self.machine.force(middle, v_mean, &gravity, torques, y);
+        for y in y {
+            *y *= options.time_step;
+        }
+    }
+
+    fn work_of_displacement(
+        &mut self,
+        _options: &StepOptions,
+        start: Start<'_, Vec<f64>>,
+        v_end: &[f64],
+        displacement: &[f64],
+    ) -> f64 {
+        self.set_driving(start.v, v_end);
+        sum_of_products(&self.parts.driving, displacement)
+    }
+
+    fn work(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Vec<f64>>,
+        v_end: &[f64],
+        out: &mut [Work],
+    ) {
+        self.set_driving(start.v, v_end);
+        let parts = &*self.parts;
+        let (h, theta) = (options.time_step, options.theta);
+        let mean = |k: usize| theta * v_end[k] + (1.0 - theta) * start.v[k];
+        let driving = parts.driving.iter().enumerate();
+        let power: f64 = driving.map(|(k, f)| f * mean(k)).sum();
+        let mut work = h * power;
+        for own in &parts.motors {
+            let torque = parts.torques[own.input];
+            let turned = h * own.motor.gain.signum() * mean(own.motor.coordinate);
+            let surplus = torque * turned - own.line.work(torque, turned);
+            work -= own.motor.gain.abs() * surplus;
+        }
+        out.fill(Work {
+            supplied: work,
+            ..Work::default()
+        });
+    }
+}
+
+impl Contacting for PlanarSystem<'_> {
+    type Contact = PlanarContact;
 
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<PlanarContact>) {
         out.clear();
@@ -245,146 +394,6 @@ impl MechanicalSystem for PlanarSystem<'_> {
             let next = *next.unwrap_or(&tangent);
             contact.meet(&disc, &next, self.rule);
         }
-    }
-
-    fn update_mass_matrix(&mut self, options: &StepOptions) {
-        let parts = &mut *self.parts;
-        parts.matrices.set_mass(self.machine, &parts.middle);
-        let step = (options.time_step, options.theta);
-        for own in &mut parts.motors {
-            let inertia = *parts.matrices.inertia(own.motor.coordinate) / own.motor.gain.abs();
-            own.theta = implicit_weight(step, (own.line.slope(), 0.0), inertia);
-        }
-    }
-
-    fn factorise(&mut self, options: &StepOptions) -> bool {
-        let parts = &mut *self.parts;
-        for own in &parts.motors {
-            let damping = own.motor.gain.abs() * own.line.damping();
-            let inertia = parts.matrices.inertia(own.motor.coordinate);
-            *inertia += options.time_step * own.theta * damping;
-        }
-        parts.matrices.factorise()
-    }
-
-    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        self.parts.matrices.multiply_mass(v, out);
-    }
-
-    fn load(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
-        v_mean: &[f64],
-        y: &mut [f64],
-    ) {
-        self.load_at_end(options, start, start.v, v_mean, y);
-    }
-
-    fn choose_branches(&mut self, start: Start<'_, Vec<f64>>) {
-        let motors = &mut self.parts.motors;
-        motors.clear();
-        for (input, &torque) in self.inputs.iter().enumerate() {
-            if let Some(motor) = self.machine.motor(input) {
-                let mut own = Driven {
-                    input,
-                    motor,
-                    line: MotorLine::new(Single::Baseline),
-                    theta: 0.5,
-                };
-                own.line.set_lane(0, Some(&motor.motor), torque);
-                own.line.choose(own.rate(start.v));
-                motors.push(own);
-            }
-        }
-    }
-
-    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
-        let mut is_new = false;
-        for own in &mut self.parts.motors {
-            let rate = own.implicit_rate(start.v, v_end);
-            is_new |= own.line.revise(true, rate);
-        }
-        is_new
-    }
-
-    fn turning(&self, v: &[f64]) -> f64 {
-        self.machine.turning(v)
-    }
-
-    fn load_at_end(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
-        v_end: &[f64],
-        v_mean: &[f64],
-        y: &mut [f64],
-    ) {
-        self.set_torques(start.v, v_end);
-        let PlanarScratch {
-            middle, torques, ..
-        } = &mut *self.parts;
-        let gravity = options.gravity.xy();
-        self.machine.force(middle, v_mean, &gravity, torques, y);
-        for y in y {
-            *y *= options.time_step;
-        }
-    }
-
-    fn energies(
-        &mut self,
-        options: &StepOptions,
-        q: &Vec<f64>,
-        v: &[f64],
-        out: &mut Vec<MechanicalEnergy>,
-    ) {
-        out.clear();
-        out.push(self.machine.energy(q, v, &options.gravity.xy()));
-    }
-
-    fn work_of_displacement(
-        &mut self,
-        _options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
-        v_end: &[f64],
-        displacement: &[f64],
-    ) -> f64 {
-        self.set_driving(start.v, v_end);
-        sum_of_products(&self.parts.driving, displacement)
-    }
-
-    fn work(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
-        v_end: &[f64],
-        out: &mut [Work],
-    ) {
-        self.set_driving(start.v, v_end);
-        let parts = &*self.parts;
-        let (h, theta) = (options.time_step, options.theta);
-        let mean = |k: usize| theta * v_end[k] + (1.0 - theta) * start.v[k];
-        let driving = parts.driving.iter().enumerate();
-        let power: f64 = driving.map(|(k, f)| f * mean(k)).sum();
-        let mut work = h * power;
-        for own in &parts.motors {
-            let torque = parts.torques[own.input];
-            let turned = h * own.motor.gain.signum() * mean(own.motor.coordinate);
-            let surplus = torque * turned - own.line.work(torque, turned);
-            work -= own.motor.gain.abs() * surplus;
-        }
-        out.fill(Work {
-            supplied: work,
-            ..Work::default()
-        });
-    }
-
-    fn half_solve(&self, y: &mut [f64]) {
-        self.parts.matrices.forward(y);
-    }
-
-    fn half_solve_back(&self, y: &mut [f64]) {
-        self.parts.matrices.backward(y);
     }
 
     fn assemble(&mut self, contacts: &[PlanarContact], v: &[f64], u: &mut [f64]) {
@@ -451,9 +460,5 @@ impl MechanicalSystem for PlanarSystem<'_> {
         mu: &'a [f64],
     ) -> Option<FrictionContactProblem<'a>> {
         Some(self.problem(q, mu))
-    }
-
-    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
-        self.machine.displacement(y)
     }
 }

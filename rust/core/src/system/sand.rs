@@ -11,7 +11,7 @@
 //! at the velocity before the step. C is the symmetric part of the derivative by
 //! the twist, over memory and pose, without its negative pivots: M̂ stays symmetric and positive,
 //! and has the sparsity of M. Where the force at the solution is another
-//! ([`crate::integrator::MechanicalSystem::revise`]), the wheel alone is solved first, with a
+//! ([`crate::integrator::Forces::revise`]), the wheel alone is solved first, with a
 //! machine that answers linearly; the step is then repeated with the force and the tangent there. C
 //! is then at least the secant of the last two points.
 //!

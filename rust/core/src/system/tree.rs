@@ -18,9 +18,9 @@ use crate::contact::{
     detect_pairs, generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
-use crate::integrator::mechanical_system::MOST_REVISIONS;
+use crate::integrator::forces::MOST_REVISIONS;
 use crate::integrator::{
-    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
+    Contacting, Dynamics, Forces, MechanicalEnergy, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
@@ -158,9 +158,8 @@ impl TreeSystem<'_> {
     }
 }
 
-impl MechanicalSystem for TreeSystem<'_> {
+impl Dynamics for TreeSystem<'_> {
     type Configuration = Configuration;
-    type Contact = Contact;
 
     const DIMENSION: Dimension = Dimension::Three;
 
@@ -177,10 +176,6 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn cluster_of_velocity(&self, k: usize) -> usize {
         self.model.mechanism().cluster_of_velocity(k)
-    }
-
-    fn clusters_of(&self, key: &ContactKey) -> [usize; 2] {
-        clusters_of(self.model, key)
     }
 
     fn take_clusters(
@@ -215,6 +210,323 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn place_end(&mut self, q: &Configuration) {
         self.parts.place_end(self.model, q);
+    }
+
+    #[inline]
+    fn update_mass_matrix(&mut self, options: &StepOptions) {
+        self.parts.apply(self.model, &self.command.wrenches);
+        if let Some((sand, scene, _)) = self.sand() {
+            sand.linearise(&scene, true, step(options), options.gravity.into());
+        }
+        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
+        let mass_matrix = &mut parts.mass_matrix;
+        mass_matrix.update(mechanism, self.model.inertias(), parts.kinematics.poses());
+        let inertia = |k| mass_matrix.diagonal(mechanism, k);
+        (parts.drives).set_theta(mechanism, step(options), inertia);
+    }
+
+    #[inline]
+    fn factorise(&mut self, options: &StepOptions) -> bool {
+        if self.factor_implicit(options) {
+            self.begin_loops();
+            return true;
+        }
+        // Tangents of sand whose sizes differ too much leave no factor.
+        let parts = &mut *self.parts;
+        let Some(sand) = &mut parts.sand else {
+            return false;
+        };
+        sand.drop_tangents();
+        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
+        (parts.mass_matrix).update(mechanism, inertias, parts.kinematics.poses());
+        let is_positive = self.factor_implicit(options);
+        self.begin_loops();
+        is_positive
+    }
+
+    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
+        (self.parts.mass_matrix).times(self.model.mechanism(), v, out);
+    }
+
+    #[inline]
+    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], cluster: usize) -> bool {
+        let turning = Turning::of_cluster(0.0, self.model.mechanism(), v, cluster);
+        turning.is_gyroscopic(options.time_step)
+    }
+
+    #[inline]
+    fn turning(&self, v: &[f64]) -> f64 {
+        let mechanism = self.model.mechanism();
+        let of_frames = |own| Turning::of_cluster(0.0, mechanism, v, own).of_frames();
+        (0..mechanism.n_clusters())
+            .map(of_frames)
+            .fold(0.0, f64::max)
+    }
+
+    fn translation_axis(&self, velocity: usize) -> Option<usize> {
+        let mut trees = self.model.trees().iter();
+        let tree = trees.find(|tree| tree.velocities.contains(&velocity))?;
+        let axis = velocity - tree.velocities.start;
+        (tree.is_free && axis < 3).then_some(axis)
+    }
+
+    fn conserves_momenta(&self) -> bool {
+        self.model.is_free_tree() && self.model.loops().is_empty()
+    }
+
+    fn energies(
+        &mut self,
+        options: &StepOptions,
+        q: &Configuration,
+        v: &[f64],
+        out: &mut Vec<MechanicalEnergy>,
+    ) {
+        out.clear();
+        if self.parts.has_given_sand() {
+            return;
+        }
+        let TreeScratch {
+            q: lane,
+            energy: scratch,
+            ..
+        } = &mut *self.parts;
+        lane.set_lane(0, q);
+        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
+        let gravity = options.gravity.into();
+        let found = energies(mechanism, inertias, lane, v, gravity, scratch);
+        out.extend(found.iter().enumerate().map(|(cluster, own)| {
+            // A tree on a fixed base, or tied to the world, passes momentum on to it.
+            let is_held = mechanism.is_held(cluster);
+            MechanicalEnergy {
+                kinetic: own.energy.kinetic,
+                potential: own.energy.potential,
+                momentum: if is_held {
+                    Vector3::zeros()
+                } else {
+                    own.momentum.into()
+                },
+                mass: inertias.mass_of(mechanism, cluster),
+                is_held,
+            }
+        }));
+    }
+
+    #[inline]
+    fn half_solve(&self, y: &mut [f64]) {
+        self.parts.factor.half_solve(self.model.mechanism(), y);
+    }
+
+    #[inline]
+    fn half_solve_back(&self, y: &mut [f64]) {
+        (self.parts.factor).half_solve_back(self.model.mechanism(), y);
+    }
+
+    #[inline]
+    fn close_velocity(&mut self, options: &StepOptions, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
+        if let Some(loops) = &mut self.parts.loops {
+            loops.close(options.theta, v_begin, v, y);
+        }
+    }
+
+    fn add_loop_impulse(&mut self, p: &[f64], out: &mut [f64]) {
+        if let Some(loops) = &mut self.parts.loops {
+            loops.add_generalized_impulse(p, out);
+        }
+    }
+
+    #[inline]
+    fn close_end(&mut self, p: &[f64], q: &mut Configuration, v: &mut [f64]) -> f64 {
+        let TreeScratch {
+            loops,
+            factor,
+            q: lane,
+            ..
+        } = &mut *self.parts;
+        let Some(loops) = loops else {
+            return 0.0;
+        };
+        lane.set_lane(0, q);
+        let gap = loops.end(self.model, factor, p, lane, v);
+        lane.to_lane(0, q);
+        gap
+    }
+
+    fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
+        let stated = options.penetration_tolerance;
+        tolerated(stated, self.model.mechanism(), cluster)
+    }
+
+    fn displacement(&self, y: &[f64], cluster: usize) -> f64 {
+        displacement(0.0, self.model.mechanism(), y, cluster)
+    }
+}
+
+impl Forces for TreeSystem<'_> {
+    #[inline]
+    fn load(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        self.load_with_bias(options, start, Some(v_mean), y);
+    }
+
+    fn add_given(&self, options: &StepOptions, impulse: &mut [f64]) {
+        // Given forces are the same at any velocity.
+        (self.parts).add_sand(options.time_step, &self.parts.force, impulse, true);
+    }
+
+    fn load_gyroscopic(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_mean: &[f64],
+        impulse: &[f64],
+        y: &mut [f64],
+    ) {
+        self.load_with_bias(options, start, None, y);
+        let (parts, model) = (&mut *self.parts, self.model);
+        parts.gyroscopic.solve(
+            model,
+            &parts.kinematics,
+            &parts.mass_matrix,
+            (options.time_step, options.theta),
+            (start.v, v_mean),
+            impulse,
+            y,
+        );
+        parts.factor.half_solve(model.mechanism(), y);
+    }
+
+    #[inline]
+    fn choose_branches(&mut self, start: Start<'_, Configuration>) {
+        let drives = &mut self.parts.drives;
+        drives.set_lane(0, self.model.joints(), self.command);
+        drives.finish_loading();
+        drives.choose_branches(self.model.mechanism(), start.v);
+        if let Some(sand) = &mut self.parts.sand {
+            sand.start_from(start.v);
+        }
+    }
+
+    fn most_revisions(&self) -> usize {
+        if self.parts.sand.is_some() {
+            MOST_REVISIONS_IN_SAND
+        } else {
+            MOST_REVISIONS
+        }
+    }
+
+    fn is_settled(&mut self, v_end: &[f64]) -> bool {
+        let tried = self.parts.sand.clone();
+        let is_new = (self.sand())
+            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
+        self.parts.sand = tried;
+        !is_new
+    }
+
+    fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
+        let mechanism = self.model.mechanism();
+        let is_new = (self.parts.drives).revise(mechanism, true, start.v, v_end);
+        let is_new_in_sand = (self.sand())
+            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
+        is_new | is_new_in_sand
+    }
+
+    fn work(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+        out: &mut [Work],
+    ) {
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let velocities = [start.v, v_end];
+        (self.parts.drives).work(mechanism, step(options), places, velocities, out);
+        let mut of_sand = std::mem::take(&mut self.parts.of_sand);
+        of_sand.clear();
+        of_sand.resize(out.len(), 0.0);
+        if let Some((sand, scene, _)) = self.sand() {
+            sand.work(mechanism, &scene.layers, velocities, &mut of_sand);
+        }
+        for (cluster, (work, of_sand)) in out.iter_mut().zip(&of_sand).enumerate() {
+            let own = 0..self.parts.applied.len();
+            let own = own.filter(|&k| mechanism.cluster_of_velocity(k) == cluster);
+            let power = own.map(|k| {
+                let mean = options.theta * v_end[k] + (1.0 - options.theta) * start.v[k];
+                self.parts.applied[k] * mean
+            });
+            work.supplied += options.time_step * power.sum::<f64>();
+            work.damped -= *of_sand;
+        }
+        self.parts.of_sand = of_sand;
+    }
+
+    fn stored(&self, q: &Configuration, out: &mut [f64]) {
+        let mechanism = self.model.mechanism();
+        (self.parts.drives).stored(mechanism, 0.0, &q.joints, out);
+    }
+
+    fn work_of_displacement(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+        displacement: &[f64],
+    ) -> f64 {
+        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
+        let motion = [start.v, v_end, displacement];
+        let applied = self.parts.applied.iter().zip(displacement);
+        let of_wrenches = applied.map(|(force, way)| force * way).sum::<f64>();
+        of_wrenches
+            + (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
+    }
+
+    #[inline]
+    fn accept(&mut self) {
+        let parts = &mut *self.parts;
+        parts.drives.accept_part();
+        if let Some(sand) = &mut parts.sand {
+            sand.accept(true);
+        }
+    }
+
+    fn begin_balance(&mut self, start: Start<'_, Configuration>) {
+        let parts = &mut *self.parts;
+        (parts.kinematics).update_for_step(self.model, start.configuration);
+        (parts.balance).begin(self.model, &parts.kinematics, start.v);
+    }
+
+    /// In momentum form, exact at both ends; see [`crate::integrator::moreau_jean_newton`].
+    fn balance(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+        _v_mean: &[f64],
+        _scratch: &mut [f64],
+        y: &mut [f64],
+    ) {
+        let parts = &mut *self.parts;
+        let scene = BalanceScene {
+            model: self.model,
+            kinematics: [&parts.kinematics, &parts.kinematics_end],
+            gravity: &options.gravity,
+            h: options.time_step,
+            theta: options.theta,
+        };
+        parts.balance.residual(&scene, start, v_end, y);
+        self.add_actuation(options, start, v_end, y);
+    }
+}
+
+impl Contacting for TreeSystem<'_> {
+    type Contact = Contact;
+
+    fn clusters_of(&self, key: &ContactKey) -> [usize; 2] {
+        clusters_of(self.model, key)
     }
 
     #[inline]
@@ -307,274 +619,6 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn update_mass_matrix(&mut self, options: &StepOptions) {
-        self.parts.apply(self.model, &self.command.wrenches);
-        if let Some((sand, scene, _)) = self.sand() {
-            sand.linearise(&scene, true, step(options), options.gravity.into());
-        }
-        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
-        let mass_matrix = &mut parts.mass_matrix;
-        mass_matrix.update(mechanism, self.model.inertias(), parts.kinematics.poses());
-        let inertia = |k| mass_matrix.diagonal(mechanism, k);
-        (parts.drives).set_theta(mechanism, step(options), inertia);
-    }
-
-    #[inline]
-    fn factorise(&mut self, options: &StepOptions) -> bool {
-        if self.factor_implicit(options) {
-            self.begin_loops();
-            return true;
-        }
-        // Tangents of sand whose sizes differ too much leave no factor.
-        let parts = &mut *self.parts;
-        let Some(sand) = &mut parts.sand else {
-            return false;
-        };
-        sand.drop_tangents();
-        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
-        (parts.mass_matrix).update(mechanism, inertias, parts.kinematics.poses());
-        let is_positive = self.factor_implicit(options);
-        self.begin_loops();
-        is_positive
-    }
-
-    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        (self.parts.mass_matrix).times(self.model.mechanism(), v, out);
-    }
-
-    #[inline]
-    fn load(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_mean: &[f64],
-        y: &mut [f64],
-    ) {
-        self.load_with_bias(options, start, Some(v_mean), y);
-    }
-
-    fn add_given(&self, options: &StepOptions, impulse: &mut [f64]) {
-        // Given forces are the same at any velocity.
-        (self.parts).add_sand(options.time_step, &self.parts.force, impulse, true);
-    }
-
-    #[inline]
-    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], cluster: usize) -> bool {
-        let turning = Turning::of_cluster(0.0, self.model.mechanism(), v, cluster);
-        turning.is_gyroscopic(options.time_step)
-    }
-
-    #[inline]
-    fn turning(&self, v: &[f64]) -> f64 {
-        let mechanism = self.model.mechanism();
-        let of_frames = |own| Turning::of_cluster(0.0, mechanism, v, own).of_frames();
-        (0..mechanism.n_clusters())
-            .map(of_frames)
-            .fold(0.0, f64::max)
-    }
-
-    fn translation_axis(&self, velocity: usize) -> Option<usize> {
-        let mut trees = self.model.trees().iter();
-        let tree = trees.find(|tree| tree.velocities.contains(&velocity))?;
-        let axis = velocity - tree.velocities.start;
-        (tree.is_free && axis < 3).then_some(axis)
-    }
-
-    fn conserves_momenta(&self) -> bool {
-        self.model.is_free_tree() && self.model.loops().is_empty()
-    }
-
-    fn load_gyroscopic(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_mean: &[f64],
-        impulse: &[f64],
-        y: &mut [f64],
-    ) {
-        self.load_with_bias(options, start, None, y);
-        let (parts, model) = (&mut *self.parts, self.model);
-        parts.gyroscopic.solve(
-            model,
-            &parts.kinematics,
-            &parts.mass_matrix,
-            (options.time_step, options.theta),
-            (start.v, v_mean),
-            impulse,
-            y,
-        );
-        parts.factor.half_solve(model.mechanism(), y);
-    }
-
-    #[inline]
-    fn choose_branches(&mut self, start: Start<'_, Configuration>) {
-        let drives = &mut self.parts.drives;
-        drives.set_lane(0, self.model.joints(), self.command);
-        drives.finish_loading();
-        drives.choose_branches(self.model.mechanism(), start.v);
-        if let Some(sand) = &mut self.parts.sand {
-            sand.start_from(start.v);
-        }
-    }
-
-    fn most_revisions(&self) -> usize {
-        if self.parts.sand.is_some() {
-            MOST_REVISIONS_IN_SAND
-        } else {
-            MOST_REVISIONS
-        }
-    }
-
-    fn is_settled(&mut self, v_end: &[f64]) -> bool {
-        let tried = self.parts.sand.clone();
-        let is_new = (self.sand())
-            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
-        self.parts.sand = tried;
-        !is_new
-    }
-
-    fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
-        let mechanism = self.model.mechanism();
-        let is_new = (self.parts.drives).revise(mechanism, true, start.v, v_end);
-        let is_new_in_sand = (self.sand())
-            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
-        is_new | is_new_in_sand
-    }
-
-    fn energies(
-        &mut self,
-        options: &StepOptions,
-        q: &Configuration,
-        v: &[f64],
-        out: &mut Vec<MechanicalEnergy>,
-    ) {
-        out.clear();
-        if self.parts.has_given_sand() {
-            return;
-        }
-        let TreeScratch {
-            q: lane,
-            energy: scratch,
-            ..
-        } = &mut *self.parts;
-        lane.set_lane(0, q);
-        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
-        let gravity = options.gravity.into();
-        let found = energies(mechanism, inertias, lane, v, gravity, scratch);
-        out.extend(found.iter().enumerate().map(|(cluster, own)| {
-            // A tree on a fixed base, or tied to the world, passes momentum on to it.
-            let is_held = mechanism.is_held(cluster);
-            MechanicalEnergy {
-                kinetic: own.energy.kinetic,
-                potential: own.energy.potential,
-                momentum: if is_held {
-                    Vector3::zeros()
-                } else {
-                    own.momentum.into()
-                },
-                mass: inertias.mass_of(mechanism, cluster),
-                is_held,
-            }
-        }));
-    }
-
-    fn work(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_end: &[f64],
-        out: &mut [Work],
-    ) {
-        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
-        let velocities = [start.v, v_end];
-        (self.parts.drives).work(mechanism, step(options), places, velocities, out);
-        let mut of_sand = std::mem::take(&mut self.parts.of_sand);
-        of_sand.clear();
-        of_sand.resize(out.len(), 0.0);
-        if let Some((sand, scene, _)) = self.sand() {
-            sand.work(mechanism, &scene.layers, velocities, &mut of_sand);
-        }
-        for (cluster, (work, of_sand)) in out.iter_mut().zip(&of_sand).enumerate() {
-            let own = 0..self.parts.applied.len();
-            let own = own.filter(|&k| mechanism.cluster_of_velocity(k) == cluster);
-            let power = own.map(|k| {
-                let mean = options.theta * v_end[k] + (1.0 - options.theta) * start.v[k];
-                self.parts.applied[k] * mean
-            });
-            work.supplied += options.time_step * power.sum::<f64>();
-            work.damped -= *of_sand;
-        }
-        self.parts.of_sand = of_sand;
-    }
-
-    fn stored(&self, q: &Configuration, out: &mut [f64]) {
-        let mechanism = self.model.mechanism();
-        (self.parts.drives).stored(mechanism, 0.0, &q.joints, out);
-    }
-
-    fn work_of_displacement(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_end: &[f64],
-        displacement: &[f64],
-    ) -> f64 {
-        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
-        let motion = [start.v, v_end, displacement];
-        let applied = self.parts.applied.iter().zip(displacement);
-        let of_wrenches = applied.map(|(force, way)| force * way).sum::<f64>();
-        of_wrenches
-            + (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
-    }
-
-    #[inline]
-    fn accept(&mut self) {
-        let parts = &mut *self.parts;
-        parts.drives.accept_part();
-        if let Some(sand) = &mut parts.sand {
-            sand.accept(true);
-        }
-    }
-
-    fn begin_balance(&mut self, start: Start<'_, Configuration>) {
-        let parts = &mut *self.parts;
-        (parts.kinematics).update_for_step(self.model, start.configuration);
-        (parts.balance).begin(self.model, &parts.kinematics, start.v);
-    }
-
-    /// In momentum form, exact at both ends; see [`crate::integrator::moreau_jean_newton`].
-    fn balance(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_end: &[f64],
-        _v_mean: &[f64],
-        _scratch: &mut [f64],
-        y: &mut [f64],
-    ) {
-        let parts = &mut *self.parts;
-        let scene = BalanceScene {
-            model: self.model,
-            kinematics: [&parts.kinematics, &parts.kinematics_end],
-            gravity: &options.gravity,
-            h: options.time_step,
-            theta: options.theta,
-        };
-        parts.balance.residual(&scene, start, v_end, y);
-        self.add_actuation(options, start, v_end, y);
-    }
-
-    #[inline]
-    fn half_solve(&self, y: &mut [f64]) {
-        self.parts.factor.half_solve(self.model.mechanism(), y);
-    }
-
-    #[inline]
-    fn half_solve_back(&self, y: &mut [f64]) {
-        (self.parts.factor).half_solve_back(self.model.mechanism(), y);
-    }
-
-    #[inline]
     fn assemble(&mut self, contacts: &[Contact], v: &[f64], u: &mut [f64]) {
         let parts = &mut *self.parts;
         parts.system.assemble(
@@ -621,36 +665,6 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn close_velocity(&mut self, options: &StepOptions, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
-        if let Some(loops) = &mut self.parts.loops {
-            loops.close(options.theta, v_begin, v, y);
-        }
-    }
-
-    fn add_loop_impulse(&mut self, p: &[f64], out: &mut [f64]) {
-        if let Some(loops) = &mut self.parts.loops {
-            loops.add_generalized_impulse(p, out);
-        }
-    }
-
-    #[inline]
-    fn close_end(&mut self, p: &[f64], q: &mut Configuration, v: &mut [f64]) -> f64 {
-        let TreeScratch {
-            loops,
-            factor,
-            q: lane,
-            ..
-        } = &mut *self.parts;
-        let Some(loops) = loops else {
-            return 0.0;
-        };
-        lane.set_lane(0, q);
-        let gap = loops.end(self.model, factor, p, lane, v);
-        lane.to_lane(0, q);
-        gap
-    }
-
-    #[inline]
     fn generalized_impulse(&self, contacts: &[Contact], p: &[f64], out: &mut [f64]) {
         generalized_impulse(self.model, &self.parts.kinematics_end, contacts, p, out);
     }
@@ -673,15 +687,6 @@ impl MechanicalSystem for TreeSystem<'_> {
             Part::Limit(joint, _) => self.model.mechanism().joints[joint].arm,
             _ => 1.0,
         }
-    }
-
-    fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
-        let stated = options.penetration_tolerance;
-        tolerated(stated, self.model.mechanism(), cluster)
-    }
-
-    fn displacement(&self, y: &[f64], cluster: usize) -> f64 {
-        displacement(0.0, self.model.mechanism(), y, cluster)
     }
 }
 

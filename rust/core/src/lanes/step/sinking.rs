@@ -1,7 +1,7 @@
 //! The sand under the wheels in a step: [`crate::system::sand`].
 
 use super::Block;
-use crate::integrator::mechanical_system::MOST_REVISIONS;
+use crate::integrator::forces::MOST_REVISIONS;
 use crate::lanes::lane_rover::LaneRover;
 use crate::sand::RutMap;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};

@@ -4,7 +4,9 @@ use super::contact::{CompositeContact, GrainTouch};
 use super::parts::CompositeScratch;
 use super::touches;
 use crate::contact::{Activation, Contact, generalized_impulse};
-use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact, Work};
+use crate::integrator::{
+    Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
+};
 use crate::multibody::Configuration;
 use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
@@ -134,9 +136,8 @@ impl TreeAmongGrains<'_> {
     }
 }
 
-impl MechanicalSystem for TreeAmongGrains<'_> {
+impl Dynamics for TreeAmongGrains<'_> {
     type Configuration = Both;
-    type Contact = CompositeContact;
 
     const DIMENSION: Dimension = Dimension::Three;
 
@@ -174,46 +175,6 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.tree.place_end(&q.1);
     }
 
-    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<CompositeContact>) {
-        let v = self.halves(v);
-        let CompositeScratch {
-            of_grains, of_tree, ..
-        } = &mut *self.parts;
-        self.bed.detect(v.0, activation, of_grains);
-        self.tree.detect(v.1, activation, of_tree);
-        // The order of the keys, in which the last step's impulses are looked up.
-        of_tree.sort_by_key(UnilateralContact::key);
-        let CompositeScratch { touches, near, .. } = &mut *self.parts;
-        touches::find(&self.bed, &self.tree, v, activation, near, touches);
-        out.clear();
-        out.extend(self.parts.listed());
-    }
-
-    fn unknown_ground(&self) -> Option<[f64; 2]> {
-        self.tree.unknown_ground()
-    }
-
-    fn relocate(&mut self, contacts: &mut [CompositeContact]) {
-        let parts = &mut *self.parts;
-        parts.sort(contacts);
-        self.bed.relocate(&mut parts.of_grains);
-        self.tree.relocate(&mut parts.of_tree);
-        for touch in &mut parts.touches {
-            touch.contact.gap = touches::gap_at_end(&self.bed, &self.tree, touch);
-        }
-        for (place, contact) in contacts.iter_mut().zip(parts.listed()) {
-            *place = contact;
-        }
-    }
-
-    fn friction_coefficient(&self, options: &StepOptions, contact: &CompositeContact) -> f64 {
-        match contact {
-            CompositeContact::Grains(contact) => self.bed.friction_coefficient(options, contact),
-            CompositeContact::Tree(contact) => self.tree.friction_coefficient(options, contact),
-            CompositeContact::Touch(_) => self.friction,
-        }
-    }
-
     fn update_mass_matrix(&mut self, options: &StepOptions) {
         self.bed.update_mass_matrix(options);
         self.tree.update_mass_matrix(options);
@@ -229,6 +190,36 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         self.tree.multiply_mass(v_b, out_b);
     }
 
+    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], _cluster: usize) -> bool {
+        let mut clusters = 0..self.tree.n_clusters();
+        clusters.any(|own| self.tree.is_gyroscopic(options, self.halves(v).1, own))
+    }
+
+    fn turning(&self, v: &[f64]) -> f64 {
+        self.tree.turning(self.halves(v).1)
+    }
+
+    fn half_solve(&self, y: &mut [f64]) {
+        let (y_a, y_b) = self.halves_mut(y);
+        self.bed.half_solve(y_a);
+        self.tree.half_solve(y_b);
+    }
+
+    fn half_solve_back(&self, y: &mut [f64]) {
+        let (y_a, y_b) = self.halves_mut(y);
+        self.bed.half_solve_back(y_a);
+        self.tree.half_solve_back(y_b);
+    }
+
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
+        let (y_a, y_b) = self.halves(y);
+        let clusters = 0..self.tree.n_clusters();
+        let of_trees = clusters.map(|own| self.tree.displacement(y_b, own));
+        of_trees.fold(self.bed.displacement(y_a, 0), f64::max)
+    }
+}
+
+impl Forces for TreeAmongGrains<'_> {
     fn load(
         &mut self,
         options: &StepOptions,
@@ -240,11 +231,6 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         let ((v_a, v_b), (y_a, y_b)) = (self.halves(v_mean), self.halves_mut(y));
         self.bed.load(options, start_a, v_a, y_a);
         self.tree.load(options, start_b, v_b, y_b);
-    }
-
-    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], _cluster: usize) -> bool {
-        let mut clusters = 0..self.tree.n_clusters();
-        clusters.any(|own| self.tree.is_gyroscopic(options, self.halves(v).1, own))
     }
 
     fn load_gyroscopic(
@@ -282,10 +268,6 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         let (end_a, end_b) = self.halves(v_end);
         let has_struck = self.bed.revise(start_a, end_a);
         self.tree.revise(start_b, end_b) || has_struck
-    }
-
-    fn turning(&self, v: &[f64]) -> f64 {
-        self.tree.turning(self.halves(v).1)
     }
 
     fn work(
@@ -327,17 +309,49 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         (self.bed).balance(options, start_a, end_a, v_a, own, y_a);
         (self.tree).balance(options, start_b, end_b, v_b, theirs, y_b);
     }
+}
 
-    fn half_solve(&self, y: &mut [f64]) {
-        let (y_a, y_b) = self.halves_mut(y);
-        self.bed.half_solve(y_a);
-        self.tree.half_solve(y_b);
+impl Contacting for TreeAmongGrains<'_> {
+    type Contact = CompositeContact;
+
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<CompositeContact>) {
+        let v = self.halves(v);
+        let CompositeScratch {
+            of_grains, of_tree, ..
+        } = &mut *self.parts;
+        self.bed.detect(v.0, activation, of_grains);
+        self.tree.detect(v.1, activation, of_tree);
+        // The order of the keys, in which the last step's impulses are looked up.
+        of_tree.sort_by_key(UnilateralContact::key);
+        let CompositeScratch { touches, near, .. } = &mut *self.parts;
+        touches::find(&self.bed, &self.tree, v, activation, near, touches);
+        out.clear();
+        out.extend(self.parts.listed());
     }
 
-    fn half_solve_back(&self, y: &mut [f64]) {
-        let (y_a, y_b) = self.halves_mut(y);
-        self.bed.half_solve_back(y_a);
-        self.tree.half_solve_back(y_b);
+    fn unknown_ground(&self) -> Option<[f64; 2]> {
+        self.tree.unknown_ground()
+    }
+
+    fn relocate(&mut self, contacts: &mut [CompositeContact]) {
+        let parts = &mut *self.parts;
+        parts.sort(contacts);
+        self.bed.relocate(&mut parts.of_grains);
+        self.tree.relocate(&mut parts.of_tree);
+        for touch in &mut parts.touches {
+            touch.contact.gap = touches::gap_at_end(&self.bed, &self.tree, touch);
+        }
+        for (place, contact) in contacts.iter_mut().zip(parts.listed()) {
+            *place = contact;
+        }
+    }
+
+    fn friction_coefficient(&self, options: &StepOptions, contact: &CompositeContact) -> f64 {
+        match contact {
+            CompositeContact::Grains(contact) => self.bed.friction_coefficient(options, contact),
+            CompositeContact::Tree(contact) => self.tree.friction_coefficient(options, contact),
+            CompositeContact::Touch(_) => self.friction,
+        }
     }
 
     fn assemble(&mut self, contacts: &[CompositeContact], v: &[f64], u: &mut [f64]) {
@@ -478,12 +492,5 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     fn add_moments(&self, y: &mut [f64]) {
         let (y_a, _) = self.halves_mut(y);
         self.bed.add_moments(y_a);
-    }
-
-    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
-        let (y_a, y_b) = self.halves(y);
-        let clusters = 0..self.tree.n_clusters();
-        let of_trees = clusters.map(|own| self.tree.displacement(y_b, own));
-        of_trees.fold(self.bed.displacement(y_a, 0), f64::max)
     }
 }

@@ -1,4 +1,4 @@
-//! Grains as a [`MechanicalSystem`]: a diagonal mass matrix, contacts
+//! Grains as a [`crate::integrator::MechanicalSystem`]: a diagonal mass matrix, contacts
 //! between pairs of bodies, and a machine with a dense one.
 
 use std::sync::OnceLock;
@@ -15,7 +15,7 @@ use super::slabs::Slabs;
 use super::struck_pairs::{MOST_REPETITIONS, Struck};
 use crate::contact::Activation;
 use crate::geometry::Facing;
-use crate::integrator::{MechanicalSystem, Stabilisation, Start, StepOptions};
+use crate::integrator::{Contacting, Dynamics, Forces, Stabilisation, Start, StepOptions};
 use crate::law::newton_impact::rebound_at_gap;
 use crate::planar::{PlanarPoses, PlanarTree};
 use crate::problem::{
@@ -303,13 +303,12 @@ const fn dimension(dimensions: usize) -> Dimension {
 
 /// Its energy is not audited: frames are those of the start of the step and grains have no
 /// gyroscopic terms, so a step with θ ≥ ½ is passive by construction.
-impl<const D: usize> MechanicalSystem for GrainSystem<'_, D>
+impl<const D: usize> Dynamics for GrainSystem<'_, D>
 where
     BodyPairs<D>: Swept<D>,
 {
     /// [`COORDINATES`] of each grain, then the machine's, m and rad.
     type Configuration = Vec<f64>;
-    type Contact = GrainContact<D>;
 
     const DIMENSION: Dimension = dimension(D);
 
@@ -346,30 +345,6 @@ where
         self.place_machine(q, 1);
     }
 
-    fn choose_branches(&mut self, _start: Start<'_, Vec<f64>>) {
-        self.parts.struck.clear();
-    }
-
-    fn most_revisions(&self) -> usize {
-        MOST_REPETITIONS
-    }
-
-    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
-        self.find_struck(start.v, v_end)
-    }
-
-    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<GrainContact<D>>) {
-        self.find_contacts(v, activation, out);
-    }
-
-    fn relocate(&mut self, contacts: &mut [GrainContact<D>]) {
-        self.forecast_gaps(contacts);
-    }
-
-    fn friction_coefficient(&self, _options: &StepOptions, contact: &GrainContact<D>) -> f64 {
-        self.friction_of(contact.key)
-    }
-
     fn update_mass_matrix(&mut self, _options: &StepOptions) {
         if let Some(machine) = self.scene.machine.as_deref() {
             let GrainParts {
@@ -400,6 +375,46 @@ where
                 .machine
                 .multiply_mass(rate, &mut out[V * self.n()..]);
         }
+    }
+
+    fn half_solve(&self, y: &mut [f64]) {
+        self.divide_by_roots(y);
+        if self.scene.machine.is_some() {
+            let at = body_velocities(D) * self.n();
+            self.parts.machine.forward(&mut y[at..]);
+        }
+    }
+
+    fn half_solve_back(&self, y: &mut [f64]) {
+        self.divide_by_roots(y);
+        if self.scene.machine.is_some() {
+            let at = body_velocities(D) * self.n();
+            self.parts.machine.backward(&mut y[at..]);
+        }
+    }
+
+    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
+        match &self.scene.machine {
+            Some(machine) => machine.displacement(self.scene.machine_velocities(y)),
+            None => 0.0,
+        }
+    }
+}
+
+impl<const D: usize> Forces for GrainSystem<'_, D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    fn choose_branches(&mut self, _start: Start<'_, Vec<f64>>) {
+        self.parts.struck.clear();
+    }
+
+    fn most_revisions(&self) -> usize {
+        MOST_REPETITIONS
+    }
+
+    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
+        self.find_struck(start.v, v_end)
     }
 
     fn load(
@@ -435,21 +450,24 @@ where
             }
         }
     }
+}
 
-    fn half_solve(&self, y: &mut [f64]) {
-        self.divide_by_roots(y);
-        if self.scene.machine.is_some() {
-            let at = body_velocities(D) * self.n();
-            self.parts.machine.forward(&mut y[at..]);
-        }
+impl<const D: usize> Contacting for GrainSystem<'_, D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    type Contact = GrainContact<D>;
+
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<GrainContact<D>>) {
+        self.find_contacts(v, activation, out);
     }
 
-    fn half_solve_back(&self, y: &mut [f64]) {
-        self.divide_by_roots(y);
-        if self.scene.machine.is_some() {
-            let at = body_velocities(D) * self.n();
-            self.parts.machine.backward(&mut y[at..]);
-        }
+    fn relocate(&mut self, contacts: &mut [GrainContact<D>]) {
+        self.forecast_gaps(contacts);
+    }
+
+    fn friction_coefficient(&self, _options: &StepOptions, contact: &GrainContact<D>) -> f64 {
+        self.friction_of(contact.key)
     }
 
     fn assemble(&mut self, contacts: &[GrainContact<D>], v: &[f64], u: &mut [f64]) {
@@ -624,13 +642,6 @@ where
 
     fn add_moments(&self, y: &mut [f64]) {
         self.parts.rolling.add(&self.parts.pairs.round, y);
-    }
-
-    fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
-        match &self.scene.machine {
-            Some(machine) => machine.displacement(self.scene.machine_velocities(y)),
-            None => 0.0,
-        }
     }
 }
 

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use crate::contact::Contact;
 use crate::integrator::held_step::HeldStep;
-use crate::integrator::{MechanicalSystem, StepOptions};
+use crate::integrator::{Contacting, Dynamics, StepOptions};
 use crate::sand::memory::rate;
 use crate::sand::{Derivatives, Memory, Soil, Twist, WheelPose};
 use crate::system::sand::SandContact;

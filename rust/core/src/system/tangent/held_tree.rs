@@ -7,7 +7,7 @@ use crate::contact::contact_slope::ContactSlope;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::held_step::HeldStep;
-use crate::integrator::{MechanicalSystem, ScratchOf, Start, StepOptions};
+use crate::integrator::{Contacting, Dynamics, ScratchOf, Start, StepOptions};
 use crate::multibody::{Configuration, Factor, Model};
 use crate::system::TreeSystem;
 use crate::system::command::Command;
