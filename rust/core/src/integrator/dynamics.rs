@@ -153,8 +153,8 @@ pub trait Dynamics {
         (velocity < Self::DIMENSION.components()).then_some(velocity)
     }
 
-    /// Whether [`Self::balance`] conserves the momenta of free flight at any step, so that no
-    /// energy correction may change them. By default it does not.
+    /// Whether [`super::Forces::balance`] conserves the momenta of free flight at any step, so that
+    /// no energy correction may change them. By default it does not.
     fn conserves_momenta(&self) -> bool {
         false
     }
@@ -163,7 +163,7 @@ pub trait Dynamics {
     fn half_solve(&self, impulse: &mut [f64]);
 
     /// Changes `y` so that the step from `v_begin` to `v + F⁻¹ y` obeys the system's closed loops.
-    /// [`Self::add_impulses`] keeps that. By default there are none.
+    /// [`super::Contacting::add_impulses`] keeps that. By default there are none.
     fn close_velocity(
         &mut self,
         _options: &StepOptions,

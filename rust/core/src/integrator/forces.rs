@@ -53,7 +53,7 @@ pub trait Forces: Dynamics {
     /// ```
     ///
     /// If the actual impulse equals the forecast J, the whole step is implicit. Called only for a
-    /// system that may be [`Self::is_gyroscopic`].
+    /// system that may be [`Dynamics::is_gyroscopic`].
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
