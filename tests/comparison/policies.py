@@ -68,20 +68,20 @@ GROUPS: Mapping[str, Group] = {
     "rovers": Group(
         dict(
             [
-                *(_rover("open-rover", level) for level in (1.0, 1.5, 2.0)),
+                *(_rover("open-rover", level) for level in (1.0, 2.0)),
                 *(_rover(name, 1.0) for name in ("skid-steered", "four-steered", "mars-rover")),
             ]
         ),
+        policies=("scan", "anywhere", "guided"),
         episodes=100,
     ),
-    "tasks": Group(
-        {
-            **dict([_course("plane", None), _course("rocks", 0.5), _course("rocks", 1.0), _course("hills", 0.5)]),
-            "battery of 7000 J": {"environment": "RoverBattery-v0"},
-            "trap": {"environment": "RoverTrap-v0"},
-        },
-        episodes=100,
+    "courses": Group(
+        dict([_course("plane", None), _course("rocks", 0.5), _course("rocks", 1.0), _course("hills", 0.5)])
+        | {"battery of 7000 J": {"environment": "RoverBattery-v0"}},
+        policies=("pd", "scan", "guided"),
+        episodes=50,
     ),
+    "trap": Group({"trap": {"environment": "RoverTrap-v0"}}, episodes=100),
     "sand": Group(
         {"sand, 0.5": {"terrain": "sand", "difficulty": 0.5}}, policies=("pd", "scan", "anywhere", "sand"), episodes=50
     ),
