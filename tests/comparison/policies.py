@@ -47,8 +47,8 @@ class Group:
     seed: int = 1_000_000
 
 
-def _fields(terrain: str) -> dict[str, dict[str, Any]]:
-    return {f"{terrain}, {level:g}": {"terrain": terrain, "difficulty": level} for level in (1.0, 1.5, 2.0)}
+def _fields(terrain: str, *levels: float) -> dict[str, dict[str, Any]]:
+    return {f"{terrain}, {level:g}": {"terrain": terrain, "difficulty": level} for level in levels}
 
 
 def _rover(model: str, level: float) -> tuple[str, dict[str, Any]]:
@@ -63,8 +63,9 @@ def _course(terrain: str, level: float | None) -> tuple[str, dict[str, Any]]:
 
 
 GROUPS: Mapping[str, Group] = {
-    "rocks": Group(_fields("rocks")),
-    "hills": Group(_fields("hills")),
+    "rocks": Group(_fields("rocks", 1.0, 1.5, 2.0)),
+    "hills": Group(_fields("hills", 1.0, 1.5)),
+    "steep": Group(_fields("hills", 2.0), episodes=50),
     "rovers": Group(
         dict(
             [
@@ -73,7 +74,7 @@ GROUPS: Mapping[str, Group] = {
             ]
         ),
         policies=("scan", "anywhere", "guided"),
-        episodes=100,
+        episodes=50,
     ),
     "courses": Group(
         dict([_course("plane", None), _course("rocks", 0.5), _course("rocks", 1.0), _course("hills", 0.5)])
@@ -81,7 +82,7 @@ GROUPS: Mapping[str, Group] = {
         policies=("pd", "scan", "guided"),
         episodes=50,
     ),
-    "trap": Group({"trap": {"environment": "RoverTrap-v0"}}, episodes=100),
+    "trap": Group({"trap": {"environment": "RoverTrap-v0"}}, episodes=50),
     "sand": Group(
         {"sand, 0.5": {"terrain": "sand", "difficulty": 0.5}}, policies=("pd", "scan", "anywhere", "sand"), episodes=50
     ),
