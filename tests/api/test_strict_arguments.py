@@ -167,7 +167,7 @@ COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
 ]
 
 OTHERS: list[tuple[str, Callable[[], Any]]] = [
-    ("model", lambda: MirroredRoverSimulation(Line(), model="rover")),  # type: ignore[arg-type]
+    ("model", lambda: MirroredRoverSimulation(Line(), model=3)),  # type: ignore[arg-type]
     ("coordinates", lambda: Simulation().set_state(np.zeros(21), coordinates=1)),  # type: ignore[arg-type]
     ("coordinates", lambda: RoverModel().tags(np.zeros(21), 1)),  # type: ignore[arg-type]
     ("joints", lambda: Simulation().hold(3)),  # type: ignore[arg-type]
