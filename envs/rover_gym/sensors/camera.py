@@ -44,6 +44,7 @@ class Camera(Sensor):
         height: Rows of pixels.
         view_deg: Angle of view along a row, deg; pixels are square.
         sees_rover: Whether the collision shapes of the rover's other solids are seen.
+        image: Kind of the image, one of `IMAGES`; None for a reading that is none.
     """
 
     mount: Mount = field(default_factory=lambda: Mount(position=(0.6, 0.4, 0.0), pitch_deg=-20.0))
@@ -51,6 +52,7 @@ class Camera(Sensor):
     height: int = 48
     view_deg: float = 87.0
     sees_rover: bool = True
+    image: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -62,6 +64,11 @@ class Camera(Sensor):
     def check(self, model: RoverModel) -> None:
         """Rejects a model without the mount's solid."""
         self.mount.solid_of(model)
+
+    @property
+    def reading_type(self) -> type[np.float32] | type[np.uint8]:
+        """The type of the readings: uint8 for an image that is asked for as such."""
+        return np.uint8 if self.image == "uint8" else np.float32
 
     @property
     def directions(self) -> Array:

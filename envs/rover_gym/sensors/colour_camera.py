@@ -49,11 +49,6 @@ class ColourCamera(Camera):
         number("noise", self.noise, at_least=0.0)
         self._keep_ranges("gain", at_least=0.0)
 
-    @property
-    def reading_type(self) -> type[np.float32] | type[np.uint8]:
-        """The type of the readings: uint8 for an image that is asked for as such."""
-        return np.uint8 if self.image == "uint8" else np.float32
-
     def bounds(self, model: RoverModel) -> tuple[Array, Array]:  # noqa: ARG002 - of every model
         """0 to 255, or to 1."""
         black, white = (np.full((self.height, self.width, 3), level) for level in (0.0, 1.0))

@@ -43,7 +43,6 @@ class DepthCamera(Camera):
     noise: float = 0.0
     gain: float | Range = 1.0
     dropout: float | Range = 0.0
-    image: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -59,11 +58,6 @@ class DepthCamera(Camera):
         """0 to `max_range`, (height, width); of an image 0 to 255 or to 1."""
         nearest, farthest = (np.full((self.height, self.width), depth) for depth in (0.0, self.max_range))
         return self._shown(nearest), self._shown(farthest)
-
-    @property
-    def reading_type(self) -> type[np.float32] | type[np.uint8]:
-        """The type of the readings: uint8 for an image that is asked for as such."""
-        return np.uint8 if self.image == "uint8" else np.float32
 
     def _shown(self, depth: Array) -> Array:
         """A depth image (height, width), m, as it is read."""
