@@ -28,8 +28,7 @@ def wide(**fields: Any) -> RoverModel:
     description = RoverModel().to_dict()
     for wheel in description["wheels"]:
         if "stiffness" in fields:
-            for own in ("stiffness", "damping", "relaxation_length"):
-                del wheel[own]
+            del wheel["deflection"]
         wheel.update({name: value for name, value in fields.items() if value is not None})
     return RoverModel.from_dict(description)
 
@@ -128,14 +127,15 @@ def test_a_rover_on_wide_wheels_stands_on_two_points_a_wheel() -> None:
 
 
 def test_cylinders_yield_by_a_hair_unless_they_are_said_to_be_rigid() -> None:
-    (wheel, *_) = wide(width=0.15, stiffness=None).to_dict()["wheels"]
-    assert wheel["stiffness"] == pytest.approx(wide(width=0.15).mass * 9.81 / 6 / 3e-5, rel=0.05)
-    assert wide(width=0.15, stiffness=0.0).to_dict()["wheels"][0]["stiffness"] == 0.0
+    model = wide(width=0.15, stiffness=None)
+    assert model.to_dict()["wheels"][0]["deflection"] == 3e-4
+    assert model.wheel_stiffnesses == pytest.approx(np.full(6, model.mass * 9.81 / 6 / 3e-5))
+    assert wide(width=0.15, stiffness=0.0).wheel_stiffnesses.tolist() == [0.0] * 6
     description = RoverModel().replace(wheel_stiffness=0.0).to_dict()
     for wheel in description["wheels"]:
         wheel |= {"width": 0.15, "rounding": 0.075}
         del wheel["stiffness"]
-    assert "stiffness" not in RoverModel.from_dict(description).to_dict()["wheels"][0]
+    assert RoverModel.from_dict(description).wheel_stiffnesses.tolist() == [0.0] * 6
 
 
 @pytest.mark.parametrize(
@@ -279,10 +279,9 @@ def test_a_wheel_yields_by_its_load_over_its_stiffness(name: str) -> None:
     sim = Simulation(model)
     sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
     sim.step(400)
-    stiffness = [wheel["stiffness"] for wheel in model.to_dict()["wheels"]]
-    np.testing.assert_allclose(-sim.wheel_gaps, sim.wheel_forces[:, 0] / stiffness, rtol=1e-4)
+    np.testing.assert_allclose(-sim.wheel_gaps, sim.wheel_forces[:, 0] / model.wheel_stiffnesses, rtol=1e-4)
     assert sim.wheel_forces[:, 0].sum() == pytest.approx(9.81 * model.mass, rel=1e-9)
-    share = model.wheel_radii / 300.0
+    share = 0.0033 * model.wheel_radii
     assert ((sim.wheel_gaps < -0.3 * share) & (sim.wheel_gaps > -2.0 * share)).all()
 
 
@@ -369,7 +368,7 @@ def test_what_no_force_has_pressed_in_is_not_given_back(name: str, depth: float)
         assert sim.energy().total < start + 1.0
         # What each wheel holds that bears all of the weight, no more.
         load = 9.81 * model.mass
-        assert given < 1.01 * sum(0.5 * load**2 / wheel["stiffness"] for wheel in model.to_dict()["wheels"])
+        assert given < 1.01 * (0.5 * load**2 / model.wheel_stiffnesses).sum()
     assert given != 0.0
 
 

@@ -1,5 +1,7 @@
 """Forces of wheels along the surface: `docs/wheel-forces.md`."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -233,3 +235,17 @@ def test_wheels_that_are_thrown_onto_rocks_give_off_no_more_than_they_took(resti
         assert given.max() <= 1e-12 * most
         # A wheel that bounces does not yield.
         assert restitution > 0.0 or given.min() < -1e-3
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_states_the_numbers_of_the_gallery(name: str) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "wheel-forces.md").read_text()
+    (row,) = re.findall(rf"^\| `{name}` \| (.*) \|$", page, re.MULTILINE)
+    stated = [float(re.sub(r"[^\d.e]", "", cell)) for cell in row.split("|")]
+    model = RoverModel.named(name)
+    deflection = 0.0033 * model.wheel_radii[0]
+    stiffness, share = model.wheel_stiffnesses[0], model.mass * 9.81 / len(model.wheel_radii)
+    damping = 2.0 * np.sqrt(stiffness * share / 9.81)
+    length = np.sqrt(2.0 * model.wheel_radii[0] * deflection)
+    slip = np.degrees(0.5 * share / (stiffness * length))
+    assert stated == pytest.approx([1e3 * deflection, stiffness, damping, 1e3 * length, slip], rel=0.04)

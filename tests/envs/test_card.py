@@ -58,9 +58,17 @@ def test_motor_table_is_the_model(env: RoverEnv) -> None:
 
 def test_wheel_table_is_the_model(env: RoverEnv) -> None:
     rows = {name: ast.literal_eval(value) for name, value, _, _ in table("Wheels")}
-    for wheel in env.model.to_dict()["wheels"]:
-        assert rows == {name: wheel[name] for name in rows}
-    assert set(rows) == {"stiffness", "damping", "relaxation_length"}
+    share, deflection = env.model.mass * 9.81 / 6, rows.pop("deflection")
+    for wheel, radius, stiffness in zip(
+        env.model.to_dict()["wheels"], env.model.wheel_radii, env.model.wheel_stiffnesses, strict=True
+    ):
+        assert wheel["deflection"] == deflection
+        assert stiffness == pytest.approx(share / (deflection * radius))
+        damping = 2.0 * math.sqrt(env.model.mass / 6 * stiffness)
+        length = radius * math.sqrt(2.0 * deflection)
+        assert rows == pytest.approx(
+            {"stiffness": stiffness, "damping": damping, "relaxation_length": length}, rel=5e-3
+        )
 
 
 def test_observation_table_is_the_layout(env: RoverEnv) -> None:

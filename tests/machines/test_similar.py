@@ -32,12 +32,10 @@ def scaled(description: dict[str, Any], s: float) -> dict[str, Any]:
         solid.pop("armature", None)
         solid.pop("drive", None)
     for wheel in description.get("wheels", []):
-        for key in ("radius", "contact_radius", "width", "rounding", "relaxation_length"):
+        for key in ("radius", "contact_radius", "width", "rounding"):
             if key in wheel:
                 wheel[key] *= s
-        for key, power in {"torque_limit": 4.0, "stiffness": 2.0, "damping": 2.5}.items():
-            if key in wheel:
-                wheel[key] *= s**power
+        wheel["torque_limit"] *= s**4
         wheel.pop("motor", None)
     for tag in description.get("tags", []):
         tag["position"] = [x * s for x in tag["position"]]

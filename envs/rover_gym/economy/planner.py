@@ -269,7 +269,7 @@ def _obstacle(scene: Scene, terrain: Terrain, start: Array, *, steers: bool) -> 
     apart = [np.ptp(start[pair]) for pair in pairs]
     if np.abs(start[still]).max(initial=0.0) > _STRAIGHT or max(apart) > _STRAIGHT:
         return "the start is not symmetric"
-    if any(wheel.get("stiffness") for wheel in scene.model.to_dict()["wheels"]):
+    if scene.model.wheel_stiffnesses.any():
         return "the wheels yield, and those of the planar model are rigid"
     return None
 

@@ -90,11 +90,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     The wheels yield where they touch, and slip sideways by a small angle under a side force. Those of the built-in rover:
 
-    | quantity          | value | unit  | meaning                                                      |
-    |-------------------|-------|-------|--------------------------------------------------------------|
-    | stiffness         | 4.7e6 | N/m   | upright and along the surface: 0.33 mm under the load        |
-    | damping           | 5.5e4 | N s/m | upright: critical                                            |
-    | relaxation_length | 0.0082 | m    | way of rolling that renews the deflection along the surface  |
+    | quantity          | value  | unit  | meaning                                                      |
+    |-------------------|--------|-------|--------------------------------------------------------------|
+    | deflection        | 0.0033 |       | of the radius under the load on Earth, critically damped     |
+    | stiffness         | 4.76e6 | N/m   | upright and along the surface                                |
+    | damping           | 5.52e4 | N s/m | upright                                                      |
+    | relaxation_length | 0.0081 | m     | way of rolling that renews the deflection along the surface  |
 
     ## Observation
 

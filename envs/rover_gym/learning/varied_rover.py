@@ -21,7 +21,7 @@ VARIED = {
 #: Powers of the size that quantities of a description grow with. Weights over their lengths, and the angles by which
 #: springs yield to them, stay; so does the rover's top speed.
 POWERS: dict[str, float] = {
-    **dict.fromkeys(("position", "size", "radius", "height", "width", "centre_of_mass"), 1.0),
+    **dict.fromkeys(("position", "size", "radius", "height", "width", "centre_of_mass", "relaxation_length"), 1.0),
     "mass": 3.0,
     "inertia": 5.0,
     **dict.fromkeys(("torque_limit", "stall_torque", "hold.stiffness"), 4.0),

@@ -271,18 +271,18 @@ def _wheel(
 
 
 def _yielding(tree: RobotTree, role: WheelRole, weight: float, options: WheelOptions) -> dict[str, float]:
-    """Stiffness, N/m, and damping, N s/m, where a wheel touches; stiffness 0 for a rigid wheel.
+    """How a wheel yields where it touches; a stiffness of 0 for a rigid wheel.
 
     Without compliance, the weight of a rigid chassis rests on three of its wheels, and micrometres of height decide
-    which. Neither number is rounded, so that they scale with the robot.
+    which.
     """
     stiffness, compression = options.wheel_stiffness, YIELD * role.radius
     if stiffness is None:
-        stiffness = weight / compression
         tree.assumed.append(
-            f"wheel {role.link}: stiffness {stiffness:.3g} N/m, by which it yields {YIELD:g} of its radius "
+            f"wheel {role.link}: stiffness {weight / compression:.3g} N/m, by which it yields {YIELD:g} of its radius "
             "under its share of the weight, and critical damping"
         )
+        return {"deflection": YIELD}
     if stiffness == 0.0:
         return {"stiffness": 0.0}
     return {"stiffness": stiffness, "damping": 2.0 * math.sqrt(compression / GRAVITY) * stiffness}

@@ -66,6 +66,7 @@ def solid_rows(model: RoverModel) -> tuple[tuple[str, str, str, float, str], ...
     """Name, joint, carrier, mass (kg) and role of every solid of a model."""
     description = model.to_dict()
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
+    stiffnesses = dict(zip(wheels, model.wheel_stiffnesses, strict=True))
     steered: dict[str, list[str]] = {}
     for wheel in description["wheels"]:
         if wheel.get("steering"):
@@ -77,7 +78,7 @@ def solid_rows(model: RoverModel) -> tuple[tuple[str, str, str, float, str], ...
             wheel = wheels[solid["name"]]
             width = f", {wheel['width']:g} m wide" if wheel.get("width") else ""
             radius = wheel.get("contact_radius") or wheel["radius"]
-            yields = f", {wheel['stiffness']:.2g} N/m" if wheel.get("stiffness") else ""
+            yields = f", {stiffness:.2g} N/m" if (stiffness := stiffnesses[solid["name"]]) else ""
             role = f"wheel of radius {radius:g} m{width}{yields}, {wheel['torque_limit']:.4g} N m"
         elif solid["name"] in steered:
             role = f"steers {', '.join(steered[solid['name']])}"

@@ -327,7 +327,8 @@ impl RoverModel {
         }
     }
 
-    /// Returns a copy of the model with the given properties changed.
+    /// Returns a copy of the model with the given properties changed. The stiffness of the wheels
+    /// does not follow masses and radii.
     ///
     /// Args:
     ///     wheel_radius: Radius of all wheels, m. Shape, inertia and contact radius change
@@ -489,6 +490,15 @@ impl RoverModel {
     #[getter]
     fn wheel_radii(&self) -> Array {
         self.inner.wheels().iter().map(|w| w.radius).collect()
+    }
+
+    /// Normal stiffness of each wheel where it touches, (n_wheels,), N/m; 0 for a rigid wheel.
+    #[getter]
+    fn wheel_stiffnesses(&self) -> Array {
+        let treads = self.inner.wheels().iter().map(|w| w.tread);
+        treads
+            .map(|own| own.map_or(0.0, |own| own.stiffness))
+            .collect()
     }
 
     /// Radius of the circle that the rover needs to turn on the spot, m.

@@ -55,7 +55,7 @@ fn on_stand(change: &dyn Fn(&mut WheelDescription), heading: f64, lower: f64) ->
 }
 
 fn rigid(wheel: &mut WheelDescription) {
-    (wheel.stiffness, wheel.damping, wheel.relaxation_length) = (None, None, None);
+    wheel.stiffness = Some(0.0);
 }
 
 const STIFFNESS: f64 = 1e5;

@@ -382,11 +382,15 @@ fn check_rollers(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Resu
     }
 }
 
-/// Checks stiffness and damping of a wheel; `at` gives the path of its fields.
+/// Checks how a wheel yields; `at` gives the path of its fields.
 fn check_compliance(
     at: &impl Fn(&str) -> String,
     wheel: &WheelDescription,
 ) -> Result<(), ModelError> {
+    if let Some(deflection) = wheel.deflection {
+        positive(&at("deflection"), deflection)?;
+        in_range(&at("deflection"), deflection, 0.5, "at most 0.5")?;
+    }
     if let Some(stiffness) = wheel.stiffness {
         not_negative(&at("stiffness"), stiffness)?;
         in_range(&at("stiffness"), stiffness, 1e12, "at most 1e12 N/m")?;
@@ -404,11 +408,14 @@ fn check_compliance(
         length(&at("relaxation_length"), relaxation)?;
         beside.push(("relaxation_length", relaxation));
     }
-    let is_rigid = wheel.stiffness.is_none_or(|stiffness| stiffness == 0.0);
+    let is_rigid = match wheel.stiffness {
+        Some(stiffness) => stiffness == 0.0,
+        None => wheel.deflection.is_none(),
+    };
     match beside.into_iter().find(|(_, value)| *value != 0.0) {
         Some((field, value)) if is_rigid => Err(ModelError::OutOfRange {
             field: at(field),
-            range: "given beside a stiffness",
+            range: "given beside a stiffness or a deflection",
             value,
         }),
         _ => Ok(()),

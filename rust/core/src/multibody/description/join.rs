@@ -14,7 +14,8 @@ impl ModelDescription {
             name: name.to_owned(),
             ..Self::empty()
         };
-        for (machine, part) in parts {
+        for (machine, mut part) in parts {
+            part.state_treads();
             joined.add(&machine, part);
         }
         joined.loops.extend(loops);

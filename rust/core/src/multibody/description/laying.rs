@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::check_values::{direction, in_range, length, material, moderate, place, positive};
 use super::tracks::MOST_TRACK_WHEELS;
-use super::yielding::yielding;
+use super::yielding::Share;
 use super::{
     CouplingDescription, JointKind, ModelDescription, SolidDescription, TrackDescription,
     WheelDescription,
@@ -32,7 +32,7 @@ impl ModelDescription {
         let more: usize = tracks.iter().map(|track| track.wheels).sum();
         let n = self.wheels.len() + more;
         for track in &tracks {
-            let shared = yielding(mass, n, track.radius);
+            let shared = Share { mass, n }.of_cylinder(track.radius);
             let end = self.end_of_tree(&track.solid);
             let (solids, wheels): (Vec<_>, Vec<_>) =
                 (0..track.wheels).map(|k| track.wheel(k, shared)).unzip();

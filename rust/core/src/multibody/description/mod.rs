@@ -227,11 +227,16 @@ pub struct WheelDescription {
     /// Number of grousers around the rim; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grousers: Option<u32>,
-    /// Normal stiffness where it touches, N/m; 0: rigid. By default a wheel that can stand on a
-    /// line yields by 3e-4 of its radius under its share of the weight, and any other one is rigid.
+    /// Deflection where it touches, as a share of its radius, under its share of the machine's
+    /// weight on Earth. By default 3e-4 for a wheel that can stand on a line, and any other one is
+    /// rigid. Not read beside a stiffness.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deflection: Option<f64>,
+    /// Normal stiffness where it touches, N/m; 0: rigid. By default that of the deflection.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
-    /// Normal damping beside the stiffness, N s/m; 0 by default.
+    /// Normal damping where it touches, N s/m. By default critical beside a deflection, and 0
+    /// beside a stiffness.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<f64>,
     /// Stiffness along the surface relative to the normal one; 1 by default.

@@ -12,7 +12,6 @@ use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
 use super::tree::{Paths, Tree};
 use super::{Body, Model, fingerprint};
-use crate::law::compliance::Tread;
 use crate::law::materials::OwnFriction;
 use crate::multibody::description::{
     JointKind, MaterialDescription, ModelDescription, Shape, SolidDescription,
@@ -485,7 +484,7 @@ fn wheels(
         (!body.is_coupled || joints[coordinate].drive.is_none()).then_some(coordinate)
     };
     let mut wheels = Vec::new();
-    for wheel in &description.wheels {
+    for (wheel, tread) in description.wheels.iter().zip(description.treads()) {
         let Some(frame) = index_of.get(wheel.solid.as_str()).map(|&k| &frames[k]) else {
             continue;
         };
@@ -505,13 +504,7 @@ fn wheels(
                 .and_then(MaterialDescription::across),
             grouser_height: wheel.grouser_height.unwrap_or(0.0),
             grousers: wheel.grousers.unwrap_or(0),
-            tread: (wheel.stiffness.filter(|stiffness| *stiffness > 0.0)).map(|stiffness| Tread {
-                stiffness,
-                damping: wheel.damping.unwrap_or(0.0),
-                tangential_ratio: wheel.tangential_ratio.unwrap_or(1.0),
-                relaxation_length: wheel.relaxation_length.unwrap_or(wheel.radius),
-                radius: wheel.contact_radius.unwrap_or(wheel.radius),
-            }),
+            tread,
             material: named(wheel.material.as_ref(), "wheel"),
             torque_limit: wheel.torque_limit,
             drive_sign: wheel.drive_sign,

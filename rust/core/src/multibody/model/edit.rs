@@ -37,6 +37,19 @@ pub struct Changes {
 }
 
 impl Changes {
+    /// Whether the stiffness of a wheel with a stated deflection would follow what changes.
+    fn changes_what_yields(&self) -> bool {
+        let of_wheels = [
+            self.wheel_radius,
+            self.contact_radius,
+            self.wheel_stiffness,
+            self.wheel_damping,
+            self.wheel_relaxation_length,
+            self.mass_scale,
+        ];
+        !self.masses.is_empty() || of_wheels.iter().any(Option::is_some)
+    }
+
     fn change_wheels(&self, wheels: &mut [WheelDescription]) {
         for wheel in wheels {
             wheel.torque_limit = self.wheel_torque_limit.unwrap_or(wheel.torque_limit);
@@ -70,13 +83,25 @@ impl Model {
         Self::from_description(ModelDescription::joined(name, machines, loops))
     }
 
-    /// A copy with changes.
+    /// The description, with the stiffness of its wheels stated: it stays when masses and radii
+    /// change.
+    fn settled(&self) -> ModelDescription {
+        let mut description = self.description.clone();
+        description.state_treads();
+        description
+    }
+
+    /// A copy with changes. The wheels keep their stiffness.
     ///
     /// # Errors
     /// A number out of its range; `UnknownName` for a solid that does not exist; `NotADisc` as of
     /// [`Model::with_wheel_radius`].
     pub fn changed(&self, changes: &Changes) -> Result<Self, ModelError> {
-        let mut description = self.description.clone();
+        let mut description = if changes.changes_what_yields() {
+            self.settled()
+        } else {
+            self.description.clone()
+        };
         changes.change_wheels(&mut description.wheels);
         for (name, mass) in &changes.masses {
             let Some(solid) = description.solids.iter_mut().find(|s| &s.name == name) else {
@@ -144,7 +169,7 @@ impl Model {
     /// # Errors
     /// `NotADisc` for a wheel whose solid has another shape; a radius out of range.
     pub fn with_wheel_radius(&self, radius: f64) -> Result<Self, ModelError> {
-        let mut description = self.description.clone();
+        let mut description = self.settled();
         length("wheel_radius", radius)?;
         for wheel in &mut description.wheels {
             let mut solids = description.solids.iter_mut();
@@ -173,7 +198,7 @@ impl Model {
     /// # Errors
     /// A radius out of range.
     pub fn with_contact_radius(&self, radius: f64) -> Result<Self, ModelError> {
-        let mut description = self.description.clone();
+        let mut description = self.settled();
         length("contact_radius", radius)?;
         for wheel in &mut description.wheels {
             wheel.contact_radius = Some(radius);
@@ -186,7 +211,7 @@ impl Model {
     /// # Errors
     /// A mass or an inertia that leaves its range.
     pub fn with_masses_scaled(&self, factor: f64) -> Result<Self, ModelError> {
-        let mut description = self.description.clone();
+        let mut description = self.settled();
         for solid in &mut description.solids {
             solid.set_mass(solid.mass * factor);
         }

@@ -77,7 +77,7 @@ impl Model {
     pub fn from_description(mut description: ModelDescription) -> Result<Self, ModelError> {
         description.lay_tracks()?;
         check(&description)?;
-        description.state_yielding();
+        description.state_deflections();
         Self::build(description)
     }
 
