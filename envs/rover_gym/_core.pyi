@@ -320,6 +320,8 @@ class RoverModel:
     ) -> RoverModel:
         """Returns a copy of the model with the given properties changed.
 
+        The stiffness of the wheels does not follow masses and radii.
+
         Args:
             wheel_radius: Radius of all wheels, m. Shape, inertia and contact radius change
                 together.

@@ -124,7 +124,8 @@ def test_residuals_and_covariance_belong_together(fits: Fits) -> None:
         fit["frction"]
 
 
-@pytest.mark.parametrize("seed", [None, pytest.param(1, marks=OTHER_SEED)])
+@pytest.mark.nightly("tests/api/test_identification.py::test_a_run_that_tells_only_a_quotient_says_so")
+@pytest.mark.parametrize("seed", [None, 1])
 def test_a_run_without_slip_does_not_tell_the_friction(rolling: RoverRun, seed: int | None) -> None:
     run = rolling if seed is None else with_noise(rolling, seed)
     fit = identify(run, ["mass_scale", "friction"], window=0.4, **BELIEVED)
@@ -153,7 +154,7 @@ def test_without_noise_the_parameters_are_exact(slipping: RoverRun) -> None:
     assert fit["friction"].value == pytest.approx(0.5, abs=1e-5)
 
 
-@pytest.mark.takes_long("a fit is some hundred simulations")
+@pytest.mark.nightly("tests/api/test_identification.py::test_the_stated_noise_is_taken")
 def test_a_fit_that_noise_does_not_explain_identifies_nothing(slipping: RoverRun, fits: Fits) -> None:
     """Wheels spun in the run and held in the simulation; the misfit passed for noise (standard error 0.0004)."""
     believed = BELIEVED | {"settings": {"friction": 0.9}}

@@ -166,7 +166,7 @@ def test_a_policy_drives_and_a_rock_falls_in_its_way(live: Live) -> None:
     await_that(lambda: live.loop.state.scene.driver == "hand", "the driver")
 
 
-@pytest.mark.takes_long("looks at nine pictures")
+@pytest.mark.nightly("tests/browser/test_overlays.py::test_a_key_shows_an_overlay_and_takes_it_away")
 def test_overlays_show_what_the_rover_sees_and_those_of_a_planner_wait_for_one(live: Live) -> None:
     grey = "return [...document.querySelectorAll('#overlays button:disabled')].map((one) => one.dataset.name).sort();"
     world = live.loop.state.world

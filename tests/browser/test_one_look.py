@@ -11,10 +11,12 @@ from browser.one_look import both, difference, grounds
 # pixels, those of frames from flattened bodies. The two colours of tiles are 18 levels apart, the grain spans 40, and a
 # twentieth more light is 8: swapped tiles, another grain, exposure, Sun, haze or eye exceed these bounds.
 MEAN, WORST_TENTH = 5.0, 11.0
+OTHER_GROUND = pytest.mark.nightly("tests/browser/test_one_look.py::test_a_frame_and_a_page_show_the_same")
 
 
-@pytest.mark.takes_long("starts a browser for each ground and draws a drive frame by frame")
-@pytest.mark.parametrize("ground", ["plane", "rocks", "hills"])
+@pytest.mark.parametrize(
+    "ground", [pytest.param("plane", marks=OTHER_GROUND), "rocks", pytest.param("hills", marks=OTHER_GROUND)]
+)
 def test_a_frame_and_a_page_show_the_same(ground: str, tmp_path: Path) -> None:
     """Tiles were swapped, hills had none in frames and ended after a few metres on pages, and light was another."""
     frame, page = both(grounds()[ground], tmp_path)

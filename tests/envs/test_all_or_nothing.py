@@ -352,12 +352,12 @@ def numbers_in(info: Any, path: str = "") -> dict[str, float]:
 
 
 @pytest.mark.takes_long("steps every environment with every number that is not finite")
-def test_no_number_that_is_not_finite_leaves_a_step() -> None:
+def test_no_number_that_is_not_finite_leaves_a_step(whole: bool) -> None:
     # Speeds and places up to what float32 holds: the physics may fail, what is said of it may not.
     env = RoverEnv(solver_options={"max_iterations": 50, "budget": 10_000_000})
     rng = np.random.default_rng(0)
     failed = 0
-    for _ in range(60):
+    for _ in range(60 if whole else 15):
         size = 10.0 ** rng.uniform(0.0, 38.0)
         q = np.concatenate(([0.0, rng.uniform(1.5, 3.0), 0.0], rng.uniform(-3.0, 3.0, 18)))
         v = size * rng.uniform(-1.0, 1.0, 21) * (rng.uniform(size=21) < rng.choice([0.1, 1.0]))

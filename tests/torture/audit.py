@@ -54,11 +54,14 @@ class Audit:
         self._signs = model.actuation_matrix()[:, : len(indices)]
         self._given = self._most = 0.0
         self._weight = model.mass * float(np.linalg.norm(sim.gravity))
-        springs = [wheel for wheel in description["wheels"] if wheel.get("stiffness")]
-        self._yields, self._at_first = bool(springs), True
+        springs = model.wheel_stiffnesses > 0.0
+        self._yields, self._at_first = bool(springs.any()), True
         friction = float(sim.settings["friction"])
+        ratios = np.array([float(wheel.get("tangential_ratio", 1.0)) for wheel in description["wheels"]])
+        held = _held_by(model.wheel_stiffnesses[springs], model.wheel_radii[springs], self._weight)
+        held += 0.5 * (friction * self._weight) ** 2 / (model.wheel_stiffnesses * ratios)[springs]
         #: What a contact may store at the start, J.
-        self._settled = max((_held_by(wheel, self._weight, friction) for wheel in springs), default=0.0)
+        self._settled = float(held.max(initial=0.0))
         self._twin: Simulation | None = None
 
     def push(self, torques: Array) -> None:
@@ -201,8 +204,6 @@ def _gains(model: RoverModel, description: dict[str, Any], joints: npt.NDArray[n
     return np.array([solids[model.dof_names[i]]["hold"]["stiffness"] for i in joints])
 
 
-def _held_by(wheel: dict[str, Any], load: float, friction: float) -> float:
-    """Energy in a wheel that yields under a load, with friction at its limit and the slack of the law, J."""
-    k = float(wheel["stiffness"])
-    deflection = load / k + 1e-5 * float(wheel["radius"])
-    return 0.5 * k * deflection**2 + 0.5 * (friction * load) ** 2 / (k * float(wheel.get("tangential_ratio", 1.0)))
+def _held_by(stiffness: Array, radius: Array, load: float) -> Array:
+    """Energy in wheels that yield under a load, with the slack of the law, J."""
+    return 0.5 * stiffness * (load / stiffness + 1e-5 * radius) ** 2

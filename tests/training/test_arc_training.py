@@ -33,6 +33,8 @@ TINY: dict[str, Any] = {
     "evaluation": {"scenes": {"easy": {"terrain": "plane"}}, "fields": 2},
 }
 
+TWO_PROCESSES = pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
+
 
 def config(tmp_path: Path, **changes: Any) -> ArcConfig:
     path = tmp_path / "tiny.yaml"
@@ -40,7 +42,7 @@ def config(tmp_path: Path, **changes: Any) -> ArcConfig:
     return read_arc_config(path)
 
 
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.takes_long("trains in two processes"))])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=TWO_PROCESSES)])
 def test_a_training_writes_a_network_and_goes_on(tmp_path: Path, workers: int) -> None:
     settings, said = config(tmp_path), []
     folder = train_arcs(settings, tmp_path / "run", workers=workers, threads=1, device="cpu", say=said.append)

@@ -67,7 +67,7 @@ def test_too_few_states_and_bad_numbers_are_refused() -> None:
         try_arcs(ARGUMENTS, 1, 0)
 
 
-@pytest.mark.takes_long("copies of three rovers drive for a second from a hundred states")
+@pytest.mark.nightly("tests/training/test_foresight_training.py::test_the_fit_explains_states_that_it_has_not_seen")
 def test_the_script_writes_a_forecast_that_drives_any_rover(
     train_foresight: Callable[..., Any], tmp_path: Path
 ) -> None:

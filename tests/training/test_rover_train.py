@@ -49,6 +49,7 @@ def test_several_seeds_end_with_a_table(config: Path, tmp_path: Path) -> None:
     assert told["seeds"][0]["stage"] == "imitation"
 
 
+@pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
 def test_a_training_begins_with_a_network(config: Path, tmp_path: Path) -> None:
     """PPO alone, whose actor is held at first: the network stays the shipped one."""
     ppo = {"decisions": 32, "n_steps": 4, "batch_size": 16, "n_epochs": 1, "every": 16, "warm_up": 10_000}

@@ -327,8 +327,9 @@ impl RoverModel {
         }
     }
 
-    /// Returns a copy of the model with the given properties changed. The stiffness of the wheels
-    /// does not follow masses and radii.
+    /// Returns a copy of the model with the given properties changed.
+    ///
+    /// The stiffness of the wheels does not follow masses and radii.
     ///
     /// Args:
     ///     wheel_radius: Radius of all wheels, m. Shape, inertia and contact radius change

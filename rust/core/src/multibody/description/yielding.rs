@@ -1,7 +1,7 @@
 //! Wheels that yield: how a description states it, and what that is in newtons and metres.
 //!
-//! A `deflection` has no unit. It is a share of the radius, under the wheel's share of the machine's
-//! weight, so that the same machine at another size deflects in proportion.
+//! A `deflection` has no unit. It is a share of the radius, under the wheel's share of the weight,
+//! so that the same machine at another size deflects in proportion.
 //!
 //! Two contacts share the load of a rigid cylinder on rigid ground by micrometres: an axle that
 //! tilts by a hair puts all of it on one end, and the path follows. Real wheels yield by more. A

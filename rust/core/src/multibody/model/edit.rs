@@ -45,9 +45,11 @@ impl Changes {
             self.wheel_stiffness,
             self.wheel_damping,
             self.wheel_relaxation_length,
-            self.mass_scale,
         ];
-        !self.masses.is_empty() || of_wheels.iter().any(Option::is_some)
+        let scales = self
+            .mass_scale
+            .is_some_and(|scale| (scale - 1.0).abs() > 0.0);
+        scales || !self.masses.is_empty() || of_wheels.iter().any(Option::is_some)
     }
 
     fn change_wheels(&self, wheels: &mut [WheelDescription]) {
