@@ -410,6 +410,9 @@ class RoverModel:
     def wheel_radii(self) -> _Array:
         """Radius at which each wheel touches the ground, (n_wheels,), m."""
     @property
+    def wheel_stiffnesses(self) -> _Array:
+        """Normal stiffness of each wheel where it touches, (n_wheels,), N/m; 0 for a rigid wheel."""
+    @property
     def clear_radius(self) -> float:
         """Radius of the circle that the rover needs to turn on the spot, m.
 
