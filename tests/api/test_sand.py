@@ -127,6 +127,7 @@ def synthetic(soil: Soil, noise: float = 0.0) -> Runs:
     return Runs("w", empty.slip_angle, empty.speed, empty.rate, empty.load, measured)
 
 
+@pytest.mark.nightly("tests/api/test_sand.py::test_a_run_settles_at_steady_motion")
 def test_a_fit_finds_the_soil_behind_synthetic_runs() -> None:
     start = named_soil("cmu-sand")
     truth = start.having(

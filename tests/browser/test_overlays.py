@@ -102,6 +102,7 @@ def test_the_help_on_a_touch_screen_is_about_touch(page: str) -> None:
     assert "<kbd>" not in re.sub(r'<p data-for="mouse"[^>]*>.*?</p>', "", text, flags=re.DOTALL)
 
 
+@pytest.mark.nightly("tests/browser/test_overlays.py::test_a_key_shows_an_overlay_and_takes_it_away")
 def test_what_a_run_does_not_hold_is_grey_and_says_why_and_a_ghost_drives_along(tmp_path: Path) -> None:
     run = drive(tmp_path / "run")
     ghost = drive(tmp_path / "ghost", "--friction", "0.3", "--goal", "2", "2")

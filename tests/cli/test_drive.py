@@ -129,6 +129,7 @@ def test_a_film_has_the_size_and_the_camera_that_are_asked_for(tmp_path: Path) -
     assert (caption.min(axis=2) > 230).sum() > 100  # white letters: the seed, the outcome and the time
 
 
+@pytest.mark.nightly("tests/cli/test_drive.py::test_episodes_are_filmed")
 def test_a_recorded_drive_is_filmed_afterwards_as_it_was_filmed_while_it_drove(tmp_path: Path) -> None:
     during, after = tmp_path / "during.mp4", tmp_path / "after.mp4"
     given = ("--difficulty", "0.5", "--time-limit", "0.5", "--output", str(tmp_path), "--size", "960x540")

@@ -16,6 +16,9 @@ from rover_gym.figures.grain_run_figures import GRAIN_DRAWINGS, slip_of_wheels
 from rover_gym.rendering.appearance import SAND_COLOUR
 from rover_gym.runs import open_run, record_run
 
+ROVER_PLOTTED = pytest.mark.nightly("tests/cli/test_grains.py::test_a_run_is_plotted")
+ROVER_FILMED = pytest.mark.nightly("tests/cli/test_grains.py::test_a_run_is_filmed")
+
 
 @pytest.mark.parametrize(
     ("command", "options", "said"),
@@ -73,7 +76,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {"rover": folder / "rover.h5", "bed": folder / "bed.h5"}
 
 
-@pytest.mark.parametrize("name", ["rover", "bed"])
+@pytest.mark.parametrize("name", [pytest.param("rover", marks=ROVER_PLOTTED), "bed"])
 def test_a_run_is_plotted(name: str, runs: dict[str, Path], tmp_path: Path) -> None:
     output = output_of("plot", runs[name], "--output", tmp_path)
     of_wheels = {"wheel-forces", "sinkage-and-slip"}
@@ -89,7 +92,7 @@ def test_the_slip_of_rolling_wheels_is_small(runs: dict[str, Path]) -> None:
     assert np.nanmax(np.abs(slip[13:])) < 0.05
 
 
-@pytest.mark.parametrize("name", ["rover", "bed"])
+@pytest.mark.parametrize("name", [pytest.param("rover", marks=ROVER_FILMED), "bed"])
 def test_a_run_is_filmed(name: str, runs: dict[str, Path], tmp_path: Path) -> None:
     film = tmp_path / "run.mp4"
     output_of("replay", runs[name], "--film", film, "--fps", "5")

@@ -96,7 +96,9 @@ def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
     assert channels["path"][0].tolist() == [[-1e5, -1e5, pytest.approx(run.trajectory["q"][0, 1])]] * 13
 
 
-@pytest.mark.takes_long("the planner drives a second")
+@pytest.mark.nightly(
+    "tests/cli/test_sights.py::test_the_scans_points_lie_on_the_ground_and_the_plan_is_one_of_the_arcs"
+)
 def test_the_planner_with_futures_tells_a_path_that_leads_on(tmp_path: Path) -> None:
     pytest.importorskip("scipy")
     run = driven(tmp_path, "--difficulty", "0.5", "--policy", "planner")

@@ -19,6 +19,9 @@ SENSORS = [
     InertialUnit(rate=10.0, gyroscope_noise=1e-3),
 ]
 LIMIT = 5
+OTHER_CAMERA = pytest.mark.nightly(
+    "tests/envs/test_sensors_in_vectors.py::test_a_convolutional_network_of_stable_baselines_takes_the_image"
+)
 
 
 def actions(steps: int, n: int) -> Any:
@@ -100,7 +103,7 @@ def test_depth_is_an_image_if_asked_for(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["uint8", "channels_first"])
-@pytest.mark.parametrize("camera", [DepthCamera, ColourCamera])
+@pytest.mark.parametrize("camera", [pytest.param(DepthCamera, marks=OTHER_CAMERA), ColourCamera])
 def test_a_convolutional_network_of_stable_baselines_takes_the_image(camera: Any, kind: str) -> None:
     """`MultiInputPolicy` flattened depth in metres, and `NatureCNN` refused it."""
     sb3 = pytest.importorskip("rover_gym.vector.sb3")

@@ -254,6 +254,7 @@ def test_a_page_that_watches_gets_the_scene_once_and_then_frames(served: Served)
     assert size < 4000
 
 
+@pytest.mark.nightly("tests/live/test_live_server.py::test_a_page_that_watches_gets_the_scene_once_and_then_frames")
 def test_another_ground_is_another_scene(served: Served) -> None:
     with served.page() as page:
         page.send('{"do":"watch"}')

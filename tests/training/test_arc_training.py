@@ -67,6 +67,7 @@ def test_a_training_writes_a_network_and_goes_on(tmp_path: Path, workers: int) -
         assert caught.value.field == "scenes"
 
 
+@pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
 def test_the_command_trains_and_its_policy_drives(tmp_path: Path) -> None:
     path, run = tmp_path / "tiny.yaml", tmp_path / "run"
     path.write_text(yaml.safe_dump({**TINY, "ppo": None}), encoding="utf-8")
@@ -82,6 +83,7 @@ def test_the_command_trains_and_its_policy_drives(tmp_path: Path) -> None:
     assert runner.invoke(app, ["train", str(path)]).exit_code != 0
 
 
+@pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
 def test_imitation_goes_on_after_a_round(tmp_path: Path) -> None:
     one = config(tmp_path, ppo=None, imitation={**TINY["imitation"], "rounds": 1})
     train_arcs(one, tmp_path / "run", threads=1, device="cpu", say=lambda _line: None)

@@ -76,7 +76,7 @@ def test_a_run_whose_configuration_is_a_file_beside_it_is_still_read(run: tuple[
         RawPolicy.load(folder)
 
 
-@pytest.mark.takes_long("trains with the single-file example")
+@pytest.mark.nightly("tests/envs/test_sb3_vec_env.py::test_ppo_learns_from_it_without_complaint")
 def test_the_single_file_trains(capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(TRAINING / "examples" / "single_file.py"))["train"](steps=12_288)
     assert capsys.readouterr().out.splitlines()[-1].startswith("12288 decisions: ")

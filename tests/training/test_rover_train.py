@@ -35,6 +35,7 @@ def config(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.nightly("tests/training/test_rover_train.py::test_a_run_is_never_overwritten_and_its_figures_are_events")
 def test_several_seeds_end_with_a_table(config: Path, tmp_path: Path) -> None:
     runs = tmp_path / "runs"
     result = rover("train", config, "--seeds", 3, 5, "--output", runs, "--workers", 1)

@@ -55,7 +55,7 @@ def test_a_rover_over_a_map(folder: Path) -> None:
     assert names["simulation"].q[0] > -3.9
 
 
-@pytest.mark.takes_long("trains, evaluates, films and replays, as the tutorial does")
+@pytest.mark.nightly("tests/training/test_rover_train.py::test_a_run_is_never_overwritten_and_its_figures_are_events")
 @pytest.mark.timeout(900)
 def test_train_a_policy(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the page's own variables for a rehearsal."""

@@ -30,6 +30,7 @@ fn every_step_of_64_boxes_is_solved() {
 }
 
 #[test]
+#[ignore = "tests/physics/contacts/heaps.rs::every_step_of_64_boxes_is_solved"]
 fn every_step_of_125_boxes_is_solved() {
     let most = solve_every_step(5, 1, 225);
     assert!(most > 200, "{most} contacts");
