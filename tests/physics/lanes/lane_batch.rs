@@ -307,7 +307,6 @@ proptest! {
 }
 
 #[test]
-#[ignore = "tests/physics/lanes/lane_batch.rs::a_rover_moves_as_it_would_alone"]
 fn narrower_lanes_give_the_same_bits() {
     let models = models();
     for instructions in Instructions::all_of_this_machine() {
