@@ -39,7 +39,7 @@ def quaternions(rotations: Array) -> Array:
 
 
 def continuous(q: Array) -> Array:
-    """The same rotations without sign flips along the first axis, so that interpolation takes the short way.
+    """Returns rotations without sign flips along the first axis, so that interpolation takes the short way.
 
     Args:
         q: (n, ..., 4) unit quaternions.

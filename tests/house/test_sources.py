@@ -139,6 +139,52 @@ def test_what_is_too_long() -> None:
     assert not is_too_long(f"/// [`Short`]({'a::' * 40}b)")
 
 
+#: Words with which a comment says nothing where an editor or a page shows it alone.
+LEANS = re.compile(r"(?:That of|Those|The same|Of|Its|It|As|See|Also|The other|One of|Whether it|What it|Where it)\b")
+
+DOC = re.compile(r"\s*(?:///|//!|#:) ?(.*)")
+
+
+def doc_comments(text: str) -> list[tuple[int, str]]:
+    """Line numbers and first lines of the doc comments of a Rust source, or of the `#:` comments of a Python source."""
+    found, is_inside = [], False
+    for number, line in enumerate(text.splitlines(), start=1):
+        comment = DOC.fullmatch(line)
+        if comment and not is_inside:
+            found.append((number, comment[1]))
+        is_inside = comment is not None
+    return found
+
+
+def docstrings(text: str) -> list[tuple[int, str]]:
+    """Line numbers and docstrings of a Python source."""
+    places = ast.Module, ast.ClassDef, ast.FunctionDef
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, places)]
+    return [(node.body[0].lineno, ast.get_docstring(node) or "") for node in nodes if node.body]
+
+
+def test_a_comment_says_what_a_thing_is_where_it_is_shown_alone() -> None:
+    """Hundreds began with "Those of", "The same", "Its": a tooltip showed half a sentence."""
+    leaning = []
+    for page in tracked_files():
+        place = page.relative_to(ROOT).as_posix()
+        if not place.startswith(("rust", "envs", "training")) or page.suffix not in (".rs", ".py", ".pyi"):
+            continue
+        text = page.read_text(encoding="utf-8")
+        found = doc_comments(text) + (docstrings(text) if page.suffix != ".rs" else [])
+        leaning += [f"{place}:{number}: {said.splitlines()[0]}" for number, said in found if LEANS.match(said)]
+    assert not leaning, "\n".join(leaning)
+
+
+def test_what_leans_on_its_neighbours_is_found() -> None:
+    said = dict(
+        doc_comments("/// Mass, kg.\n/// Its unit.\nm: f64,\n    /// Its unit.\nlet x = 1; // Its\n#: Of a scan.")
+    )
+    assert said == {1: "Mass, kg.", 4: "Its unit.", 6: "Of a scan."}
+    assert [bool(LEANS.match(one)) for one in said.values()] == [False, True, True]
+    assert docstrings('def f():\n    """The same."""') == [(1, ""), (2, "The same.")]
+
+
 WRITER = runpy.run_path(str(ROOT / "rust" / "python" / "stub.py"))
 
 STUB = WRITER["STUB"].read_text(encoding="utf-8")

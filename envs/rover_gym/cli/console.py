@@ -63,7 +63,7 @@ SET_BY = {
     "options.goal": ("goal", "--goal"),
 }
 
-#: The same of what a command takes by its place: the name in errors, and the command's parameters.
+#: Names in errors of what a command takes by its place, and the command's parameters.
 PLACED = (
     ("path", "run"),
     ("path", "recording"),

@@ -213,7 +213,7 @@ def named_ground(
 def places_on(
     ground: object, places: dict[str, tuple[float, float] | None], *, map_coordinates: bool
 ) -> dict[str, tuple[float, float]]:
-    """Those places of options that are given, as (x, z), m; with `map_coordinates` they are easting and northing.
+    """The places that options give, as (x, z), m; with `map_coordinates` the options give easting and northing.
 
     Raises:
         OptionError: The ground has no map coordinates.

@@ -74,7 +74,7 @@ def _files(given: Any) -> Iterator[Path]:
 
 
 def _identity(path: Path) -> object:
-    """The same for two paths if they are the same file."""
+    """An identifier of the file at a path, equal for two paths of one file."""
     try:
         status = path.stat()
     except (OSError, ValueError):

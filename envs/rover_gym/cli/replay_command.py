@@ -86,7 +86,7 @@ def replay(
             say_path("film", film_run(frames, film, fps, progress=lambda n: bar.update(task, completed=n)))
 
 
-#: As what each kind of run is replayed, and what is said of the rest.
+#: Formats in which each kind of run is replayed, and the message for the others.
 _KINDS: dict[type, tuple[tuple[str, ...], str]] = {
     RoverRun: (("html", "vrml", "gltf", "film"), ""),
     PlanarRun: (("html",), "a ball or a two-wheel rover is replayed as a page, with --html"),

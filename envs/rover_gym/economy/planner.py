@@ -40,10 +40,11 @@ from rover_gym.validation import flag, number, refuse, vector
 #: Largest distance between the trunks of the welded model and of the full model with PD-held steering, m. On a plane a
 #: wheel touches the ground on its steering axis, so the contact does not turn it. Largest measured: 2.6e-7.
 WELD_ERROR = 1e-6
-#: The same between the planar and the welded model: rounding, m, and for each unit of the solver's relative tolerance,
-#: m. Largest measured: 2.3e-13 m with a tolerance of 1e-12, and 1.3e-6 m with 1e-8.
+#: Largest distance between the trunks of the planar and the welded model: rounding, m, and for each unit of the
+#: solver's relative tolerance, m. Largest measured: 2.3e-13 m with a tolerance of 1e-12, and 1.3e-6 m with 1e-8.
 PLANAR_ERROR, PLANAR_ERROR_BY_TOLERANCE = 1e-7, 400.0
-#: The same between the linearised and the Newton scheme, over the step size squared, m/s2. Largest measured: 3.3e-3.
+#: Largest distance between the trunks of the linearised and the Newton scheme over the step size squared, m/s2.
+#: Largest measured: 3.3e-3.
 LINEARISED_ERROR = 1e-2
 #: Time of a batch's physics with welded steering over that with steering, on the plane, and among rocks that are never
 #: met over that on the plane: `python -m comparison.batch_economies`.

@@ -12,7 +12,7 @@ DRAWN_SOILS = ("cmu-sand", "grc-1-loose", "grc-1", "grc-1-dense", "hit-simulant"
 #: The default rover of the sand, by its name in the gallery.
 SAND_ROVER = "open-rover"
 
-#: Its wheels on sand: width, rounding of the edges and height of the grousers, m, and their number.
+#: Wheels of the default rover on sand: width, rounding of the edges and height of the grousers, m, and their number.
 WHEEL_WIDTH, WHEEL_ROUNDING, GROUSER_HEIGHT, GROUSERS = 0.08, 0.005, 0.005, 24
 
 

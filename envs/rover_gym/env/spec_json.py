@@ -89,7 +89,7 @@ def _plain_wrapper(wrapper: WrapperSpec) -> WrapperSpec:
 
 
 def rover_spec(spec: EnvSpec | None) -> RoverSpec | None:
-    """The same specification with the `to_json` of `RoverSpec`."""
+    """A copy of a specification with the `to_json` of `RoverSpec`."""
     if spec is None or isinstance(spec, RoverSpec):
         return spec
     made = copy.copy(spec)

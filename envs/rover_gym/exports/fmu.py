@@ -338,7 +338,7 @@ ENDINGS = {"Linux": (".so", "linux"), "Darwin": (".dylib", "darwin"), "Windows":
 
 MACHINES = {"AMD64": "x86_64", "arm64": "aarch64", "ARM64": "aarch64"}
 
-#: Of every file in a unit, so that equal scenes make equal units.
+#: Time stamp of every file in a unit, so that equal scenes make equal units.
 STAMP = (1980, 1, 1, 0, 0, 0)
 
 

@@ -360,7 +360,7 @@ class McapWriter:
 
 
 def _drive_signs(model: RoverModel) -> list[tuple[int, float]]:
-    """Of each wheel: the index of its joint in `dof_names`, and the sign of a torque that drives forward."""
+    """The index of each wheel's joint in `dof_names`, and the sign of a torque that drives it forward."""
     wheels = model.to_dict()["wheels"]
     joints = {name: i for i, name in enumerate(model.dof_names)}
     return [(joints.get(wheel["solid"], 0), wheel.get("drive_sign", 1.0)) for wheel in wheels]

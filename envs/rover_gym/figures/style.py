@@ -49,7 +49,7 @@ QUANTITY_COLOURS = ("#332288", "#CC6677", "#117733", "#882255", "#999933")
 
 DARK = "0.25"
 
-#: Of nested lines: front, middle and back wheels, points.
+#: Line widths of front, middle and back wheels, which may lie over each other, points.
 NESTED_WIDTHS = {"F": 0.8, "M": 1.6, "B": 2.6}
 
 #: Width of a figure, inches. Shown 800 pixels wide, as a README does, type of 10 points is 12 pixels high.

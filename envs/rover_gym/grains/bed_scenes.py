@@ -155,7 +155,7 @@ def rover_before_pit(
 
 @checked(model="RoverModel")
 def with_wheel_width(model: RoverModel, wheel_width: float) -> RoverModel:
-    """The same rover on wheels of a width, m, between whose rims balls do not slip.
+    """Returns a copy of a rover on wheels of a width, m, between whose rims balls do not slip.
 
     Raises:
         OptionError: The width is not positive.

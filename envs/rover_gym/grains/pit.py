@@ -61,12 +61,12 @@ class Pit:
 
     @property
     def middle(self) -> float:
-        """Of the pit along x, m."""
+        """Middle of the pit along x, m."""
         return self.begin + 0.5 * self.length
 
     @property
     def volume(self) -> float:
-        """Below the ground, m³."""
+        """Volume of the pit below the ground, m³."""
         length, width = self.length - 2.0 * self.bank, self.width - 2.0 * self.bank
         top, bottom = self.length * self.width, length * width
         across = (self.length - self.bank) * (self.width - self.bank)
@@ -174,7 +174,7 @@ class PitFill:
     position: Array
 
     def mirrored(self, *, along_x: bool = False, along_z: bool = False) -> PitFill:
-        """The same fill seen in a mirror across the pit's middle."""
+        """Returns the fill as seen in a mirror across the pit's middle."""
         position = self.position.copy()
         if along_x:
             position[:, 0] = 2.0 * self.pit.middle - position[:, 0]

@@ -156,7 +156,7 @@ def _first_deviations(noise: object, model: RoverModel) -> Array:
 
 
 def _some(windows: list[Window], most: int) -> list[Window]:
-    """As many windows as wanted, at equal distances."""
+    """At most `most` of the windows, at equal distances."""
     if len(windows) <= most:
         return windows
     return [windows[i] for i in np.linspace(0, len(windows) - 1, most).round().astype(int).tolist()]

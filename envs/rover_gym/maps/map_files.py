@@ -49,7 +49,7 @@ class GroundFile:
 
     @property
     def ending(self) -> str:
-        """Its ending in lower case, with the dot."""
+        """The file's ending in lower case, with the dot."""
         return self.path.suffix.lower()
 
     def refuse(self, reason: str, value: object = None) -> NoReturn:

@@ -64,7 +64,7 @@ class WrittenSolid:
             self.kind = "fixed"
 
     def shapes(self, wheel: dict[str, Any] | None) -> list[FileShape]:
-        """Its shapes in the file's axes. A wheel's disc becomes its collision cylinder.
+        """Returns the solid's shapes in the file's axes. A wheel's disc becomes its collision cylinder.
 
         Args:
             wheel: The description of the wheel if the solid is one, or None.

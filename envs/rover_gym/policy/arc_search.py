@@ -45,7 +45,7 @@ class RoverOutline:
 
     @classmethod
     def of(cls, model: RoverModel, cell: float) -> "RoverOutline":
-        """That of a model, in square cells of a width, m."""
+        """The outline of a model, in square cells of a width, m."""
         zero, wheels, radii = np.zeros(model.nq), wheel_centres(model), model.wheel_radii
         ground = float(np.mean(np.asarray(model.wheel_contact_points(zero, Plane(), coordinates="state"))[:, 1]))
         poses = model.poses(zero)
@@ -149,7 +149,7 @@ class Arcs:
         return Arcs(*(np.concatenate(pair) for pair in pairs))
 
     def kept(self, which: npt.NDArray[np.bool_]) -> "Arcs":
-        """Those marked in `which` `(n,)`."""
+        """The arcs that are marked in `which` `(n,)`."""
         return Arcs(*(values[which] for values in vars(self).values()))
 
     def steering(self, wheels: Array) -> Array:
@@ -159,7 +159,7 @@ class Arcs:
         return atan2(left, cosine[:, None] + self.curvature[:, None] * wheels[:, 1])
 
     def within(self, max_steering: float, wheels: Array) -> "Arcs":
-        """Those on which no wheel at x and z `(n_wheels, 2)` is steered beyond a limit, rad, by more than a degree."""
+        """The arcs on which no wheel at x and z `(n_wheels, 2)` is steered more than a degree beyond a limit, rad."""
         if not len(wheels):
             return self
         largest: Array = np.abs(self.steering(wheels)).max(axis=1)
@@ -186,16 +186,16 @@ class PathCosts:
     """What a path costs, in metres of way. Lengths of the rover are in wheel radii where not said otherwise.
 
     Attributes:
-        belly: Of a metre with the underside a wheel radius below the margin.
+        belly: Cost of low clearance: a metre with the underside d radii below the margin costs belly d (1 + d).
         margin: Clearance that costs nothing.
-        climb: Of a wheel's rise by a radius.
-        step: Of the square of a rise between two poses, beyond half a radius.
-        lean: Of a metre at a slope of 1.
-        facing: Of a radian off the goal, over the rover's reach.
-        swerve: Of a change of a command from 0 to its limit.
-        switch: Of a change between forward and backward.
-        reverse: Of an arc driven backward.
-        memory: Of a pose at a place where the rover got stuck.
+        climb: Cost of a wheel's rise by a radius.
+        step: Cost of the square of a wheel's rise between two poses, beyond half a radius.
+        lean: Cost of a metre at a slope of 1; it grows with the square of the slope.
+        facing: Cost of a heading one radian off the goal, over the rover's reach.
+        swerve: Cost of a change of the curvature or sideways command from 0 to its limit.
+        switch: Cost of a change between forward and backward.
+        reverse: Cost of an arc driven backward.
+        memory: Cost of an arc through a pose in which the rover got stuck.
         later: Factor on the costs of each arc after the first, since the rover plans again before it gets there.
         depth: Arcs of a path.
         width: Paths kept.

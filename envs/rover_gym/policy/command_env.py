@@ -412,7 +412,7 @@ class RoverCommandEnv(DriveByCommand):
     - v0: numbers may change until the first release.
     """
 
-    #: As of the rover's environment.
+    #: Metadata of the rover's environment.
     metadata = RoverEnv.metadata
 
     @takes_command_arguments

@@ -63,7 +63,7 @@ class Contender:
 
     @property
     def is_trained(self) -> bool:
-        """Whether it is a network of a run of `rover train`."""
+        """Whether the policy is a network of a run of `rover train`."""
         return self.name not in NAMES and any(path.name == ARCS_FILE for path in self.files)
 
 

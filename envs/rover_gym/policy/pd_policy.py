@@ -80,7 +80,7 @@ class Turning:
 
     @classmethod
     def of(cls, model: RoverModel, weight: float) -> "Turning":
-        """Those of a model with its joints at zero and a weight, N."""
+        """The constants of a model with its joints at zero and a weight, N."""
         centres, steering = wheel_centres(model), Steering.of(model)
         fixed = [float(x) for (x, _), entry in zip(centres, steering.entries, strict=True) if entry < 0]
         if fixed and steering.joints:

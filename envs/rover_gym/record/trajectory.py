@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 #: Largest ratio of decompressed data to file size: admits compressed files, refuses decompression bombs.
 LARGEST_EXPANSION = 100
-#: The same for packed data sets: what deflate can reach, since a bed at rest repeats its rows.
+#: Largest such ratio of packed data sets: what deflate can reach, since a bed at rest repeats its rows.
 LARGEST_PACKING = 1032
 #: Most bytes of frames that one call reads.
 MOST_BYTES = 1 << 32

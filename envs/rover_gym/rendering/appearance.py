@@ -43,7 +43,7 @@ GROUND_COLOUR: Colour = (0.72, 0.45, 0.30)
 
 GROUND_COLOUR_2: Colour = (0.65, 0.39, 0.26)  # the other fields of the checkered ground
 
-#: The same of sand, paler and yellower.
+#: Colours of the checkered ground on sand, paler and yellower.
 SAND_GROUND: tuple[Colour, Colour] = ((0.80, 0.67, 0.46), (0.76, 0.63, 0.43))
 
 ROCK_COLOUR: Colour = (0.50, 0.33, 0.25)

@@ -177,7 +177,7 @@ class RockActors:
 
 
 def shadow_of(actor: vtkActor, ground: GroundActors) -> vtkActor:
-    """The same surface, dark and flattened onto the ground, where `set_pose` does not move it."""
+    """Returns an actor's surface, dark and flattened onto the ground, where `set_pose` does not move it."""
     mapper = vtkPolyDataMapper()
     mapper.SetInputDataObject(actor.GetMapper().GetInputDataObject(0, 0))
     mapper.ScalarVisibilityOff()

@@ -110,7 +110,7 @@ def nearest_points(run: PlanarRun) -> tuple[Array, Array]:
 
 
 def _nearest(ground: PlanarGround, centres: Array, radius: Array) -> tuple[Array, Array]:
-    """The same of one frame: centres (n_discs, 2) and radii (n_discs, 1), m."""
+    """Nearest points of the ground, m, and its normals there in one frame, from centres (n_discs, 2) and radii, m."""
     x = centres[:, :1] + np.linspace(-1.5, 1.5, 97) * radius
     if isinstance(ground, Polyline):
         near = (ground.x >= x.min()) & (ground.x <= x.max())

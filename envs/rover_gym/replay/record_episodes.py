@@ -100,7 +100,7 @@ class RecordEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
 
 def _writable(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Those arguments that can be written."""
+    """The arguments that can be written."""
     found: dict[str, Any] = {}
     for name, value in arguments.items():
         try:

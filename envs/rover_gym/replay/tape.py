@@ -36,7 +36,7 @@ class Watched:
     def predict(
         self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
     ) -> tuple[npt.NDArray[np.float32], Any]:
-        """As the policy's; keeps the state."""
+        """The policy's action; its state is kept."""
         assert self.policy is not None  # noqa: S101 - only a policy is asked
         action, self.state = self.policy.predict(observation, state, episode_start)
         return action, self.state

@@ -73,7 +73,7 @@ def ground_normals(terrain: Terrain, places: Array) -> Array:
 
 
 def feet(run: RoverRun, wheels: list[DrawnWheel]) -> tuple[Array, Array, Array]:
-    """Of each sample and wheel: the lowest point towards the ground, m, the normal there, and the axle.
+    """The lowest point of each wheel towards the ground in each sample, m, the normal there, and the axle.
 
     All are (n, n_wheels, 3); the axle points to the rover's right.
     """

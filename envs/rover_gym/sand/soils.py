@@ -78,7 +78,7 @@ class Soil:
                 raise OptionError(f"{name}: missing from the numbers of the soil {self.name!r}")
 
     def having(self, **numbers: float) -> "Soil":
-        """The same soil with other numbers.
+        """Returns the soil with other numbers.
 
         Args:
             numbers: Those that differ.

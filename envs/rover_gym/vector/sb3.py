@@ -86,7 +86,7 @@ class RoverVecEnv(VecEnv):
         sensors: Sequence[SensorLike] | None = None,
         **arguments: Unpack[RoverArguments],
     ) -> None:
-        #: The same rovers as a vector of Gymnasium.
+        #: The rovers as a vector of Gymnasium.
         self.rovers = RoverVectorEnv(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
         self.batch = self.rovers.batch
         #: Whether a step takes the height scan, see `RoverBatch.step`.

@@ -40,7 +40,7 @@ impl SphereKind {
 /// All bodies there are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bodies {
-    /// Of each sphere.
+    /// Mass and radius of each sphere.
     pub kind: SphereKind,
     /// How many spheres.
     pub n: usize,
@@ -69,7 +69,7 @@ impl Bodies {
 /// Where the bodies are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Placement {
-    /// Of each body, the box last, world, m.
+    /// Centres of the bodies, the box last, world, m.
     pub centres: Vec<Vector3<f64>>,
     /// Attitude of the box.
     pub turn: UnitQuaternion<f64>,

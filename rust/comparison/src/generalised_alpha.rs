@@ -76,7 +76,7 @@ struct Coefficients {
 }
 
 impl Coefficients {
-    /// Of a spectral radius at infinite frequency.
+    /// Coefficients for a spectral radius at infinite frequency.
     fn of(rho: f64) -> Self {
         let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
         let gamma = 0.5 + alpha_f - alpha_m;

@@ -35,8 +35,8 @@ impl Slab {
             .component_mul(&Vector3::new(sign(1), sign(2), sign(4)))
     }
 
-    /// Of a point x, in own axes: the nearest point of the surface (m), the distance (m, negative
-    /// inside) and the outward normal there.
+    /// Nearest point of the surface to a point x (m), its distance from x (m, negative if x is
+    /// inside) and the outward normal there, all in own axes.
     #[must_use]
     pub fn nearest(&self, x: &Vector3<f64>) -> (Vector3<f64>, f64, Vector3<f64>) {
         let clamped = Vector3::from_fn(|k, _| x[k].clamp(-self.half[k], self.half[k]));

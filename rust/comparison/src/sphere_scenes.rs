@@ -14,13 +14,13 @@ use crate::slab::Slab;
 use crate::sphere_simulation::SphereSimulation;
 use crate::{ProjectedToConvergence, Stepper};
 
-/// Of every scene but rolling.
+/// Spheres of every scene but rolling.
 pub const KIND: SphereKind = SphereKind {
     mass: 10.0,
     radius: 0.1,
 };
 
-/// Of rolling.
+/// Balls of the rolling scene.
 pub const BALL: SphereKind = SphereKind {
     mass: 1.0,
     radius: 0.5,
@@ -94,12 +94,12 @@ impl Push {
     }
 }
 
-/// One of the scenes.
+/// A scene of free spheres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
     /// 6 x 6 x 6 spheres, e = 0, lowest centres 0.11 m above the plane.
     Block,
-    /// The same with e = 1, lowest centres at 1.1 m.
+    /// 6 x 6 x 6 spheres, e = 1, lowest centres 1.1 m above the plane.
     ElasticBlock,
     /// 7 x 7 balls 0.4 m apart, centres at 5 m, e = 1.
     Bouncing,
@@ -163,7 +163,7 @@ impl Scene {
         }
     }
 
-    /// Of the contacts with the plane, and of spheres with one another.
+    /// Coefficient of friction of contacts with the plane and between spheres.
     #[must_use]
     pub fn friction(self) -> f64 {
         if matches!(self, Self::Rolling(_)) {
@@ -173,7 +173,7 @@ impl Scene {
         }
     }
 
-    /// What its spheres are.
+    /// Mass and radius of the scene's spheres.
     #[must_use]
     pub fn kind(self) -> SphereKind {
         if matches!(self, Self::Rolling(_)) {
@@ -183,7 +183,7 @@ impl Scene {
         }
     }
 
-    /// Its box, and where its centre is, m.
+    /// The scene's box and its centre, m; None without a box.
     #[must_use]
     pub fn slab(self) -> Option<(Slab, Vector3<f64>)> {
         let Self::Rolling(push) = self else {
@@ -290,7 +290,7 @@ pub struct SphereRun {
     pub time_step: f64,
     /// Mean over the samples of the sum of squared penetrations, m².
     pub penetration: f64,
-    /// The same sum at the end, m².
+    /// Sum of squared penetrations at the end, m².
     pub last_penetration: f64,
     /// Largest such sum of any sample, m².
     pub largest_penetration: f64,

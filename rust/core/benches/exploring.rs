@@ -39,7 +39,7 @@ type Histogram = BTreeMap<usize, usize>;
 struct Measured {
     /// Microseconds a step at each tolerance.
     microseconds: [f64; 2],
-    /// The same of a rover in a batch, at the first tolerance.
+    /// Microseconds a step of a rover in a batch, at the first tolerance.
     batch_microseconds: f64,
     steps: usize,
     /// Steps that the general code took.

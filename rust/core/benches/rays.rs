@@ -18,7 +18,7 @@ use rover_core::geometry::ray::{Ray, cast};
 use rover_core::geometry::{HeightField, Plane, SphereField, Terrain, TriangleMesh, Union};
 use rover_core::nalgebra;
 
-/// Of one figure, s.
+/// Least time spent on a measurement, s.
 const ENOUGH: f64 = 0.5;
 const RANGE: f64 = 20.0;
 
@@ -41,7 +41,7 @@ fn map(n: u32, cell: f64) -> HeightField {
     HeightField::new(heights.collect(), shape, [cell; 2], [-half; 2]).unwrap()
 }
 
-/// The same as a mesh.
+/// Triangle mesh of the heights of a map.
 fn mesh(field: &HeightField) -> TriangleMesh {
     let [rows, columns] = field.shape();
     let ([dx, dz], [x, z]) = (field.spacing(), field.origin());

@@ -134,7 +134,7 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    /// The same between two lines of output, by which a tracer finds it.
+    /// Repeats a phase between two lines of output, by which a tracer finds it.
     fn announce(&mut self, phase: &str, n: usize) {
         println!("{phase}, {n} times");
         self.repeat(phase, n);

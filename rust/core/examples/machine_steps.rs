@@ -114,7 +114,8 @@ fn torques(model: &Model, k: usize) -> Vec<f64> {
     (0..n).map(|i| most(i) * drawn(17 * k + i)).collect()
 }
 
-/// The same, with a mean that makes the second rover push the first.
+/// Torques of the wheels of a named machine, N m. In "push" those of the second rover are never
+/// negative, so that it pushes the first.
 fn torques_of(name: &str, model: &Model, k: usize) -> Vec<f64> {
     let mut torques = torques(model, k);
     if name == "push" {

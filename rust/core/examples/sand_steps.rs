@@ -107,7 +107,7 @@ fn counted_derivatives(sim: &RoverSimulation, steps: usize) {
     (differentiator.trajectory(&state, (steps, &commands), &[], &mut || true)).unwrap();
 }
 
-/// The same rover on its way, in sand or on firm ground.
+/// A parked rover that has begun to drive, in sand or on firm ground.
 fn on_its_way(is_firm: bool) -> RoverSimulation {
     let mut sim = placed(&wide("open-rover", 0.08, 1.0), dry_sand(), 0.0, 0.005);
     if is_firm {

@@ -112,7 +112,7 @@ unsafe fn slice<'a, T>(
     }
 }
 
-/// The same, to be written.
+/// A writable array of the importer's; empty for a null pointer without entries.
 ///
 /// SAFETY: as [`slice`], and nobody else holds the array during the call.
 unsafe fn slice_mut<'a, T>(

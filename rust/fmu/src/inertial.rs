@@ -31,7 +31,8 @@ impl Motion {
     }
 }
 
-/// What it tells before the first interval: of a unit that does not accelerate.
+/// Specific force, m/s², and angular velocity, rad/s, of a unit that does not accelerate: the
+/// readings before the first interval.
 pub fn unaccelerated(rover: &RoverSimulation, gravity: [f64; 3]) -> [f64; 6] {
     let into = rover.q().attitude.inverse();
     let angular_velocity = Vector3::from_column_slice(&rover.v()[3..6]);

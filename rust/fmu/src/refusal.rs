@@ -43,13 +43,13 @@ pub enum Refusal {
     /// An argument that is a null pointer.
     #[error("{argument}: must not be null")]
     Null {
-        /// Its name.
+        /// Name of the argument.
         argument: &'static str,
     },
     /// A text that is not UTF-8.
     #[error("{argument}: must be UTF-8")]
     Text {
-        /// Its name.
+        /// Name of the argument.
         argument: &'static str,
     },
     /// A value reference without a variable of this type.

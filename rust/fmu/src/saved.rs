@@ -10,7 +10,7 @@ use crate::state::{Inputs, LastStep, Mode, Parameters};
 /// Everything that changes in a unit.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Saved {
-    /// Of the unit that it belongs to.
+    /// Token of the unit that the state belongs to.
     pub token: String,
     pub mode: Mode,
     pub parameters: Parameters,

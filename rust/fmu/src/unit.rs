@@ -95,7 +95,7 @@ impl Unit {
         Ok(())
     }
 
-    /// As it was instantiated.
+    /// Resets the unit to the state in which it was instantiated.
     pub fn reset(&mut self) -> Result<(), Refusal> {
         let parameters = Parameters::of(&self.scene.options);
         self.rover = begun(&self.scene, &parameters)?;

@@ -124,7 +124,7 @@ impl<'py> Named<'py> {
         }
     }
 
-    /// The same values, with errors of another kind.
+    /// The values by name, with errors of another kind.
     pub fn of(&self, kind: Kind) -> Self {
         Self {
             given: self.given.clone(),
@@ -184,7 +184,7 @@ impl<'py> Named<'py> {
             .transpose()
     }
 
-    /// The same of a value that must be given.
+    /// What a function reads of a value that must be given.
     pub fn need<T>(
         &self,
         name: &str,

@@ -96,7 +96,8 @@ pub fn vector(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<f
     Ok(view.iter().copied().collect())
 }
 
-/// The same with at most `n` entries: of more, none is read. Fewer are for the caller to refuse.
+/// Any array-like of one dimension as a vector of at most `n` entries: of more, none is read. Fewer
+/// are for the caller to refuse.
 pub fn at_most(value: &Bound<'_, PyAny>, n: usize, kind: Kind, field: &str) -> Result<Vec<f64>> {
     match value.len() {
         Ok(length) if length > n => Err(kind.error(

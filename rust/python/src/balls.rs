@@ -137,7 +137,7 @@ impl Balls {
     }
 }
 
-/// The same walls with their velocities, (m, 3).
+/// Walls with their velocities (m, 3), m/s.
 fn moving(walls: Vec<Wall<3>>, velocity: Option<&Bound<'_, PyAny>>) -> Result<Vec<Wall<3>>> {
     let Some(velocity) = velocity else {
         return Ok(walls);

@@ -123,7 +123,7 @@ pub fn walls<const D: usize>(walls: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<W
 pub struct Usual {
     /// s.
     pub time_step: f64,
-    /// Of the contact problem's relative residual.
+    /// Tolerance of the contact problem's relative residual.
     pub tolerance: f64,
     /// Largest error of a velocity in the contact problem, m/s, under the usual gravity and by the
     /// tolerance.

@@ -52,7 +52,7 @@ use crate::terrain::{self, Terrain};
 pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
     pub words: SolverWords,
-    /// What it was made with, for pickling.
+    /// Constructor arguments, for pickling.
     given: ((GivenRules, Py<Simulation>), Py<PyDict>),
 }
 

@@ -18,7 +18,7 @@ use crate::shared::Release;
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 #[derive(Clone)]
 pub struct SolverReport {
-    /// One of "converged", "relaxed", "not_converged" and "budget_exhausted".
+    /// Outcome of the solve, "converged", "relaxed", "not_converged" or "budget_exhausted".
     ///
     /// "relaxed": the convex relaxation is solved, which differs from Coulomb's law.
     /// "budget_exhausted": the `budget` is spent, and the best solution found is returned.

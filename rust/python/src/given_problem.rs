@@ -44,7 +44,7 @@ impl Delassus {
         Ok(Self::Dense(dense.as_array().iter().copied().collect()))
     }
 
-    /// One of SciPy's sparse arrays, which is not changed.
+    /// Reads a sparse array of SciPy's, which is not changed.
     fn read_scipy(W: &Bound<'_, PyAny>, dimension: Dimension) -> Result<Self> {
         let d = dimension.components();
         let shape: Vec<usize> = W.getattr("shape")?.extract()?;

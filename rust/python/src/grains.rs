@@ -368,7 +368,7 @@ fn corner(given: &Named<'_>) -> Result<[f64; 3]> {
     ])
 }
 
-/// Its sides, m, without an upper end.
+/// Sides of the rectangle that balls are laid over, m, without an upper end.
 fn sides(given: &Named<'_>) -> Result<[f64; 3]> {
     Ok([
         given.need("width", number)?,

@@ -7,18 +7,18 @@ use std::ops::Range;
 
 use crate::errors::{Kind, Result, Value};
 
-/// One of the machines of a model, as parts of arrays.
+/// A machine of a model, with its slices of the model's arrays.
 #[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
 pub struct Machine {
-    /// Its name.
+    /// Name of the machine.
     name: String,
-    /// Names of its solids.
+    /// Names of the machine's solids.
     solids: Vec<String>,
-    /// Its part of coordinates and velocities, such as `Simulation.q`.
+    /// The machine's slice of coordinates and velocities, such as `Simulation.q`.
     coordinates: Py<PySlice>,
-    /// Its part of arrays with one entry a joint.
+    /// The machine's slice of arrays with one entry a joint.
     joints: Py<PySlice>,
-    /// Its part of arrays with one entry a wheel, such as `Simulation.wheel_forces`.
+    /// The machine's slice of arrays with one entry a wheel, such as `Simulation.wheel_forces`.
     wheels: Py<PySlice>,
 }
 

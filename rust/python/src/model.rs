@@ -285,7 +285,7 @@ impl RoverModel {
         Self::wrap(Model::joined(&name, machines, loops))
     }
 
-    /// Its machines by name; one, of the model's own name, unless several were joined.
+    /// Machines of the model by name; one, of the model's own name, unless several were joined.
     #[getter]
     fn machines<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         machines::by_name(py, &self.inner)
@@ -319,7 +319,7 @@ impl RoverModel {
         self.report.as_ref().map(|report| report.clone_ref(py))
     }
 
-    /// The same model with the report of its import.
+    /// Copy of the model with the report of its import.
     fn _with_import_report(&self, report: Py<PyAny>) -> Self {
         Self {
             inner: self.inner.clone(),

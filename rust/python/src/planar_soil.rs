@@ -20,7 +20,7 @@ use crate::planar_machines::two_wheel_rover;
 use crate::shared::{Open, Shared};
 use crate::stepping::AnySimulation;
 
-/// Of the steps of a soil: its velocities are right to ten times the tolerance, m/s.
+/// Usual step options of a soil: velocities are right to ten times the tolerance, m/s.
 const USUAL: Usual = Usual {
     time_step: 1e-3,
     tolerance: 1e-4,

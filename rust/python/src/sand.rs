@@ -17,7 +17,7 @@ use crate::shared::Release;
 struct Numbers<'py>(Bound<'py, PyMapping>);
 
 impl<'py> Numbers<'py> {
-    /// Of a mapping, or of an object whose attribute `numbers` is one.
+    /// Numbers from a mapping, or from an object whose attribute `numbers` is one.
     fn of(soil: &Bound<'py, PyAny>) -> PyResult<Self> {
         let numbers = match soil.getattr("numbers") {
             Ok(numbers) => numbers,

@@ -126,7 +126,7 @@ impl Simulation {
         self.inner.open()
     }
 
-    /// What it was made with and the core does not keep.
+    /// Origin of the simulation: what it was made with and the core does not keep.
     pub fn origin(&self) -> &Origin {
         &self.origin
     }

@@ -44,7 +44,7 @@ const SMOOTH: f64 = 1e-5;
 const NOTHING: f64 = 1e-3;
 
 impl ContactSlope {
-    /// Of a contact that is placed at the poses of `kinematics`.
+    /// Derivatives of a contact that is placed at the poses of `kinematics`.
     pub(crate) fn of(
         model: &Model,
         kinematics: &Kinematics,

@@ -160,7 +160,7 @@ struct Placed<'a> {
 }
 
 impl Placed<'_> {
-    /// Its contact at a point of the ground.
+    /// Contact of the part with the ground at a point of a primitive.
     #[inline]
     fn contact(&self, point: &SurfacePoint, primitive: u32) -> Contact {
         Contact {
@@ -190,8 +190,8 @@ impl<S: BodyMotion> Gate<'_, S> {
         }
     }
 
-    /// Of the contacts from the `first` on, those of one part, leaves out the ones with a surface
-    /// that do not lead out of it.
+    /// Removes contacts with a surface that do not lead out of it, among those of one part: the
+    /// contacts from `first` on.
     #[cold]
     fn keep_ways_out(&mut self, first: usize, part: &OverSurfaces<'_>) {
         let Self { ways, out, .. } = self;
@@ -322,8 +322,8 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
     }
 }
 
-/// Of the contacts from the `first` on, leaves out those that an earlier one equals, as where parts
-/// of the ground coincide: at the same point and gap, within a distance (m).
+/// Removes contacts that equal an earlier one, among those from `first` on, as where parts of the
+/// ground coincide: at the same point and gap, within a distance (m).
 #[cold]
 fn drop_copies(contacts: &mut Vec<Contact>, first: usize, within: f64) {
     let mut kept = first;
@@ -498,7 +498,8 @@ fn touch<S: BodyMotion>(
     }
 }
 
-/// The same for a disc, which moves by `half_way` (m) in half a step and keeps its midpoint axes
+/// Normal from a sphere of the ground to a disc at their first contact in a step, if the disc
+/// passes the sphere. The disc moves by `half_way` (m) in half a step and keeps its midpoint axes
 /// throughout.
 pub(crate) fn touch_of_disc(
     disc: &Disc,
@@ -518,7 +519,8 @@ pub(crate) fn touch_of_disc(
     first_touch(distance, &middle, &(middle - half_way), ground.radius)
 }
 
-/// The same for a wheel with a width.
+/// Normal from a sphere of the ground to a wheel with a width at their first contact in a step, if
+/// the wheel passes the sphere; `half_way` as for [`touch_of_disc`].
 pub(crate) fn touch_of_roller(
     roller: &Roller,
     ground: &Sphere,
@@ -587,7 +589,8 @@ pub fn disc_gap(disc: &Disc, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 
     wheel_gap(&PlacedShape::Disc(*disc), base, terrain)
 }
 
-/// The same of a wheel's shape, with a width or without.
+/// Gap between a wheel's shape, with or without a width, and a terrain, m, as [`wheel_contact`]
+/// finds it; `base` as for [`disc_gap`].
 #[must_use]
 pub fn wheel_gap(shape: &PlacedShape<'_>, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
     // Only a surface, and no sphere or plane that may be nearer.

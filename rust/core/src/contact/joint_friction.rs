@@ -45,7 +45,8 @@ pub(crate) fn joint_of(contact: &Contact) -> Option<usize> {
     }
 }
 
-/// Its point is the origin of the body that the joint carries, its normal the joint's axis.
+/// Dry friction of a joint as a contact: its point is the origin of the body that the joint
+/// carries, its normal the joint's axis.
 fn contact(model: &Model, kinematics: &Kinematics, joint: usize) -> Contact {
     let body = model.joints()[joint].body;
     let motion = &kinematics.motions()[model.bodies()[body].motion];

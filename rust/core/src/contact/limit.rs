@@ -76,7 +76,8 @@ pub fn detect_limits(
     }
 }
 
-/// The same stop in another configuration.
+/// Updates point, frame and gap of a joint's stop to another configuration. `joints`: coordinates
+/// of all joints (n_joints) at the poses of `kinematics`, rad or m.
 pub fn relocate_limit(model: &Model, kinematics: &Kinematics, joints: &[f64], stop: &mut Contact) {
     if let Part::Limit(joint, side) = stop.part {
         let gap = gap(model, joints, joint, side);

@@ -15,7 +15,7 @@ use crate::geometry::Terrain;
 use crate::law::materials::Materials;
 use crate::multibody::Model;
 
-/// The other side of a contact, by index.
+/// Opposite side of a contact, by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Opposite {
     /// A primitive of the ground.
@@ -39,7 +39,7 @@ pub struct ContactKey {
     /// Between bodies, the feature of [`crate::geometry::query::PairPoint`]. For a joint, 0 is the
     /// lower stop, 1 the upper and 2 its friction.
     pub feature: u32,
-    /// The other side.
+    /// Opposite side of the contact.
     pub opposite: Opposite,
 }
 
@@ -79,7 +79,7 @@ impl ContactKey {
         }
     }
 
-    /// The same on a surface.
+    /// Key with its feature marked as one on a surface, by [`ON_SURFACE`].
     #[inline]
     #[must_use]
     pub fn on_surface(self) -> Self {
@@ -133,10 +133,10 @@ fn narrow(feature: usize) -> u32 {
     u32::try_from(feature).unwrap_or_else(|_| panic!("invariant: feature {feature} fits 32 bits"))
 }
 
-/// The other body of a contact.
+/// Second body of a contact between two bodies, and its part in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OtherSide {
-    /// Its part in contact.
+    /// Part of the second body that is in contact.
     pub part: Part,
     /// Body that carries it.
     pub body: usize,
@@ -145,13 +145,13 @@ pub struct OtherSide {
 /// A possible contact point of a body with the ground or another body, or a joint's stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// Its identity from step to step.
+    /// Identity of the contact from step to step.
     pub key: ContactKey,
     /// The part in contact.
     pub part: Part,
     /// Body that carries the part.
     pub body: usize,
-    /// The other body of a model; `None` for the ground, a grain or a joint's stop.
+    /// Second body of the model in contact; `None` for the ground, a grain or a joint's stop.
     pub other: Option<OtherSide>,
     /// Contact point relative to the origin of the body's tree, world axes, m: on the ground the
     /// body's own point, between bodies the midpoint.

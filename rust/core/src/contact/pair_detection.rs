@@ -67,7 +67,7 @@ pub fn detect_pairs(
     detect_pairs_of(model, &machine, activation, search, out);
 }
 
-/// The same by the motion of a machine's bodies.
+/// Adds the contacts between bodies to `out`, with poses and velocities from `motion`.
 pub(crate) fn detect_pairs_of(
     model: &Model,
     motion: &impl BodyMotion,

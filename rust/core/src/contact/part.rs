@@ -174,7 +174,7 @@ impl Part {
         }
     }
 
-    /// Its shape at the poses of `kinematics`, relative to the origin of its body's tree.
+    /// Shape of the part at the poses of `kinematics`, relative to the origin of its body's tree.
     #[inline]
     #[must_use]
     pub fn place<'a>(self, model: &'a Model, kinematics: &Kinematics) -> PlacedShape<'a> {
@@ -182,7 +182,7 @@ impl Part {
         self.place_at(model, (&kinematics.R(body), &kinematics.r(body)))
     }
 
-    /// The same where its body has an attitude and an origin, m.
+    /// Shape of the part, given the attitude and the origin (m) of its body.
     #[inline]
     #[must_use]
     pub fn place_at<'a>(
@@ -198,7 +198,8 @@ impl Part {
         }
     }
 
-    /// The same for what is no wheel, kept separate so that the short code for wheels is inlined.
+    /// Shape of a part other than a wheel, given the attitude and the origin (m) of its body. Kept
+    /// separate so that the short code for wheels is inlined.
     fn place_solid<'a>(
         self,
         model: &'a Model,

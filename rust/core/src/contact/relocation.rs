@@ -29,7 +29,7 @@ pub fn relocate(
     relocate_to(model, &machine, terrain, contact);
 }
 
-/// The same by the motion of a machine's bodies.
+/// Updates point, frame and gap of a contact to the poses of `motion`, as [`relocate`].
 #[inline]
 pub(crate) fn relocate_to(
     model: &Model,

@@ -68,7 +68,7 @@ pub(crate) struct Path<'a> {
 }
 
 impl<'a> Path<'a> {
-    /// That of a body.
+    /// Path of a contact on a body.
     #[inline(always)]
     pub(crate) fn of(mechanism: &'a Mechanism, body: usize) -> Self {
         Self {
@@ -140,8 +140,9 @@ impl<'a> Path<'a> {
         u
     }
 
-    /// The same for the last joint of the path, of which only one row is not zero, n, t or b: the
-    /// `sign` at the joint's velocity.
+    /// Writes the rows of Hᵀ for a stop or the dry friction of the path's last joint, and returns
+    /// `Hᵀ v`. The only entry that is not zero is `sign`, at the joint's velocity along n, t or b
+    /// (`which`: 0, 1 or 2).
     #[inline(always)]
     pub(crate) fn write_joint<T: Lane>(
         &self,

@@ -35,7 +35,7 @@ pub(crate) const TOUCH: f64 = 2e-9;
 /// the part overlaps beside the first point is left behind too.
 const OUT: [f64; 2] = [1.001, 3.0];
 
-/// The same beyond that, m, for rounding.
+/// Distance by which a part is moved out beyond the depths in [`OUT`], m, to allow for rounding.
 const ROUNDING: f64 = 1e-8;
 
 /// Fraction of an overlap by which a part is raised to see whether the point is then out of the

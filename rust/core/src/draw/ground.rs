@@ -13,7 +13,7 @@ use crate::geometry::{
 pub enum GroundDistribution {
     /// A plane with the slope of the start.
     Tilted,
-    /// The same ground in every episode.
+    /// A given ground for all episodes.
     Given(DrawnGround),
     /// Hills, whose slope follows from the difficulty of the rocks.
     Hills(HillDistribution),
@@ -64,7 +64,7 @@ impl DrawnGround {
         })
     }
 
-    /// As a simulation takes it.
+    /// Ground as a simulation takes it.
     #[must_use]
     pub fn terrain(&self) -> Arc<dyn Terrain> {
         match self {

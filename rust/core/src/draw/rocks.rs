@@ -33,11 +33,11 @@ const CLEARANCE: f64 = 0.1;
 /// What the rocks are drawn from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RockDistribution {
-    /// Of the difficulty.
+    /// Range of the difficulty.
     pub difficulty: Range,
-    /// Overrides that of the difficulty.
+    /// Abundance of rocks in place of the difficulty's.
     pub abundance: Option<f64>,
-    /// Overrides that of the difficulty; in wheel radii.
+    /// Largest radius of a rock in place of the difficulty's, in wheel radii.
     pub max_radius: Option<f64>,
 }
 
@@ -50,7 +50,7 @@ pub struct RockDraw {
     pub abundance: f64,
     /// Radius of the largest rocks, in wheel radii.
     pub max_radius: f64,
-    /// Of the sizes and places, below 2⁶³.
+    /// Seed of the sizes and places, below 2⁶³.
     pub seed: u64,
 }
 
@@ -123,7 +123,8 @@ impl RockDraw {
         })
     }
 
-    /// The same on a ground of any shape, which is not part of the field; None if there is no rock.
+    /// The rocks as in [`Self::lay_out`], on a ground of any shape, which is not part of the field;
+    /// None if there is no rock.
     ///
     /// # Errors
     /// As [`SphereField::rocks_on`].

@@ -42,7 +42,7 @@ pub struct SandDraw {
     pub soil: Arc<SoftGround>,
     /// Amplitude of the longer waves, m.
     pub amplitude: f64,
-    /// Of the waves.
+    /// Seed of the waves.
     pub seed: u64,
 }
 

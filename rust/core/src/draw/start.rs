@@ -214,7 +214,8 @@ fn with_more_wheels_down(
     Ok(more.then_some(lowered))
 }
 
-/// As [`resting_pose`], with all joints at zero.
+/// Public coordinates (nv) as for [`resting_pose`], with all joints at zero even if wheels stay in
+/// the air.
 fn upright_on(
     model: &Model,
     plane: &Plane,

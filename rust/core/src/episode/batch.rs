@@ -328,9 +328,9 @@ impl EpisodeBatch {
         self.take_period(actions, active, has_scan, observations, None, go_on)
     }
 
-    /// The same, one rover after the other, whose steps a function takes: rovers that move
-    /// together with something else. It is given the index of the rover, the rover, and how many
-    /// steps to take.
+    /// Gives every rover its action as [`Self::step_while`] does, one rover after the other, and
+    /// lets a function take the steps: for rovers that move together with something else. `step` is
+    /// given the index of the rover, the rover, and how many steps to take.
     ///
     /// # Errors
     /// As [`Self::step_while`].

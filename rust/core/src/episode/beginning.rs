@@ -14,7 +14,7 @@ use crate::draw::{Drawn, DrawnScene, Order, Pcg64, SceneDistribution, draw_many}
 /// What the episodes of a task are drawn from.
 #[derive(Clone, Debug)]
 pub struct EpisodeDistribution {
-    /// Of their scenes.
+    /// Distribution of the scenes.
     pub scenes: SceneDistribution,
     /// What they share.
     pub rules: Arc<Rules>,

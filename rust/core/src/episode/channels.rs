@@ -80,7 +80,7 @@ impl Scale {
 /// A field of an observation.
 #[derive(Debug)]
 pub struct Channel {
-    /// Its name.
+    /// Name of the field.
     pub name: &'static str,
     /// Unit before scaling.
     pub unit: &'static str,
@@ -164,9 +164,9 @@ pub const CHANNELS: &[Channel] = channels! {
 /// A field of the observations of a task.
 #[derive(Debug)]
 pub struct Field {
-    /// What it is.
+    /// Channel of the field: name, unit and meaning.
     pub channel: &'static Channel,
-    /// Its entries.
+    /// Entries of the observation that belong to the field.
     pub entries: Range<usize>,
     /// By what each is divided.
     pub scale: Vec<f64>,

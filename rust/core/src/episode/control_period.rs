@@ -13,7 +13,7 @@ pub(super) struct Slot {
     pub(super) origin: Origin,
     /// Control periods since the episode began.
     pub(super) steps: u64,
-    /// Where its noise comes from.
+    /// Generator of the observation noise.
     pub(super) generator: Pcg64,
     /// Message of the physics step that failed before the episode was resumed.
     pub(super) message: Option<String>,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Why an episode has ended, in the order of the codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ending {
-    /// It has not.
+    /// The episode has not ended.
     #[default]
     None,
     /// The trunk's origin is within the tolerance of the last goal.
@@ -37,7 +37,7 @@ impl Ending {
         Self::LeftField,
     ];
 
-    /// Its name; empty while the episode runs.
+    /// Name of the ending; empty while the episode runs.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -58,13 +58,13 @@ impl Ending {
         self != Self::None
     }
 
-    /// Whether it has ended at the goal, or free.
+    /// Whether the episode has ended at the goal, or with the rover free.
     #[must_use]
     pub fn is_success(self) -> bool {
         matches!(self, Self::Goal | Self::Free)
     }
 
-    /// Whether it has ended in any other way.
+    /// Whether the episode has ended without success.
     #[must_use]
     pub fn is_failure(self) -> bool {
         self.is_end() && !self.is_success()

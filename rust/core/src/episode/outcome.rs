@@ -12,7 +12,7 @@ pub struct Outcome {
     pub now: Quantities,
     /// Work of the motors since the episode began, J.
     pub energy: f64,
-    /// Its driving part, J.
+    /// Driving part of the motors' work since the episode began, J.
     pub energy_positive: f64,
     /// Terms of the reward, in the order of [`super::TERMS`].
     pub terms: [f64; N_TERMS],

@@ -16,7 +16,7 @@ pub struct Progress {
     pub previous_action: Vec<f64>,
     /// Work of the motors since the beginning, driving or braking, J.
     pub energy: f64,
-    /// Its driving part, J.
+    /// Driving part of the motors' work since the beginning, J.
     pub energy_positive: f64,
     /// How long the rover has been high-centred, s.
     pub stuck_time: f64,

@@ -21,15 +21,15 @@ pub struct Quantities {
     pub slip_ratio: f64,
     /// Work of the motors in the period, driving or braking, J.
     pub work: f64,
-    /// Its driving part, J.
+    /// Driving part of the motors' work in the period, J.
     pub positive_work: f64,
     /// s.
     pub time: f64,
     /// 1 if the contact solver did not converge in one of the steps, else 0.
     pub not_converged: f64,
-    /// Its iterations, all steps together.
+    /// Iterations of the contact solver, all steps together.
     pub iterations: f64,
-    /// Its largest residual.
+    /// Largest residual of the contact solver.
     pub residual: f64,
     /// Most contacts in a step.
     pub n_contacts: f64,
@@ -67,7 +67,7 @@ impl Quantities {
         }
     }
 
-    /// As a list, in the order of the fields.
+    /// Quantities as a list, in the order of the fields.
     #[must_use]
     pub fn row(&self) -> [f64; N_QUANTITIES] {
         [

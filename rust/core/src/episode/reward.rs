@@ -63,7 +63,7 @@ pub struct PeriodReward<'a> {
     pub changes: [f64; 2],
     /// Entries of an action that are summed, in the same order.
     pub entries: [usize; 2],
-    /// Its length, s.
+    /// Length of the control period, s.
     pub dt: f64,
     /// How it ended.
     pub ending: Ending,

@@ -97,14 +97,14 @@ impl Settings {
     }
 }
 
-/// ReadingIndices of what an episode needs in a reading without heights.
+/// Indices of what an episode needs in a reading without heights.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReadingIndices {
     /// Leading entries that an observation shares with it.
     pub shared: usize,
-    /// Those of [`super::Quantities`], in order.
+    /// Indices of the [`super::Quantities`] in the reading, in order.
     pub scalars: Range<usize>,
-    /// Its size.
+    /// Size of the reading.
     pub size: usize,
 }
 

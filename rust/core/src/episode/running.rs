@@ -19,7 +19,7 @@ use crate::simulation::{CommandError, ReadingScratch, RoverSimulation, seen_from
 /// A control period seen from its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Period<'a> {
-    /// Its action (n_actions).
+    /// Action of the period (n_actions).
     pub action: &'a [f64],
     /// Heights of the scan; None where it was not taken.
     pub heights: Option<&'a [f64]>,
@@ -34,7 +34,7 @@ pub struct Period<'a> {
 pub struct EpisodeState {
     /// What was drawn for it.
     pub setting: Setting,
-    /// Its progress.
+    /// Progress of the episode.
     pub progress: Progress,
     /// The last observation (size).
     pub observation: Vec<f32>,
@@ -99,7 +99,7 @@ impl Episode {
         }))
     }
 
-    /// What it needs to go on.
+    /// State from which [`Self::resume`] continues the episode.
     #[must_use]
     pub fn state(&self) -> EpisodeState {
         EpisodeState {
@@ -189,7 +189,7 @@ impl Episode {
         self.progress.distance + self.setting.way_from(self.progress.reached)
     }
 
-    /// Its progress.
+    /// Progress of the episode.
     #[must_use]
     pub fn progress(&self) -> &Progress {
         &self.progress

@@ -51,7 +51,8 @@ fn norm(x: &[f64]) -> f64 {
 }
 
 impl HeldLaw {
-    /// Of the solution p, u (d n_c) for friction μ (n_c) and the weights W_NN (n_c).
+    /// Finds the modes of the solution p, u (d n_c) for friction μ (n_c) and the weights W_NN
+    /// (n_c).
     pub(crate) fn new(p: Vec<f64>, u: Vec<f64>, mu: Vec<f64>, weight: Vec<f64>) -> Self {
         let d = p.len().checked_div(mu.len()).unwrap_or(1);
         let pushes = (0..mu.len()).map(|i| weight[i] * norm(&p[d * i..d * (i + 1)]));

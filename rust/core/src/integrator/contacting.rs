@@ -13,7 +13,7 @@ pub trait UnilateralContact {
     /// Identifies a contact from one step to the next.
     type Key: Copy + Ord;
 
-    /// Its key, unique within a step.
+    /// Key of the contact, unique within a step.
     fn key(&self) -> Self::Key;
 
     /// Signed distance where the contact was last measured, m, positive when apart.

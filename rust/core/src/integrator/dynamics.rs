@@ -25,7 +25,7 @@ pub struct MechanicalEnergy {
 }
 
 impl MechanicalEnergy {
-    /// Those of two clusters together.
+    /// Energy and momentum of two clusters together.
     pub(crate) fn with(self, other: Self) -> Self {
         let is_held = self.is_held || other.is_held;
         let momentum = self.momentum + other.momentum;

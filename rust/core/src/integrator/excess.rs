@@ -76,7 +76,8 @@ impl<T: Lane> Excess<T> {
         self.measured(is_free).le(allowed)
     }
 
-    /// Where it is coarse, or an excess remains at v⁺ = 0. What is not finite is coarse.
+    /// Where the excess is coarse, or some remains at v⁺ = 0. An excess that is not finite is
+    /// coarse.
     #[inline(always)]
     pub(crate) fn is_coarse(&self, is_free: T::Mask, gain: T) -> T::Mask {
         let coarse = self.size.like(COARSE) * self.size;
@@ -95,7 +96,7 @@ impl<T: Lane> Excess<T> {
         self.value.like(0.0).lt(self.value)
     }
 
-    /// As a fraction of the kinetic energy.
+    /// Excess beyond rounding, as a fraction of the kinetic energy.
     #[inline(always)]
     pub(crate) fn relative(&self) -> T {
         let (zero, tiny) = (self.value.like(0.0), self.value.like(f64::MIN_POSITIVE));

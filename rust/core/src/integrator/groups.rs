@@ -15,11 +15,11 @@ use super::warm_start::WarmStart;
 /// The groups of a step. A group has the number of its first cluster.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Groups {
-    /// Of each cluster, its group.
+    /// Group of each cluster.
     of_cluster: Vec<usize>,
-    /// Of each contact, its group.
+    /// Group of each contact; empty if the system is one cluster.
     of_contact: Vec<usize>,
-    /// Of each group, by its number, what is known of it.
+    /// Data of each group, by its number.
     own: Vec<Group>,
 }
 
@@ -36,15 +36,15 @@ pub(super) struct Group {
     /// Whether they persisted, besides, so that the impulses of the last step are those of this one
     /// up to O(h).
     pub persists: bool,
-    /// Whether its gyroscopic terms are implicit.
+    /// Whether the group's gyroscopic terms are implicit.
     pub is_gyroscopic: bool,
     /// Whether the audit asks for another step.
     pub is_coarse: bool,
-    /// Whether its contacts were solved.
+    /// Whether the solver converged for the group's contacts.
     pub is_solved: bool,
     /// Whether an impact without elastic answer was taken as inelastic.
     pub is_inelastic: bool,
-    /// Whether its positions were projected.
+    /// Whether the group's positions were projected.
     pub is_moved: bool,
     /// Penetration that is tolerated, m: the least of its clusters.
     pub tolerated: f64,

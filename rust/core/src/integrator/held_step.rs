@@ -24,7 +24,7 @@ use crate::problem::Operator;
 /// A step of contacts `C` with its modes.
 #[derive(Clone, Debug)]
 pub(crate) struct HeldStep<C> {
-    /// Where the step evaluated them.
+    /// Contacts where the step evaluated them.
     pub contacts: Vec<C>,
     pub law: HeldLaw,
     pub answer: Answer,
@@ -44,7 +44,7 @@ pub(crate) struct Projection {
     pub answer: Answer,
     /// Whether each contact's gap counts as it is, or as 0 since it is separating (n_c).
     pub counts: Vec<bool>,
-    /// Whether its group was moved (n_c).
+    /// Whether the group of each contact was moved (n_c).
     pub moved: Vec<bool>,
 }
 
@@ -52,9 +52,10 @@ pub(crate) struct Projection {
 pub(crate) const SAME: f64 = 1e-7;
 
 impl<C: Clone + UnilateralContact> HeldStep<C> {
-    /// Of the step that was just taken with the scratch `ws`, without memory, by a system that
-    /// still holds its matrices. `is_common`: contacts with the common coefficient of friction.
-    /// None if the step was not solved, or not projected by the law.
+    /// Takes contacts, modes and matrices from the step that was just taken with the scratch `ws`,
+    /// without memory, by a system that still holds its matrices. `is_common`: contacts with the
+    /// common coefficient of friction. None if the step was not solved, or not projected by the
+    /// law.
     pub(crate) fn of<S: MechanicalSystem<Contact = C>>(
         system: &S,
         options: &StepOptions,

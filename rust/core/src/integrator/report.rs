@@ -5,7 +5,7 @@ use crate::solver::{SolveReport, SolveStatus};
 /// Whether the equations of the step were solved to their tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StepStatus {
-    /// They were.
+    /// The equations were solved to their tolerance.
     #[default]
     Converged,
     /// The contact solver or Newton's iteration stopped above its tolerance, a loop stayed open, or
@@ -30,7 +30,7 @@ pub struct StepReport {
     pub iterations: usize,
     /// Matrices that the contact solver factored, all steps together.
     pub factorisations: usize,
-    /// Its iterations that pivoted, all steps together.
+    /// Iterations of the contact solver that pivoted, all steps together.
     pub pivots: usize,
     /// Newton iterations on the forces, all steps together (0 in the linearised variant).
     pub newton_iterations: usize,

@@ -60,7 +60,7 @@ pub struct Scratch<Q, C> {
     pub(super) audited: Audited<Q>,
     /// Groups of touching clusters.
     pub(super) groups: Groups,
-    /// Of each cluster, whether the gyroscopic terms of the step are implicit.
+    /// Whether the gyroscopic terms of the step are implicit, for each cluster.
     pub(super) gyroscopic: Vec<bool>,
     /// Energies of the clusters before and after the step, the work of their own forces, and what
     /// their springs store before and after it, J.
@@ -133,7 +133,7 @@ pub type ScratchOf<S> = Scratch<<S as Dynamics>::Configuration, <S as Contacting
 pub(super) struct Audited<Q> {
     pub(super) configuration: Q,
     pub(super) v: Vec<f64>,
-    /// Of each cluster; empty if it is not known.
+    /// Energy and momentum of each cluster; empty if they are not known.
     pub(super) energies: Vec<MechanicalEnergy>,
 }
 

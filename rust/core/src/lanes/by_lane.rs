@@ -153,13 +153,13 @@ impl ByLane {
         })
     }
 
-    /// The same with their lanes.
+    /// Contacts of a slot that were found lane by lane, with their lanes.
     #[inline(always)]
     pub(super) fn contacts(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
         (self.found(slot)).map(|found| (found.lane, &found.contact))
     }
 
-    /// Those whose path is not the slot's.
+    /// Contacts found lane by lane whose path is not that of their slot, with their lanes.
     #[inline(always)]
     pub(super) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
         (self.found(slot).filter(|found| found.is_guest)).map(|found| (found.lane, &found.contact))

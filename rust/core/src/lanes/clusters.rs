@@ -21,7 +21,7 @@ const _: () = assert!(
 /// The clusters of a machine.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Clusters {
-    /// Of each tree, its cluster.
+    /// Cluster of each tree.
     of_tree: Vec<usize>,
     /// Velocities of each cluster, ascending; those of a free root come first.
     velocities: Vec<Vec<usize>>,
@@ -54,7 +54,7 @@ impl LazyPattern {
 pub(super) struct WidePatterns(Vec<(usize, LazyPattern)>);
 
 impl WidePatterns {
-    /// That of clusters that have `nv` velocities together.
+    /// Pattern with all entries for clusters that have `nv` velocities together.
     pub(super) fn of(&self, nv: usize) -> &Arc<Pattern> {
         let Some((_, own)) = self.0.iter().find(|(size, _)| *size == nv) else {
             unreachable!("invariant: all sums of clusters are listed")
@@ -64,7 +64,7 @@ impl WidePatterns {
 }
 
 impl Clusters {
-    /// Those of a mechanism.
+    /// Clusters of a mechanism with closed `loops`.
     pub(super) fn of(mechanism: &Mechanism, loops: &[Loop]) -> Self {
         let of_tree: Vec<usize> = mechanism.trees.iter().map(|tree| tree.cluster).collect();
         let n = mechanism.n_clusters();
@@ -92,27 +92,27 @@ impl Clusters {
         }
     }
 
-    /// Their number.
+    /// Number of clusters.
     pub(super) fn n(&self) -> usize {
         self.velocities.len()
     }
 
-    /// That of a tree.
+    /// Cluster of a tree: the index of the contact problem that its contacts belong to.
     pub(super) fn of_tree(&self, tree: usize) -> usize {
         self.of_tree[tree]
     }
 
-    /// Number of trees of one.
+    /// Number of trees of a cluster.
     pub(super) fn n_trees(&self, cluster: usize) -> usize {
         self.of_tree.iter().filter(|own| **own == cluster).count()
     }
 
-    /// Number of velocities of one.
+    /// Number of velocities of a cluster.
     pub(super) fn nv(&self, cluster: usize) -> usize {
         self.velocities[cluster].len()
     }
 
-    /// Of each of `nv` velocities, its cluster and its place among the cluster's velocities.
+    /// Cluster of each of `nv` velocities, and its place among the cluster's velocities.
     pub(super) fn places(&self, nv: usize) -> Vec<[usize; 2]> {
         let mut places = vec![[0; 2]; nv];
         for (cluster, own) in self.velocities.iter().enumerate() {

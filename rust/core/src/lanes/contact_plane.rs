@@ -31,9 +31,9 @@ pub struct ContactPlane<T> {
     pub offset: T,
     /// Place of the wheel's centre at the last search, world, m.
     from: [Vector3<f64>; MAX_LANES],
-    /// Its result holds as far from there as this, m.
+    /// Distance beyond the wheel's bounding ball about `from` up to which the last search holds, m.
     within: [f64; MAX_LANES],
-    /// Lanes where it found a plane.
+    /// Lanes where the last search found a plane.
     flat: u32,
     /// A place with ground that is not flat as near as this, m.
     rough_from: [Vector3<f64>; MAX_LANES],

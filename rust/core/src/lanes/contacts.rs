@@ -48,7 +48,7 @@ const NO_DIRECTION: f64 = 1e-12;
 /// A contact, of the same wheel or stop in every lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Slot<T: Lane> {
-    /// Where it is a contact. Elsewhere the other fields mean nothing.
+    /// Lanes where the slot holds a contact. Elsewhere the other fields mean nothing.
     pub active: T::Mask,
     /// Point of the wheel relative to the origin of its tree, m.
     pub point: Vec3<T>,
@@ -86,9 +86,9 @@ impl<T: Lane> Slot<T> {
 pub(super) struct Stand<T: Lane> {
     /// m.
     pub gap: T,
-    /// Where it is a contact.
+    /// Lanes where the circle is a contact.
     pub admitted: T::Mask,
-    /// Where it lies so flat that more than one point may touch.
+    /// Lanes where the circle lies so flat that more than one point may touch.
     pub lies: T::Mask,
 }
 
@@ -119,7 +119,7 @@ pub struct Contacts<T: Lane> {
     pub(super) parts: Parts,
     pub(super) by_lane: ByLane,
     pub(super) stops: Vec<Stop>,
-    /// Of each stop, 1 where the joint is at its lower end, −1 at its upper one, 0 at none.
+    /// End at which the joint of each stop is: 1 the lower, −1 the upper, 0 none.
     pub(super) ends: Vec<T>,
     /// Joints with dry friction.
     pub(super) rubbing: Vec<usize>,
@@ -135,19 +135,19 @@ pub struct Contacts<T: Lane> {
     cluster_of_body: Vec<usize>,
     cluster_of: Vec<Option<usize>>,
     pub(super) used: Vec<usize>,
-    /// How many of them are not of joints.
+    /// Number of slots in use that are not of joints.
     n_of_shapes: usize,
-    /// Of each cluster.
+    /// Contact data of each cluster.
     clusters: Vec<InCluster>,
     /// Lanes with a problem that has factors.
     factored: u32,
     /// Lanes in which clusters touch each other.
     joined: u32,
-    /// Of each problem, at `cluster * T::LANES + lane`.
+    /// Contacts of each problem, at `cluster * T::LANES + lane`.
     lists: Vec<Listed>,
     /// Whether every slot in use is active in all lanes.
     is_full: bool,
-    /// Of each slot in each lane, the problem that its contact is in, and its place there.
+    /// Problem of each slot's contact in each lane, and the contact's place in that problem.
     homes: Vec<[u16; MAX_LANES]>,
     places: Vec<[u8; MAX_LANES]>,
     /// Lanes in which each slot's contact is in a problem with factors.
@@ -172,7 +172,7 @@ struct InCluster {
     touches: u32,
     /// Lanes whose list has a problem with factors.
     factored: u32,
-    /// Its slots in use by the other lanes.
+    /// Slots of the cluster in use in lanes whose problem has the whole operator.
     dense: Vec<usize>,
 }
 
@@ -184,13 +184,13 @@ pub struct Sight<'a, T: Lane> {
     pub models: &'a [Option<Arc<Model>>],
     /// Lanes of the step.
     pub going: u32,
-    /// Poses at the midpoint of the step, where gaps are measured, and at its predicted end.
+    /// Poses at the midpoint of the step, where gaps are measured.
     pub middle: &'a Poses<T>,
-    /// See above.
+    /// Poses at the predicted end of the step.
     pub end: &'a Poses<T>,
     /// Velocity (nv) before the step.
     pub v: &'a [T],
-    /// Whether it matters which piece of a surface a wheel touches.
+    /// Whether the piece of a surface that a wheel touches matters, since materials may differ.
     pub needs_pieces: bool,
     /// Which candidates are contacts.
     pub forecast: &'a Forecast<T>,
@@ -291,19 +291,19 @@ impl<T: Lane> Contacts<T> {
         &self.used
     }
 
-    /// Those that are not of joints.
+    /// Slots in use that are not of joints, ascending.
     #[inline(always)]
     pub(super) fn used_by_shapes(&self) -> &[usize] {
         &self.used[..self.n_of_shapes]
     }
 
-    /// Those of the joints, which follow.
+    /// Slots of joints in use, ascending; they follow all others.
     #[inline(always)]
     pub(super) fn used_by_joints(&self) -> &[usize] {
         &self.used[self.n_of_shapes..]
     }
 
-    /// Those of a cluster in use in a lane whose problem has the whole operator.
+    /// Slots of a cluster in use in any lane whose problem has the whole operator.
     #[inline(always)]
     pub(super) fn used_densely(&self, cluster: usize) -> &[usize] {
         if self.factored == 0 && self.clusters.len() == 1 {
@@ -319,7 +319,7 @@ impl<T: Lane> Contacts<T> {
         self.factored
     }
 
-    /// Lanes in which a slot's contact is in such a problem.
+    /// Lanes in which a slot's contact is in a problem that has the factors of its operator.
     #[inline(always)]
     pub(super) fn near(&self, slot: usize) -> u32 {
         if self.factored == 0 {
@@ -329,7 +329,7 @@ impl<T: Lane> Contacts<T> {
         }
     }
 
-    /// Slots that have one.
+    /// Slots in use with a contact in a problem that has the factors of its operator.
     #[inline(always)]
     pub(super) fn used_nearby(&self) -> impl Iterator<Item = usize> {
         let used = self.used.iter().copied();
@@ -961,7 +961,9 @@ impl<T: Lane> Contacts<T> {
         fallbacks
     }
 
-    /// The same for a wheel with a width.
+    /// Adds the contacts with spheres, at the midpoint, of a wheel that has a width, with the axle
+    /// `s` and the centre `centre` there. `half_way`: motion of the centre to the end of the step,
+    /// m. Returns where contacts must be found lane by lane.
     #[inline(always)]
     fn look_with_tread(
         &mut self,
@@ -1128,7 +1130,8 @@ impl<T: Lane> Contacts<T> {
         undefined
     }
 
-    /// The same for a wheel with a width; `place`: which of its slots it is.
+    /// Evaluates a slot of a wheel with a width at the end of the step, with the arguments and the
+    /// result of [`Self::relocate`]. `place`: number of the slot among the wheel's.
     #[inline(always)]
     fn relocate_wide(
         &mut self,

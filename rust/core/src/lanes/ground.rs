@@ -29,7 +29,7 @@ const AHEAD: [f64; 3] = [0.1, 0.02, 0.0];
 const AHEAD_OF_BOX: f64 = 0.5;
 const KEPT_BY_BOX: f64 = 0.15;
 
-/// The same where a plane between a box and a surface is not level, m.
+/// How far around a box a search looks where the plane between box and surface is not level, m.
 const AHEAD_TILTED: f64 = 0.1;
 
 /// Covers the rounding of distances, m, for coordinates up to the size of a terrain.
@@ -48,7 +48,7 @@ pub struct GroundSphere<T> {
     pub centre: Vec3<T>,
     /// m; −∞ for a rover that has no such sphere.
     pub radius: T,
-    /// Its number in the terrain.
+    /// Number of the sphere in the terrain.
     pub number: T,
 }
 
@@ -107,14 +107,15 @@ pub struct Ground<T: Lane> {
     pub(super) offset: T,
     /// Terrain of each lane, once it has one.
     terrains: Vec<Option<Arc<dyn Terrain>>>,
-    /// Those that may have more than a plane.
+    /// Terrains of the lanes whose ground may be more than a plane.
     fields: Vec<Option<Arc<dyn Terrain>>>,
     has_spheres: bool,
-    /// Those with a surface.
+    /// Terrains of the lanes whose ground has a surface.
     surfaces: Vec<Option<Arc<dyn Terrain>>>,
     has_surfaces: bool,
-    /// Those of them that are firm, and rovers on soft ground, whose wheels meet spheres alone.
+    /// Terrains of the lanes whose ground has a surface and is firm.
     under_wheels: Vec<Option<Arc<dyn Terrain>>>,
+    /// Rovers on soft ground, whose wheels meet spheres alone.
     soft: T::Mask,
     /// Rovers on a surface and a plane.
     mixed: T::Mask,

@@ -15,9 +15,9 @@ use crate::scalar::{Lane, LaneMask};
 /// What a joint's slot is for.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum JointRow<T> {
-    /// Its stops, and at which end each lane's joint is: 1 at the lower, −1 at the upper.
+    /// Stops of the joint, and the end that is active in each lane: 1 the lower, −1 the upper.
     Stop(T),
-    /// Its dry friction.
+    /// Dry friction of the joint.
     Friction,
 }
 

@@ -10,13 +10,13 @@ use crate::system::Command;
 
 /// A rover by its parts.
 pub struct LaneRover<'a> {
-    /// Its model, whose machine is the block's.
+    /// Model of the rover, whose machine is the block's.
     pub model: &'a Arc<Model>,
-    /// Its ground.
+    /// Ground under the rover.
     pub terrain: &'a Arc<dyn Terrain>,
-    /// Its options, alike those of all rovers of the block.
+    /// Options of the step; those of all rovers of a block are alike but for gravity and friction.
     pub options: &'a StepOptions,
-    /// Its command.
+    /// Command to the rover: torques, motors and held joints.
     pub command: &'a Command,
     /// Configuration.
     pub configuration: &'a mut Configuration,

@@ -49,7 +49,7 @@ pub struct Machine {
     mechanism: Mechanism,
     /// Wheels, in the model's order.
     pub wheels: Vec<WheelDisc>,
-    /// The same as sand meets them.
+    /// Wheels as sand meets them, in the model's order.
     pub(super) in_sand: Vec<PlacedWheel>,
     /// Boxes and balls that collide with the ground, in the model's order.
     pub boxes: Vec<BodyBox>,
@@ -61,8 +61,9 @@ pub struct Machine {
     pub loops: Vec<Loop>,
     /// Slots between those of the wheels and the joints: [`Self::find_free_slots`].
     pub(super) spares: Vec<Option<usize>>,
-    /// Whether its bodies can touch each other, and whether those of one tree can.
+    /// Whether bodies of the machine can touch each other.
     pub(super) has_pairs: bool,
+    /// Whether bodies of one tree can touch each other.
     pub(super) touches_itself: bool,
     /// Which trees have contact problems of their own.
     pub(super) clusters: Clusters,
@@ -82,7 +83,7 @@ impl Deref for Machine {
 pub struct Stop {
     /// Index of the joint.
     pub joint: usize,
-    /// Its range, rad or m.
+    /// Range of the joint, rad or m.
     pub limits: Limits,
 }
 
@@ -299,7 +300,7 @@ impl WheelDisc {
         }
     }
 
-    /// Whether it has a width.
+    /// Whether the wheel has a width.
     #[must_use]
     pub fn is_wide(&self) -> bool {
         self.half > 0.0 || self.rounding > 0.0

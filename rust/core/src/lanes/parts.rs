@@ -31,18 +31,18 @@ pub(super) struct Parts {
 pub(super) struct Wheel {
     pub body: usize,
     pub tree: usize,
-    /// Its slots for contacts.
+    /// Slots for the wheel's contacts.
     pub slots: Range<usize>,
     centre: Option<[f64; 3]>,
     axle: Axle,
     pub spoke: [f64; 3],
-    /// Of its circles, m.
+    /// Radius of the wheel's circles, m.
     pub radius: f64,
     /// Distance of its circles from the middle, m; 0 if it has one.
     pub half: f64,
     /// Rounding of its edges, m.
     pub rounding: f64,
-    /// Whether it yields where it touches.
+    /// Whether the wheel yields where it touches.
     pub is_soft: bool,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
     pub rollers: Option<[f64; 2]>,
@@ -216,7 +216,7 @@ impl<T: Lane> Twist<T> {
 }
 
 impl Wheel {
-    /// Whether it has a width.
+    /// Whether the wheel has a width.
     #[inline(always)]
     pub(super) fn is_wide(&self) -> bool {
         self.half > 0.0 || self.rounding > 0.0
@@ -266,7 +266,7 @@ impl Solid {
         place(pose, self.centre.as_ref())
     }
 
-    /// Its axes.
+    /// Rotation from the box's frame to the world's; its columns are the box's axes.
     #[inline(always)]
     pub(super) fn axes<T: Lane>(&self, pose: &Pose<T>) -> Mat3<T> {
         match &self.rotation {

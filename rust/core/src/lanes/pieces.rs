@@ -70,7 +70,7 @@ struct LaneEdge<T> {
     start: Vec3<T>,
     along: Vec3<T>,
     length: T,
-    /// Of its faces.
+    /// Unit normals of the edge's two faces.
     normals: [Vec3<T>; 2],
 }
 

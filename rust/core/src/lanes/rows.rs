@@ -61,8 +61,9 @@ pub struct Rows<T: Lane> {
     wide: WidePatterns,
     /// Number of each slot in its cluster's pattern.
     numbers: Vec<usize>,
-    /// Of each velocity, its cluster and its place among the cluster's velocities; number of those.
+    /// Cluster of each velocity, and its place among the cluster's velocities.
     velocities: Vec<[usize; 2]>,
+    /// Number of velocities of each cluster.
     sizes: Vec<usize>,
     /// Diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
     pub(super) diagonal: Vec<[T; 9]>,

@@ -12,7 +12,7 @@ use crate::solver::batch::problem::Triple;
 #[derive(Clone, Debug)]
 pub struct Yields<T: Lane> {
     zero: T,
-    /// Of each slot.
+    /// Law of each slot's contact.
     pub laws: Vec<Yielding<T>>,
 }
 

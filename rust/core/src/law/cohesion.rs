@@ -64,8 +64,8 @@ pub struct Cohesion {
 }
 
 impl Cohesion {
-    /// Of this force (N) over this range (m; 1% of the smallest radius if none is given), among
-    /// grains of at least the radius `smallest` (m).
+    /// Cohesion of this force (N) over this range (m; 1% of the smallest radius if none is given),
+    /// among grains of at least the radius `smallest` (m).
     ///
     /// # Errors
     /// A force that is not finite or negative; a range that is not positive or beyond a fifth of

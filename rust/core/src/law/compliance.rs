@@ -145,7 +145,7 @@ const LYING: f64 = 1e-4;
 const UNKNOWN: f64 = 0.01;
 
 impl<T: Lane> Compliance<T> {
-    /// Of two sides in series, of which a rigid one is `None`.
+    /// Compliance of two sides in series, of which a rigid one is `None`.
     #[inline(always)]
     #[must_use]
     pub fn in_series(first: Option<Self>, second: Option<Self>) -> Option<Self> {
@@ -168,7 +168,7 @@ impl<T: Lane> Compliance<T> {
         }
     }
 
-    /// The other one where the mask is true.
+    /// Compliance `other` in the lanes where the mask `here` is true, this one elsewhere.
     #[inline(always)]
     #[must_use]
     pub fn or(self, here: T::Mask, other: &Self) -> Self {
@@ -258,7 +258,7 @@ impl<T: Lane> Compliance<T> {
 }
 
 impl<T: Lane> Yielding<T> {
-    /// That of a rigid contact; `zero`: 0 in every lane.
+    /// Law of a rigid contact; `zero`: 0 in every lane.
     #[must_use]
     pub fn none(zero: T) -> Self {
         Self {

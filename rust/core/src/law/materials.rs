@@ -58,7 +58,7 @@ pub struct Materials {
 }
 
 impl Materials {
-    /// Of a list, of which the first entry for two materials counts.
+    /// Laws of a list of pairs, of which the first entry for two materials counts.
     #[must_use]
     pub fn new(pairs: Vec<MaterialPair>) -> Self {
         Self {
@@ -68,15 +68,15 @@ impl Materials {
         }
     }
 
-    /// The same with the materials of a machine that have a friction of their own; `restitution` is
-    /// that of their contacts.
+    /// Adds the materials of a machine that have a friction of their own; `restitution` is that of
+    /// their contacts.
     #[must_use]
     pub fn with_own(mut self, own: &Arc<[OwnFriction]>, restitution: f64) -> Self {
         self.own = (!own.is_empty()).then(|| (Arc::clone(own), restitution));
         self
     }
 
-    /// The same with a restitution of zero between all.
+    /// The laws with a restitution of zero between all materials.
     #[must_use]
     pub fn inelastic(&self) -> Self {
         Self {

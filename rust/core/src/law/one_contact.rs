@@ -63,8 +63,8 @@ pub fn solve_one_contact<const D: usize>(
     solve_within::<D, MAX_STEPS>(W, q, mu, 0.0)
 }
 
-/// As [`solve_one_contact`], but the slip direction is accurate to a few digits only. `kappa`:
-/// value of the last estimate, or zero.
+/// Solves a single contact as [`solve_one_contact`] does, but with a slip direction that is
+/// accurate to a few digits only. `kappa`: value of the last estimate, or zero.
 #[inline]
 pub(crate) fn estimate_one_contact<const D: usize>(
     W: &[[f64; D]; D],
@@ -138,7 +138,7 @@ struct Tangential<'a, const D: usize> {
     inverse: f64,
     q_hat: [f64; 2],
     a: [f64; 2],
-    /// Of `Ŵ`.
+    /// Trace of `Ŵ`, 1/kg.
     trace: f64,
     determinant: f64,
     /// `|tr W_TT|`.

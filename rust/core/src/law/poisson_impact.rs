@@ -18,7 +18,7 @@ use super::friction_law::FrictionLaw;
 /// Coulomb's law of a contact in expansion, for the impulse beyond `least` along the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expansion {
-    /// Its friction.
+    /// Friction of the contact.
     pub friction: Coulomb,
     /// `e p_N^c`, N s.
     pub least: f64,
@@ -44,7 +44,7 @@ impl<const D: usize> FrictionLaw<D> for Expansion {
     }
 }
 
-/// The same, answered by its projection.
+/// [`Expansion`] with the answer that follows from its projection.
 struct Loaded(Expansion);
 
 impl<const D: usize> FrictionLaw<D> for Loaded {

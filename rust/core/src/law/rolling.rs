@@ -71,7 +71,7 @@ impl RollingFriction {
         std::array::from_fn(|k| across[k] + n[k] * along)
     }
 
-    /// As [`Self::project`], in the plane.
+    /// Nearest admissible impulse to `z`, N s, in the plane, at the normal impulse `p_N`.
     #[inline]
     #[must_use]
     pub fn project_in_plane(&self, p_N: f64, z: f64) -> f64 {

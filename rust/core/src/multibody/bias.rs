@@ -173,7 +173,7 @@ impl<T: Lane> Moved<T> {
         body
     }
 
-    /// The same for a root that a joint connects to the world.
+    /// A root that a joint connects to the world, `d` from the world's origin, without load.
     #[cold]
     fn carry_root(&self, link: &Link, motions: &[Motion<T>], d: Vec3<T>, v: &[T]) -> Self {
         self.carry(&link.joint, link, motions, d, v)

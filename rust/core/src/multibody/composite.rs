@@ -128,7 +128,7 @@ impl<T: Lane> Composite<T> {
         }
     }
 
-    /// Its products with the motions of a free root.
+    /// Block of a free root in the mass matrix: the lower triangle by rows.
     #[inline(always)]
     pub(super) fn block(&self) -> [T; BLOCK] {
         let (m, s, I) = (self.mass, self.moment, self.inertia);
@@ -170,14 +170,14 @@ impl<T: Lane> Momentum<T> {
         }
     }
 
-    /// Its products with the motions of the base.
+    /// Products of the momentum with the six motions of the base.
     #[inline(always)]
     pub(super) fn entries(&self) -> [T; BASE] {
         let (f, l) = (self.linear, self.angular);
         [f.x, f.y, f.z, l.x, l.y, l.z]
     }
 
-    /// Its products with motions, by their indices.
+    /// Products of the momentum with the motions at `indices`, written to `out`.
     #[inline(always)]
     pub(super) fn along_all(&self, motions: &[Motion<T>], indices: &[usize], out: &mut [T]) {
         for p in 0..indices.len() {
@@ -185,7 +185,7 @@ impl<T: Lane> Momentum<T> {
         }
     }
 
-    /// Its product with a motion.
+    /// Product of the momentum with a motion.
     #[inline(always)]
     pub(super) fn along(&self, motion: &Motion<T>) -> T {
         motion.power(self.linear, self.angular)

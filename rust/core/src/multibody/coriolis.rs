@@ -159,7 +159,7 @@ fn still() -> Motion<f64> {
 }
 
 impl Turning {
-    /// Of a single body with velocity V.
+    /// I and B of a single body with the velocity V.
     #[inline]
     fn of(I: Composite<f64>, V: &Motion<f64>) -> Self {
         let (J, w, v, s) = (&I.inertia, V.axis, V.swing, I.moment);
@@ -223,7 +223,8 @@ mod tests {
         (q, v)
     }
 
-    /// Also with welded joints, whose bodies have their mass centres off their origins.
+    /// The rover, and the rover with welded joints, whose bodies have their mass centres off their
+    /// origins.
     fn models() -> [Model; 2] {
         let rover = Model::rover();
         let joints = [

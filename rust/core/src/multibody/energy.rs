@@ -38,7 +38,7 @@ pub struct EnergyScratch<T: Lane> {
     token: T::Token,
     bodies: Vec<Moving<T>>,
     angles: JointAngles<T>,
-    /// Of each cluster.
+    /// Sums over the bodies of each cluster.
     sums: Vec<Sums<T>>,
     found: Vec<EnergyOfCluster<T>>,
 }

@@ -84,7 +84,7 @@ pub enum ModelError {
     LoopInOneBody {
         /// Path of the loop.
         field: String,
-        /// Its name.
+        /// Name of the loop.
         name: String,
     },
     /// A loop that is open where it should be closed.
@@ -94,11 +94,11 @@ pub enum ModelError {
     LoopOpen {
         /// Path of the loop.
         field: String,
-        /// Its name.
+        /// Name of the loop.
         name: String,
         /// What is left, m or rad.
         gap: f64,
-        /// Its unit.
+        /// Unit of the gap, "m" or "rad".
         unit: &'static str,
         /// The fields that say where it closes.
         without: &'static str,
@@ -386,7 +386,8 @@ impl ModelError {
 }
 
 impl ModelError {
-    /// The same of something inside: its field gets the path of that.
+    /// Puts `path`, the path of a part such as `solids[3]`, before the field of an error in that
+    /// part.
     pub(super) fn within(mut self, path: &str) -> Self {
         if let Self::Missing { field }
         | Self::MassesContradict { field, .. }
@@ -426,11 +427,11 @@ pub enum StateError {
         "q: the loop {name:?} is open by {gap} {unit}; RoverModel.close_loops(q) gives the nearest coordinates that close it"
     )]
     LoopOpen {
-        /// Its name.
+        /// Name of the loop.
         name: String,
         /// What is left, m or rad.
         gap: f64,
-        /// Its unit.
+        /// Unit of the gap, "m" or "rad".
         unit: &'static str,
     },
     /// Loops that no configuration near the given one closes.
@@ -440,7 +441,7 @@ pub enum StateError {
         name: String,
         /// What is left, m or rad.
         gap: f64,
-        /// Its unit.
+        /// Unit of the gap, "m" or "rad".
         unit: &'static str,
     },
     /// The report's angles cannot express a rate there.

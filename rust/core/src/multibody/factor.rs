@@ -10,9 +10,9 @@ use crate::scalar::Lane;
 /// [`super::mass_matrix`].
 #[derive(Debug)]
 pub(super) struct Rows<T> {
-    /// Of each tree.
+    /// Block of each tree's base: the lower triangle by rows.
     pub blocks: Vec<[T; BLOCK]>,
-    /// Of each row.
+    /// Entries of each row with the base of its tree.
     pub base: Vec<[T; BASE]>,
     pub joints: Vec<T>,
 }
@@ -61,9 +61,9 @@ impl<T: Clone> Clone for Rows<T> {
 #[derive(Clone, Debug)]
 pub struct Factor<T: Lane> {
     pub(super) rows: Rows<T>,
-    /// Of each tree.
+    /// Entries of `D^(-1/2)` for each tree's base.
     block_roots: Vec<[T; BASE]>,
-    /// Of each row.
+    /// Entry of `D^(-1/2)` for each row.
     roots: Vec<T>,
 }
 

@@ -45,7 +45,7 @@ impl Kinematics {
         kinematics
     }
 
-    /// Whether it is scratch of a model with these bodies.
+    /// Whether the scratch fits a model: the number of motions and the tree of every body agree.
     #[must_use]
     pub fn is_of(&self, model: &Model) -> bool {
         let trees = model.bodies().iter().map(|body| body.tree);

@@ -280,7 +280,8 @@ impl<T: Lane> MassMatrix<T> {
         factor.update(self.token, mechanism)
     }
 
-    /// The same without a copy: it leaves M undefined until [`Self::update`].
+    /// Computes `M = Lᵀ D L` without a copy, which leaves M undefined until [`Self::update`].
+    /// Returns where M is positive definite; the factor of any other lane has no meaning.
     ///
     /// # Panics
     /// If an argument is of another mechanism.

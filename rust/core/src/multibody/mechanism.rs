@@ -32,34 +32,35 @@ pub struct Mechanism {
     pub(super) n_poses: usize,
     /// Number of rotations in a configuration.
     pub(super) n_rotations: usize,
-    /// Velocities that turn a frame and their rates per unit, and velocities of the spinners.
+    /// Velocities that turn a frame, and the angular speed of the frame at a unit of each.
     pub(crate) turning: Vec<(usize, f64)>,
-    /// See above.
+    /// Velocities of the spinners whose joints follow no other joint.
     pub(crate) spinning: Vec<usize>,
     /// Coordinates of the joints that a step turns, in the order of the bodies, and how those of
     /// coupled joints follow from them.
     pub(super) angles: Vec<usize>,
     pub(super) coupled_angles: Vec<(usize, Coupling)>,
-    /// Of each row, where its entries are.
+    /// Range of each row's entries in `columns`.
     pub(super) rows: Vec<Range<usize>>,
     /// The columns of each row in the mass matrix, row after row: the rows of the velocities that
     /// precede it on its path, then its own, counted from the first row of its tree.
     pub(super) columns: Vec<usize>,
     /// The motion of each of these columns.
     pub(super) column_motions: Vec<usize>,
-    /// Of each velocity, where its diagonal entry is; not used for those of a free root.
+    /// Index of the diagonal entry of each velocity's row; not used for those of a free root.
     pub(super) diagonals: Vec<usize>,
-    /// Of each velocity, its tree, and its body with the number of entries of the body's path up to
-    /// the velocity.
+    /// Tree of each velocity.
     pub(super) tree_of: Vec<usize>,
+    /// Body of each velocity, and the number of entries of the body's path up to and including the
+    /// velocity.
     pub(super) up_to: Vec<(usize, usize)>,
     pub(super) longest_path: usize,
-    /// Of each cluster, a set of trees that closed loops tie together, whether a base or a loop
-    /// passes its momentum on to the world.
+    /// Whether a base or a loop passes the momentum of each cluster on to the world. A cluster is a
+    /// set of trees that closed loops tie together.
     pub(super) clusters: Vec<bool>,
     /// How far a unit of each velocity moves what it carries.
     pub(crate) levers: Vec<Lever>,
-    /// Of each cluster, the largest distance of anything from the origin of its tree, m.
+    /// Size of each cluster, m: the largest distance of anything in it from the origin of its tree.
     pub(super) sizes: Vec<f64>,
     pub(super) n_motions: usize,
     pub(super) paths: Vec<usize>,
@@ -69,17 +70,17 @@ pub struct Mechanism {
 /// Bodies, velocities and rows of a tree.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TreeSpan {
-    /// Its bodies; the first is the root.
+    /// Bodies of the tree; the first is the root.
     pub bodies: Range<usize>,
-    /// Its velocities; those of a free root come first.
+    /// Velocities of the tree; those of a free root come first.
     pub velocities: Range<usize>,
-    /// Its rows.
+    /// Rows of the tree: its velocities without those of a free root.
     pub rows: Range<usize>,
-    /// Whether its root is free; otherwise a joint connects it to the world.
+    /// Whether the root is free; otherwise a joint connects it to the world.
     pub is_free: bool,
-    /// Of a free root, the index of its pose in a configuration.
+    /// Index of a free root's pose in a configuration.
     pub pose: usize,
-    /// Its cluster.
+    /// Index of the tree's cluster.
     pub(crate) cluster: usize,
 }
 
@@ -102,12 +103,12 @@ pub(crate) struct Lever {
 pub struct OwnJoint {
     /// The body that it carries.
     pub body: usize,
-    /// Its velocity.
+    /// Index of the joint's velocity.
     pub velocity: usize,
     /// The cluster of its tree.
     pub(crate) cluster: usize,
-    /// Its [lever](Lever::arm): what a coordinate and a rate count as, m and m/s, where they are
-    /// compared with lengths and speeds.
+    /// [Lever arm](Lever::arm) of the joint: converts its coordinate and rate to m and m/s where
+    /// they are compared with lengths and speeds.
     pub(crate) arm: f64,
 }
 
@@ -124,7 +125,7 @@ pub struct Mover {
 #[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
-    /// Its tree.
+    /// Index of the body's tree.
     pub(super) tree: usize,
     /// The body that carries it; a root itself.
     pub parent: usize,
@@ -135,21 +136,21 @@ pub struct Link {
     /// Columns of the fixed rotation from the joint's frame to the carrier's; `None` for the
     /// identity.
     pub rotation: Option<[[f64; 3]; 3]>,
-    /// Its joint.
+    /// Joint that carries the body.
     pub joint: Joint,
-    /// Its first velocity, or the one that it follows, and its first motion.
+    /// First velocity of the joint; for a coupled joint, the velocity that it follows.
     pub velocity: usize,
-    /// See above.
+    /// Index of the joint's first motion.
     pub motion: usize,
     /// Whether a step need not turn it: [`Body::is_spinner`](super::Body::is_spinner).
     pub is_spinner: bool,
-    /// Whether it carries no other body.
+    /// Whether the body carries no other body.
     pub is_leaf: bool,
-    /// Whether, besides, its joint follows no other one.
+    /// Whether the body carries no other body and its joint follows no other joint.
     pub(super) is_plain_leaf: bool,
-    /// Whether its carrier carries no body with a higher index.
+    /// Whether the body's carrier carries no body with a higher index.
     pub is_last: bool,
-    /// Whether its mass centre is its frame's origin.
+    /// Whether the body's mass centre is its frame's origin.
     pub is_centred: bool,
     /// What is known of its principal axes.
     pub symmetry: Symmetry,
@@ -361,7 +362,7 @@ impl TreeSpan {
 }
 
 impl Link {
-    /// Whether its joint follows another one; not of a root.
+    /// Whether the body's joint follows another one; has no meaning for a root.
     #[inline(always)]
     pub(super) fn is_coupled(&self) -> bool {
         self.n_rows == 0

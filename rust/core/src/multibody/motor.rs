@@ -28,7 +28,7 @@ pub struct Motor {
     /// ω₀, the zero of the line, rad/s; may be infinite (null in JSON, which has no infinity).
     #[serde(deserialize_with = "speed")]
     pub no_load_speed: f64,
-    /// Whether it brakes when driven faster than ω₀.
+    /// Whether the motor brakes when driven faster than ω₀.
     #[serde(default = "regenerates")]
     pub regenerating: bool,
 }

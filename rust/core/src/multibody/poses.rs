@@ -185,7 +185,7 @@ impl<T: Lane> Poses<T> {
 }
 
 impl<T: Lane> Pose<T> {
-    /// That of the world's frame.
+    /// Pose of the world's frame.
     fn of_world(token: T::Token) -> Self {
         let nowhere = Vec3::splat(token, [0.0; 3]);
         Self {
@@ -254,7 +254,7 @@ pub(super) struct JointAngles<T> {
     numbers: [Vec<T>; 3],
 }
 
-/// The same, one after the other.
+/// Reader of the sines and cosines of [`JointAngles`], one joint after the other.
 pub(super) struct NextAngle<'a, T> {
     sines: &'a [T],
     cosines: &'a [T],

@@ -145,7 +145,7 @@ impl Configuration {
             .chain(&self.rotations)
     }
 
-    /// Whether it has the sizes of a model's configuration, and unit quaternions.
+    /// Whether the configuration has the sizes that a model needs, and unit quaternions.
     #[must_use]
     pub fn is_of(&self, model: &Model) -> bool {
         self.joints.len() == model.n_joints()

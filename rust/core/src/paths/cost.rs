@@ -4,25 +4,26 @@
 /// otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct PathCosts {
-    /// Of a metre with the underside a wheel radius below the margin.
+    /// Cost of low clearance: a metre with the underside `d` radii below the margin costs
+    /// `belly * d * (1 + d)`.
     pub belly: f64,
     /// Clearance that costs nothing.
     pub margin: f64,
-    /// Of a wheel's rise by a radius.
+    /// Cost of a wheel's rise by a radius.
     pub climb: f64,
-    /// Of the square of a rise between two poses, beyond half a radius.
+    /// Cost of the square of a wheel's rise between two poses, beyond half a radius.
     pub step: f64,
-    /// Of a metre at a slope of 1.
+    /// Cost of a metre at a slope of 1; it grows with the square of the slope.
     pub lean: f64,
-    /// Of a radian off the goal, over the rover's reach.
+    /// Cost of a heading one radian off the goal, over the rover's reach.
     pub facing: f64,
-    /// Of a change of a command from 0 to its limit.
+    /// Cost of a change of the curvature or sideways command from 0 to its limit.
     pub swerve: f64,
-    /// Of a change between forward and backward.
+    /// Cost of a change between forward and backward.
     pub switch: f64,
-    /// Of an arc driven backward.
+    /// Cost of an arc driven backward.
     pub reverse: f64,
-    /// Of a pose at a place where the rover got stuck.
+    /// Cost of an arc through a pose in which the rover got stuck.
     pub memory: f64,
     /// Factor on the costs of each arc after the first.
     pub later: f64,

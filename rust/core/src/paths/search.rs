@@ -90,7 +90,7 @@ pub struct SearchTask {
 /// A path that is being extended.
 #[derive(Clone, Copy, Debug)]
 struct Path {
-    /// Its first arc.
+    /// Index of the path's first arc.
     root: usize,
     end: Pose,
     /// Direction of its last arc.
@@ -98,7 +98,7 @@ struct Path {
     cost: f64,
     /// Smallest distance from the goal so far, m.
     nearest: f64,
-    /// Where its wheels' heights lie.
+    /// Index at which the heights under the wheels at the path's end begin in the list of all.
     wheels: usize,
 }
 

@@ -63,7 +63,7 @@ impl WayMap {
         }
     }
 
-    /// Its rows and columns, and their distance, m.
+    /// Number of rows and columns of the map, and their spacing, m.
     #[must_use]
     pub fn shape(&self) -> ([usize; 2], f64) {
         (self.shape, self.spacing)

@@ -55,12 +55,12 @@ pub enum PlanarError {
         /// What was given.
         value: f64,
     },
-    /// The same point twice.
+    /// A point of the curve that repeats the one before it.
     #[error("y[{index}]: repeats the point before it, {value}")]
     RepeatedPoint {
         /// Which point.
         index: usize,
-        /// Its height.
+        /// Height of the point, m.
         value: f64,
     },
     /// A solid of a rover that has no mirror image, or turns out of the plane.
@@ -68,7 +68,7 @@ pub enum PlanarError {
         "model: {body} has no mirror image on the other side, or is rotated out of the plane; a planar model needs this symmetry"
     )]
     NotMirrored {
-        /// Its name.
+        /// Name of the body.
         body: String,
     },
 }

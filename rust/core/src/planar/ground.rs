@@ -61,7 +61,8 @@ pub enum ContactRule {
     /// The curve's points nearest to the centre; the gap is their distance less the radius.
     #[default]
     Nearest,
-    /// As the report's examples: the gap is the height of the disc's *centre* over the curve, so
-    /// the disc sinks in by its radius, while friction acts at the radius. For comparison only.
+    /// Rule of the report's examples: the gap is the distance of the disc's *centre* from the
+    /// curve's tangent below it, so the disc sinks in by its radius, while friction acts at the
+    /// radius. For comparison only.
     CentreHeight,
 }

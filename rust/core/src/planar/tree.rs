@@ -31,9 +31,9 @@ pub struct Part {
     pub centre: Vector2<f64>,
     /// About the mass centre, kg m².
     pub inertia: f64,
-    /// Its coordinate is its angle in the world.
+    /// Whether the part's coordinate is its angle in the world, not relative to its parent.
     pub is_absolute: bool,
-    /// Its rotation changes neither the mass distribution nor what it carries.
+    /// Whether the part's rotation changes neither the mass distribution nor what it carries.
     pub is_spinner: bool,
 }
 

@@ -45,7 +45,8 @@ impl<'a> FrictionContactProblem<'a> {
         Self::checked(dimension, Operator::Dense(W), q, mu)
     }
 
-    /// The same for many contacts, with the blocks of `W` that are not zero.
+    /// Checks every entry and states a problem of many contacts, with only the nonzero blocks of
+    /// `W`.
     ///
     /// # Errors
     /// As [`new`](Self::new), and where the components of `W` are not the dimension's.

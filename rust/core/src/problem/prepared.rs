@@ -52,8 +52,8 @@ pub(crate) struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Of `problem`, with `W` in the storage that the solve works on;
-    /// `scales` has room for its contacts.
+    /// Prepares `problem`, with `W` in the storage that the solve works on; `scales` has room for
+    /// its contacts.
     pub fn new<const D: usize>(
         problem: &FrictionContactProblem<'a>,
         W: Operator<'a>,
@@ -189,9 +189,9 @@ mod tests {
     use super::*;
     use crate::problem::{Dimension, evaluate};
 
-    /// Of twelve contacts one moved at 4e-7 of the free velocity where its impulse held it. The
-    /// residual, a mean, was 9e-8, the rounding of large opposed impulses allowed it, and the step
-    /// said "converged".
+    /// The step said "converged" although one of twelve contacts moved at 4e-7 of the free velocity
+    /// where its impulse held it. The residual, a mean, was 9e-8, and the rounding of large opposed
+    /// impulses allowed it.
     #[test]
     fn a_law_that_is_violated_at_one_of_many_contacts_is_not_converged() {
         let n = 24;

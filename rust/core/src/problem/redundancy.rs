@@ -64,7 +64,7 @@ pub(crate) struct Answered<'a, B: Fn(usize, usize) -> [f64; 9]> {
 /// What has become of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Settled {
-    /// Its impulses are determined by the motion.
+    /// The answer as it was: the motion determines its impulses.
     Unchanged,
     /// The least impulses of the same motion.
     Least,

@@ -18,7 +18,7 @@ use crate::law::rolling::RollingFriction;
 pub struct RollingContact {
     /// k of each body, 0 for what does not rotate.
     pub levers: [f64; 2],
-    /// Its law.
+    /// Rolling and drilling friction of the contact.
     pub law: RollingFriction,
     /// w without impulses, along the world's axes, m/s.
     pub free: [f64; 3],

@@ -29,7 +29,7 @@ pub struct Twist {
 }
 
 impl Twist {
-    /// Of the linear and then the angular components.
+    /// Twist from six components, the linear ones first.
     #[must_use]
     pub fn of(six: &Vector6<f64>) -> Self {
         Self {
@@ -63,8 +63,8 @@ pub struct Recalled {
     pub memory: Memory,
     /// Derivative of the six numbers, shift first, by linear and angular velocity.
     pub slope: Matrix6<f64>,
-    /// The same without the change of the rate at which memory fades: a multiple of the identity,
-    /// s/m.
+    /// Derivative of the six numbers by the velocities if the rate at which memory fades does not
+    /// change: a multiple of the identity, s/m.
     pub fresh: f64,
 }
 
@@ -76,7 +76,7 @@ impl Memory {
         Vector6::new(a, b, c, d, e, f)
     }
 
-    /// Of the six numbers.
+    /// Memory from its six numbers, the shift first.
     #[must_use]
     pub fn of(six: &Vector6<f64>) -> Self {
         Self {
@@ -85,7 +85,7 @@ impl Memory {
         }
     }
 
-    /// That of steady motion of a wheel of this radius, m; none at rest.
+    /// Memory of the steady motion of a wheel of this radius, m; zero at rest.
     #[must_use]
     pub fn steady(twist: &Twist, radius: f64) -> Self {
         let rate = rate(&twist.six().into(), radius);
@@ -160,7 +160,8 @@ pub fn after_step<T: Lane>(
     after_way(memory, twist, rate(twist, radius), times)
 }
 
-/// The same at a speed of the wheel relative to the sand, m/s.
+/// Memories after a step and their derivative as in [`after_step`], at a given speed of the wheel
+/// relative to the sand (`rate`), m/s.
 #[inline(always)]
 #[must_use]
 pub fn after_way<T: Lane>(

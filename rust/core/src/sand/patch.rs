@@ -59,7 +59,8 @@ pub struct Bed<'a> {
 pub struct Reaction {
     /// Force, N, and moment about the centre, N m, in world axes.
     pub wrench: Vector6<f64>,
-    /// Its derivatives, as they are wanted.
+    /// Derivatives of the wrench, summed with the factors of [`Derivatives::Slopes`]; zeros for
+    /// [`Derivatives::Wrench`].
     pub slope: Matrix6<f64>,
     /// Whether a part that pushes, or may, is under the surface.
     pub is_touching: bool,
@@ -111,7 +112,8 @@ struct Sums<'a> {
 const WRENCH: usize = 8;
 const SLOPE: usize = 24;
 
-/// The same, over all lanes.
+/// Sums of a reaction over all lanes, in the wheel's axes: the wrench, and its derivatives by a
+/// translation and by a rotation.
 struct Totals {
     wrench: [f64; WRENCH],
     slopes: [[f64; SLOPE]; 2],

@@ -16,9 +16,9 @@ pub struct Piece<T: Lane> {
     pub down: Vec3<T>,
     /// Under the surface, m.
     pub depth: T,
-    /// Its way over the sand since it entered. Only Bekker's law needs it.
+    /// Way of the piece over the sand since it entered. Only Bekker's law needs it.
     pub slid: Slid<T>,
-    /// What it is part of.
+    /// Surface of the wheel that the piece belongs to.
     pub skin: Skin,
 }
 

@@ -49,7 +49,7 @@ struct Arcs {
     rings: [Option<Ring>; MAX_LANES],
     from: [f64; MAX_LANES],
     to: [f64; MAX_LANES],
-    /// Of the angles at which the rings leave the sand.
+    /// Cosines of the angles at which the rings leave the sand.
     cos: [f64; MAX_LANES],
 }
 
@@ -60,8 +60,8 @@ struct Arc {
     from: f64,
     to: f64,
     cos: f64,
-    /// Of an end that moves with the direction of the motion, m: by how much area the ring grows
-    /// as that direction turns. 0 of an arc.
+    /// Area by which the ring grows as the direction of the motion turns, m², at an end that moves
+    /// with that direction; 0 for an arc.
     grows: f64,
 }
 
@@ -99,7 +99,7 @@ pub(super) struct Feed<'a> {
 }
 
 impl Motion {
-    /// Of a shift and a turn.
+    /// Sizes of a remembered shift and turn, in the wheel's axes.
     pub fn of(shift: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
         Self {
             size: shift.norm(),
@@ -131,7 +131,7 @@ impl Default for Group {
 }
 
 impl<'a> Feed<'a> {
-    /// Of a wheel.
+    /// Feed of a wheel's points, from the first ring on.
     pub fn of(wheel: &'a Immersed<'a>) -> Self {
         Self {
             wheel,

@@ -385,7 +385,7 @@ mod tests {
         [found.alpha.into(), a, b, c]
     }
 
-    /// Of a level plate that is pressed straight down, all three cubics act along the vertical, and
+    /// On a level plate that is pressed straight down, all three cubics act along the vertical, and
     /// `α = −(f₁ + f₂ + f₃)` at (1, 1, 1).
     #[test]
     fn a_plate_is_pressed_up_by_the_sum_of_the_coefficients() {

@@ -207,7 +207,7 @@ pub struct Rut<T> {
 pub struct RutsNear<'a> {
     /// All ruts.
     pub map: &'a RutMap,
-    /// Those near the wheel.
+    /// Depths of the ruts near the wheel, m, read in advance.
     pub window: &'a Window,
     /// Size of a cell, m.
     pub cell: f64,

@@ -162,8 +162,8 @@ fn front(shift: &Vector3<f64>, rim: f64, size: f64) -> ([f64; 2], [f64; 3]) {
 }
 
 impl Rolling {
-    /// Of a wheel of a radius with a memory of a size. `level`: sine of the angle between axle and
-    /// normal of the bed.
+    /// Motion of a wheel of a radius (m) from its memory (shift and turn, in its own axes) and the
+    /// size of that memory. `level`: sine of the angle between axle and normal of the bed.
     pub fn new(
         (shift, turn): (Vector3<f64>, Vector3<f64>),
         (radius, size): (f64, f64),
@@ -311,7 +311,8 @@ mod tests {
         }
     }
 
-    /// Also for a wheel that hardly turns, either way.
+    /// Derivatives of the way by the memory match finite differences, even for a wheel that hardly
+    /// turns.
     #[test]
     fn the_slopes_are_derivatives() {
         for turn in [-7.0, 4.0, -0.4, 0.3] {
@@ -336,7 +337,8 @@ mod tests {
         }
     }
 
-    /// Of wheels that roll, spin, sink and are lifted.
+    /// Derivatives of the front's angle match finite differences for wheels that roll, spin, sink
+    /// and are lifted.
     #[test]
     fn the_front_turns_as_its_slopes_say() {
         for [down, along, turn] in [

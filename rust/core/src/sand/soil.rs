@@ -40,7 +40,7 @@ pub struct Resistive {
     pub stiffness_factor: f64,
     /// The bare rim of a wheel.
     pub tread: Interface,
-    /// Its side walls.
+    /// Side walls of a wheel.
     pub wall: Interface,
     /// A rim with grousers.
     pub grousers: Interface,
@@ -95,7 +95,7 @@ impl Soil {
         matches!(self.law, Law::Bekker(_))
     }
 
-    /// Its numbers with their names, to be read or changed.
+    /// Numbers of the soil with their names, to be read or changed.
     #[must_use]
     pub fn numbers_mut(&mut self) -> Vec<(&'static str, &mut f64)> {
         let mut all: Vec<(&'static str, &mut f64)> = match &mut self.law {

@@ -31,7 +31,7 @@ pub struct WheelInSand {
 /// The sand under a machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SandState {
-    /// Of each wheel.
+    /// Sand at each wheel, with its action in the last step (n_wheels).
     pub wheels: Vec<WheelInSand>,
     /// Where wheels have been.
     pub ruts: RutMap,
@@ -47,7 +47,7 @@ impl SandState {
         }
     }
 
-    /// Whether it has the size of a machine with this many wheels, and only sound numbers.
+    /// Whether the state has the size of a machine with this many wheels, and only sound numbers.
     #[must_use]
     pub fn is_of(&self, wheels: usize) -> bool {
         self.wheels.len() == wheels

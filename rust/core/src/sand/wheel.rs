@@ -31,7 +31,7 @@ pub struct SandWheel {
 }
 
 impl SandWheel {
-    /// Of a wheel of a model.
+    /// Geometry of a model's wheel in sand.
     #[must_use]
     pub fn of(wheel: &Wheel) -> Self {
         Self {
@@ -77,7 +77,7 @@ pub struct Ring {
     pub normal: [f64; 2],
     /// Across the ring, m.
     pub width: f64,
-    /// What it is part of.
+    /// Surface of the wheel that the ring belongs to.
     pub skin: Skin,
 }
 
@@ -87,9 +87,9 @@ pub const MOST_POINTS: usize = 24;
 /// Gauss–Legendre rule on (−1, 1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gauss {
-    /// Of its points.
+    /// Places of the points in (−1, 1).
     pub places: Vec<f64>,
-    /// Of its points.
+    /// Weights of the points.
     pub weights: Vec<f64>,
 }
 

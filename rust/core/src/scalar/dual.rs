@@ -19,7 +19,7 @@ use super::lane::{Lane, MAX_LANES};
 pub struct Dual<T> {
     /// The number.
     pub value: T,
-    /// Its derivative.
+    /// Derivative of the number.
     pub slope: T,
 }
 

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// Instructions that a single rover's step is compiled for. Its bits do not depend on them.
 #[derive(Clone, Copy, Debug)]
 pub enum Single {
-    /// Those that every machine of its kind has.
+    /// Instructions that every machine of this architecture has.
     Baseline,
     /// AVX2.
     #[cfg(target_arch = "x86_64")]
@@ -81,7 +81,7 @@ pub enum InstructionsError {
 static USED: OnceLock<Instructions> = OnceLock::new();
 
 impl Instructions {
-    /// Those that this process uses: the widest of the machine, unless others were chosen.
+    /// Instructions that this process uses: the widest of the machine, unless others were chosen.
     #[must_use]
     pub fn of_this_machine() -> Self {
         *USED.get_or_init(|| Self::all_of_this_machine()[0])

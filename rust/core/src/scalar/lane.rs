@@ -64,7 +64,7 @@ pub trait Lane:
     /// Number of lanes.
     const LANES: usize;
 
-    /// The same number in every lane.
+    /// The number `x` in every lane.
     fn splat(token: Self::Token, x: f64) -> Self;
 
     /// The numbers of a slice of [`Self::LANES`].

@@ -24,7 +24,7 @@ impl<T: Lane> Vec3<T> {
         Self { x, y, z }
     }
 
-    /// The same vector in every lane.
+    /// The vector `v` in every lane.
     #[inline(always)]
     pub fn splat(token: T::Token, v: [f64; 3]) -> Self {
         Self {
@@ -156,7 +156,7 @@ impl<T: Lane> Mat3<T> {
         }
     }
 
-    /// Its columns.
+    /// Columns of the matrix.
     #[inline(always)]
     pub fn columns(&self) -> [Vec3<T>; 3] {
         [self.x, self.y, self.z]

@@ -47,7 +47,7 @@ pub trait LocatedContact: UnilateralContact<Key: Debug> + Copy + PartialEq + Deb
 pub struct ActiveContact<C: LocatedContact> {
     /// Key, frame and gap, where the step evaluated them.
     pub contact: C,
-    /// Where it lies, world, m.
+    /// Place of the contact, world, m.
     pub position: C::Vector,
     /// Impulse along the normal and the tangents, N s.
     pub impulse: C::Vector,

@@ -128,8 +128,8 @@ impl Batch {
         self.step_while(torques, set_points, n, active, rows, &mut || true)
     }
 
-    /// The same, but asks `go_on` from time to time; once it returns false, each rover stops after
-    /// a whole step.
+    /// Takes `n` steps as [`Self::step`] does, but asks `go_on` from time to time; once it returns
+    /// false, each rover stops after a whole step.
     ///
     /// # Errors
     /// As [`Self::step`].

@@ -103,7 +103,7 @@ impl Passes {
 }
 
 impl Differentiator {
-    /// Of a simulation with its command, for this machine's instructions.
+    /// Differentiator of a simulation with its command, for this machine's instructions.
     ///
     /// # Errors
     /// `Variant`.
@@ -111,7 +111,7 @@ impl Differentiator {
         Self::with(of, Instructions::of_this_machine())
     }
 
-    /// The same for other instructions.
+    /// Differentiator of a simulation with its command, for the given instructions.
     ///
     /// # Errors
     /// `Variant`.
@@ -482,7 +482,7 @@ impl Differentiator {
 pub struct TrajectoryBatch<'a> {
     /// A row each.
     pub states: &'a [f64],
-    /// As many for each.
+    /// Commands of each trajectory (n, steps, 2 n_wheels), row-major.
     pub commands: &'a [f64],
     /// Number of steps of each.
     pub steps: usize,

@@ -57,7 +57,7 @@ pub enum CommandError {
     NoGains {
         /// Index of its solid in the description.
         solid: usize,
-        /// Its name.
+        /// Name of the joint.
         name: String,
     },
     /// A joint that the model does not have, or that is locked.
@@ -91,7 +91,7 @@ pub enum BatchError {
         index: usize,
         /// Coordinates of the first.
         expected: usize,
-        /// Its own.
+        /// Coordinates of the refused rover.
         actual: usize,
     },
     /// No rover of this number.

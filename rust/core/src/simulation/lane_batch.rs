@@ -94,7 +94,7 @@ struct Slot {
     /// Report of the steps after which the rover itself has its state.
     kept: StepReport,
     has_failed: bool,
-    /// Whether its last step was a general one.
+    /// Whether the rover's last step was a general one.
     is_general: bool,
 }
 
@@ -116,7 +116,7 @@ struct Lanes<T: Lane> {
 struct Course {
     /// Steps that it has not finished.
     left: usize,
-    /// Whether its problems are those of the position projection.
+    /// Whether the block's problems are those of the position projection.
     projects: bool,
 }
 

@@ -52,7 +52,7 @@ impl RoverScene {
             && is_of_sand
     }
 
-    /// The same machine on another terrain.
+    /// Scene of the same machine on another terrain.
     #[must_use]
     pub fn on(&self, terrain: Arc<dyn Terrain>) -> Self {
         Self {
@@ -80,9 +80,9 @@ pub struct Placement {
     pub scene: RoverScene,
     /// Options of the steps.
     pub options: StepOptions,
-    /// Where it is.
+    /// Configuration of the rover.
     pub configuration: Configuration,
-    /// Its velocity (nv).
+    /// Velocities of the rover (nv), m/s and rad/s.
     pub v: Vec<f64>,
 }
 
@@ -296,7 +296,7 @@ pub struct LastCall {
     pub report: StepReport,
     /// Work through the drives of wheels and other joints, Σ |∫ τ_i dφ_i|, driving or braking, J.
     pub work: f64,
-    /// Its driving part, Σ max(∫ τ_i dφ_i, 0), J.
+    /// Driving part of the work through the drives, Σ max(∫ τ_i dφ_i, 0), J.
     pub positive_work: f64,
 }
 
@@ -329,7 +329,7 @@ impl RoverSimulation {
         Ok(made)
     }
 
-    /// As [`Self::new`], then [`Self::begin`].
+    /// A placed rover with all loops closed; steering joints held at zero, all others free.
     ///
     /// # Errors
     /// An option out of its range.

@@ -51,7 +51,7 @@ impl RoverCommand {
         }
     }
 
-    /// Whether it fits this model and its motors, and all of its numbers are finite.
+    /// Whether the command fits this model and its motors, and all of its numbers are finite.
     pub(super) fn is_of(&self, model: &Model) -> bool {
         let own = Self::idle(model);
         let Command {

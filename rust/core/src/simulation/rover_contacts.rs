@@ -51,7 +51,7 @@ impl RoverSimulation {
         forces
     }
 
-    /// The same; `in_sand`: [`Self::wheels_in_sand`].
+    /// Writes [`Self::wheel_forces`] to `forces`, N. `in_sand`: [`Self::wheels_in_sand`].
     pub(super) fn sum_wheel_forces(
         &self,
         in_sand: &[WheelContactInSand],

@@ -33,15 +33,15 @@ pub enum TogetherError {
     Differs {
         /// `time_step`, or an entry of `gravity`.
         field: &'static str,
-        /// Of the rover.
+        /// Value of the rover, s or m/s².
         rover: f64,
-        /// Of the bed.
+        /// Value of the bed, s or m/s².
         grains: f64,
     },
     /// A part of the rover is in a grain.
     #[error("position: {part} penetrates ball {grain} by {depth} m")]
     Overlap {
-        /// Its name.
+        /// Name of the part.
         part: String,
         /// Number of the grain.
         grain: usize,

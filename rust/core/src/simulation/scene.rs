@@ -156,7 +156,8 @@ impl<S: Scene> PartialEq for Snapshot<S> {
 }
 
 impl<S: Scene> Snapshot<S> {
-    /// Whether it has the sizes of a scene with this many velocities, and only finite numbers.
+    /// Whether the snapshot has the sizes of a scene with this many velocities, and only finite
+    /// numbers.
     pub(super) fn is_sound(&self, nv: usize) -> bool {
         let warm = &self.warm_start;
         let impulses = warm.impulses.iter().flat_map(|(_, p)| p);
@@ -182,7 +183,7 @@ pub struct QuickStep<'a, S: Scene> {
     pub command: &'a S::Command,
     /// The scene's memory.
     pub memory: &'a mut S::Memory,
-    /// Its scratch.
+    /// The scene's scratch.
     pub parts: &'a mut S::Parts,
     /// Where the solve starts.
     pub warm_start: &'a mut WarmStart<SceneKey<S>>,
@@ -196,7 +197,7 @@ pub struct StepTaken<'a, S: Scene> {
     pub state: &'a mut State<S::Configuration>,
     /// The scene's memory.
     pub memory: &'a mut S::Memory,
-    /// Its scratch.
+    /// The scene's scratch.
     pub parts: &'a mut S::Parts,
     /// Where the next solve starts.
     pub warm_start: &'a mut WarmStart<SceneKey<S>>,

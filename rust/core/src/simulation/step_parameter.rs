@@ -11,7 +11,7 @@ pub enum StepParameter {
     Friction,
     /// Mass and moments of inertia of a body, by its index, as a factor of those that it has.
     Mass(usize),
-    /// The same for all bodies together.
+    /// Masses and moments of inertia of all bodies together, as a factor of those that they have.
     AllMasses,
     /// Damping of a joint, by its index, N m s/rad or N s/m.
     Damping(usize),

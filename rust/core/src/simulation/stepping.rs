@@ -168,7 +168,8 @@ impl<S: Scene> Simulation<S> {
         self.step_while(n, &mut || true)
     }
 
-    /// The same, but asks `go_on` after each step and stops once it returns false.
+    /// Takes `n` steps as [`Self::step`] does, but asks `go_on` after each and stops once it
+    /// returns false.
     ///
     /// The report's `steps` says how many were taken.
     ///

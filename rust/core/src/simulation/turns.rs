@@ -44,7 +44,7 @@ pub trait Turn<P>: Sync {
 /// How a rover's steps went.
 #[derive(Clone, Copy, Debug)]
 pub struct Done<'a> {
-    /// Whether it took any steps.
+    /// Whether the rover took any steps.
     pub has_moved: bool,
     /// The step that it could not take.
     pub error: Option<&'a StepError>,
@@ -77,7 +77,7 @@ impl Default for Worker {
 
 /// The threads that step rovers.
 pub struct Workers {
-    /// Those besides the caller's; None if it does all the work.
+    /// Threads besides the caller's; None if the caller does all the work.
     pool: Option<Pool>,
     /// One for each thread.
     workers: Vec<Worker>,

@@ -10,8 +10,8 @@ pub struct Iterate {
     pub stage: Stage,
     /// Sweeps and linear solves of all stages before it.
     pub iterations: usize,
-    /// Its [relative residual](Residual::relative); in [`Stage::Relaxed`] that of the convex
-    /// relaxation.
+    /// [Relative residual](Residual::relative) of the iterate; in [`Stage::Relaxed`] that of the
+    /// convex relaxation.
     pub residual: f64,
 }
 

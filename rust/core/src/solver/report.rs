@@ -110,11 +110,11 @@ impl Stage {
 pub(super) struct Outcome {
     /// The method that gave the answer.
     pub method: Method,
-    /// Its stage.
+    /// The stage that gave the answer.
     pub stage: Stage,
-    /// Why it stopped.
+    /// Why the stage stopped.
     pub status: SolveStatus,
-    /// Its residual under Coulomb's law.
+    /// Residual of the answer under Coulomb's law.
     pub residual: Residual,
 }
 
@@ -125,9 +125,9 @@ pub struct Rung {
     pub stage: Stage,
     /// Why it ended.
     pub status: SolveStatus,
-    /// Its sweeps and linear solves. Short, since every step copies the list.
+    /// Sweeps and linear solves of the stage. 32 bits, since every step copies the list.
     pub iterations: u32,
-    /// Matrices that it factored for them; islands and sweeps over bodies count none.
+    /// Matrices factored for the linear solves; islands and sweeps over bodies count none.
     pub factorisations: u32,
 }
 
@@ -139,7 +139,7 @@ pub struct Rungs {
 }
 
 impl Rung {
-    /// As many iterations as the list can hold.
+    /// Number of iterations as a `u32`, saturated.
     pub(super) fn count(iterations: usize) -> u32 {
         u32::try_from(iterations).unwrap_or(u32::MAX)
     }

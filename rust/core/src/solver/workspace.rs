@@ -18,9 +18,9 @@ pub struct SolverWorkspace {
     pub(super) scales: Scales,
     /// `W` in the storage that suits its size.
     pub(super) storage: Storage,
-    /// Of the stages.
+    /// Scratch of the stages.
     pub(super) scratch: Scratch,
-    /// Of the sweeps over pairs of bodies.
+    /// Scratch of the sweeps over pairs of bodies.
     pub(super) body_sweeps: BodySweeps,
     /// Problems of the islands, and the workspace that solves them. Created when first needed,
     /// since workspaces would otherwise nest without end.

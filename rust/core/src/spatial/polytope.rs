@@ -39,18 +39,18 @@ pub struct Polytope {
 pub struct PolytopeFace {
     /// Unit, outward.
     pub normal: Vector3<f64>,
-    /// Of its plane from the centroid along the normal, m.
+    /// Distance of the face's plane from the centroid along the normal, m.
     pub offset: f64,
-    /// Its vertices, counterclockwise from outside.
+    /// Numbers of the face's vertices, counterclockwise from outside.
     pub corners: Vec<usize>,
 }
 
 /// An edge of a polytope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PolytopeEdge {
-    /// Its vertices.
+    /// Numbers of the two vertices of the edge.
     pub ends: [usize; 2],
-    /// Its faces.
+    /// Numbers of the two faces at the edge; `ends` is counterclockwise in the first.
     pub faces: [usize; 2],
 }
 
@@ -116,21 +116,21 @@ impl Polytope {
         }
     }
 
-    /// Its vertices relative to the centroid, m.
+    /// Vertices of the polytope relative to its centroid, m.
     #[inline]
     #[must_use]
     pub fn vertices(&self) -> &[Vector3<f64>] {
         &self.vertices
     }
 
-    /// Its faces.
+    /// Faces of the polytope.
     #[inline]
     #[must_use]
     pub fn faces(&self) -> &[PolytopeFace] {
         &self.faces
     }
 
-    /// Its edges.
+    /// Edges of the polytope.
     #[inline]
     #[must_use]
     pub fn edges(&self) -> &[PolytopeEdge] {

@@ -33,7 +33,7 @@ impl SymmetricMatrix3 {
         }
     }
 
-    /// As a full matrix.
+    /// Full matrix, with both triangles.
     #[must_use]
     pub fn to_matrix(&self) -> Matrix3<f64> {
         Matrix3::new(

@@ -41,7 +41,7 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    /// Whether it fits a model, and all of its numbers are finite.
+    /// Whether the wrench acts on a solid of the model, and all of its numbers are finite.
     #[must_use]
     pub fn is_of(&self, model: &Model) -> bool {
         let numbers = [self.point, self.force, self.moment];

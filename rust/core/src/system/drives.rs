@@ -25,7 +25,7 @@ use crate::scalar::{Lane, LaneMask};
 struct Joint<T> {
     /// Torque apart from the drive's, N m.
     torque: T,
-    /// Its drive.
+    /// Torque–speed line and command of the joint's drive.
     line: MotorLine<T>,
     /// Position control, spring and damper: stiffness and damping of all together, and where their
     /// torque is zero; 0 where the joint is free.
@@ -184,7 +184,7 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// The same for a part of a step, in all lanes.
+    /// Adds the impulses and work of the part of a step that was tried last, in all lanes.
     pub fn accept_part(&mut self) {
         for (done, tried) in self
             .done

@@ -8,14 +8,15 @@ use crate::scalar::Lane;
 /// angle the third-order error of the explicit terms is a thousandth of the energy.
 const MOST_TURN: f64 = 0.1;
 
-/// The same limit for the rotation of the fastest frame, joints included, rad. A joint that snaps
-/// to a new set-point turns a light part of the machine. Measured on the drives of random policies:
-/// implicit terms between this limit and the one above change no error in its third digit.
+/// Rotation of the fastest frame in a step, joints included, rad, beyond which gyroscopic terms are
+/// implicit. A joint that snaps to a new set-point turns a light part of the machine. Measured on
+/// the drives of random policies: implicit terms between [`MOST_TURN`] and this limit change no
+/// error in its third digit.
 const MOST_JOINT_TURN: f64 = 0.5;
 
-/// The same limit for the rotation of a wheel about its axle in a step, rad. The spin couples the
-/// motions across the axle at a frequency of a few per cent of the spin rate, so explicit terms
-/// would stay acceptable up to some twenty times more.
+/// Rotation of a wheel about its axle in a step, rad, beyond which gyroscopic terms are implicit.
+/// The spin couples the motions across the axle at a frequency of a few per cent of the spin rate,
+/// so explicit terms would stay acceptable up to some twenty times more.
 const MOST_SPIN: f64 = 1.0;
 
 /// Angular speeds, rad/s.
@@ -30,7 +31,7 @@ pub(crate) struct Turning<T> {
 }
 
 impl<T: Lane> Turning<T> {
-    /// Those of a cluster at a velocity (nv); `zero`: 0 in every lane.
+    /// Angular speeds of a cluster at a velocity (nv), rad/s; `zero`: 0 in every lane.
     #[inline(always)]
     pub(crate) fn of_cluster(zero: T, mechanism: &Mechanism, v: &[T], cluster: usize) -> Self {
         let is_one = mechanism.n_clusters() == 1;

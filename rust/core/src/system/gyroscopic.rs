@@ -22,7 +22,7 @@ pub(super) struct GyroscopicScratch {
     matrix: DMatrix<f64>,
     /// `h (τ − G − C v) + J`, then Δv.
     load: DVector<f64>,
-    /// Of each cluster, whether the symmetric part is left out.
+    /// Whether the symmetric part of C is left out, for each cluster.
     is_skew: Vec<bool>,
 }
 

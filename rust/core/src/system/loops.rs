@@ -334,7 +334,7 @@ impl<T: Lane> Loops<T> {
         &self.B[row * self.n + contact]
     }
 
-    /// The same, to be set.
+    /// The product `Q Z` of a row with a contact, to be set.
     #[inline(always)]
     pub(crate) fn product_mut(&mut self, row: usize, contact: usize) -> &mut Triple<T> {
         &mut self.B[row * self.n + contact]
@@ -481,7 +481,8 @@ impl<T: Lane> Loops<T> {
         gap
     }
 
-    /// The same at the end of a step.
+    /// Projects a configuration at the end of a step onto the loops, and the velocity onto their
+    /// rates. Returns the widest gap that is left, m or rad.
     pub(super) fn project_end(
         &mut self,
         with: &Projector<'_, T>,
@@ -594,7 +595,7 @@ impl<T: Lane> Loops<T> {
         &self.impulses
     }
 
-    /// The same, to be set.
+    /// Impulses of all rows in the last step (m), N s or N m s, to be set.
     pub(super) fn impulses_mut(&mut self) -> &mut [T] {
         &mut self.impulses
     }
@@ -749,7 +750,7 @@ pub fn closed(
     }
 }
 
-/// Of each loop, the number of its rows that follow from other rows in a configuration.
+/// Number of rows of each loop that follow from other rows in a configuration.
 #[must_use]
 pub fn redundant_rows(model: &Model, q: &Configuration) -> Vec<usize> {
     let kinematics = Kinematics::of(model, q);

@@ -27,7 +27,7 @@ pub struct PlanarKey {
 /// A contact of a disc with the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanarContact {
-    /// Its key from step to step.
+    /// Key of the contact from step to step.
     pub key: PlanarKey,
     /// Point of the disc's rim, world, m.
     pub point: Vector2<f64>,
@@ -105,7 +105,7 @@ pub struct PlanarSystem<'a> {
     pub rule: ContactRule,
     /// Commanded torques, N m, positive forward.
     pub inputs: &'a [f64],
-    /// Its scratch.
+    /// Scratch of the system.
     pub parts: &'a mut PlanarScratch,
 }
 
@@ -123,7 +123,7 @@ fn facing(ground: &dyn Ground, rule: ContactRule, disc: &Disc, reach: f64, out: 
 struct Driven {
     input: usize,
     motor: PlanarMotor,
-    /// One of them, with its command.
+    /// Torque–speed line of a single motor, with its command.
     line: MotorLine<f64>,
     /// θ_j.
     theta: f64,

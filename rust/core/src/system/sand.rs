@@ -76,7 +76,7 @@ pub(crate) struct SandContact<T: Lane> {
 }
 
 impl<T: Lane> SandContact<T> {
-    /// Of a machine on firm ground.
+    /// Sand of a machine that is on firm ground in every lane.
     pub(crate) fn new(
         token: T::Token,
         mechanism: &Mechanism,

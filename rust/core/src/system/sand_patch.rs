@@ -71,7 +71,7 @@ pub(super) struct LaneGround<'a> {
 }
 
 impl<'a, T: Lane> SandScene<'a, T> {
-    /// That of a lane; none where it is firm.
+    /// Ground under a lane's rover; none where it is firm.
     pub(super) fn ground(&self, lane: usize) -> Option<LaneGround<'a>> {
         let layer = self.layers[lane]?;
         Some(LaneGround {
@@ -96,7 +96,7 @@ pub(super) struct SandStep<T> {
 #[derive(Clone, Debug)]
 pub(super) struct Patch<T: Lane> {
     pub(super) wheel: PlacedWheel,
-    /// Where its points lie, by lane.
+    /// Gauss rules for the points of the wheel, by lane.
     pub(super) rules: [Option<Arc<Rules>>; MAX_LANES],
     pub(super) map: TwistMap<T>,
     pub(super) pose: LanePose<T>,
@@ -118,7 +118,7 @@ pub(super) struct Patch<T: Lane> {
 }
 
 impl<T: Lane> Patch<T> {
-    /// Of a wheel, clear of the ground.
+    /// Patch of a wheel that is clear of the ground.
     pub(super) fn new(token: T::Token, mechanism: &Mechanism, wheel: PlacedWheel) -> Self {
         let (map, nobody) = (
             TwistMap::new(token, mechanism, wheel.body),

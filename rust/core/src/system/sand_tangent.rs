@@ -29,7 +29,7 @@ pub(super) struct Evaluated {
     pub(super) is_touching: bool,
 }
 
-/// The same over lanes.
+/// [`Evaluated`] over lanes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LaneEvaluated<T: Lane> {
     pub(super) at: Six<T>,
@@ -256,7 +256,7 @@ pub(super) struct TwistMap<T: Lane> {
 }
 
 impl<T: Lane> TwistMap<T> {
-    /// Of a body; all zero.
+    /// Map for a wheel on a body; arm and columns are zero until [`Self::place`].
     pub(super) fn new(token: T::Token, mechanism: &Mechanism, body: usize) -> Self {
         let zero = T::splat(token, 0.0);
         let path = mechanism.path(body).to_vec();

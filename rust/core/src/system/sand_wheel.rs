@@ -16,12 +16,12 @@ pub(crate) struct PlacedWheel {
     /// Centre and unit axle in the body's frame.
     pub centre: [f64; 3],
     pub axle: [f64; 3],
-    /// As sand meets it.
+    /// Geometry of the wheel in sand.
     pub shape: SandWheel,
 }
 
 impl PlacedWheel {
-    /// Of a model.
+    /// Place and geometry of a model's wheel.
     pub(crate) fn of(wheel: &Wheel) -> Self {
         Self {
             body: wheel.body,
@@ -61,7 +61,7 @@ impl<T: Lane> LanePose<T> {
         }
     }
 
-    /// That of a lane.
+    /// Pose of the wheel in a lane.
     #[inline(always)]
     pub(super) fn get(&self, lane: usize) -> WheelPose {
         WheelPose {

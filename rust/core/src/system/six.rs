@@ -17,7 +17,7 @@ pub(super) type Six<T> = [T; SIX];
 /// A matrix by its columns.
 pub(super) type Square<T> = [Six<T>; SIX];
 
-/// Of a linear and an angular part.
+/// Joins a linear and an angular part.
 #[inline(always)]
 pub(super) fn join<T: Lane>(linear: Vec3<T>, angular: Vec3<T>) -> Six<T> {
     [
@@ -67,7 +67,7 @@ pub(super) fn dot<T: Lane>(x: &Six<T>, y: &Six<T>) -> T {
     sum
 }
 
-/// The same with its angular part multiplied by `arm`.
+/// Vector with its angular part multiplied by `arm`.
 #[inline(always)]
 pub(super) fn scaled<T: Lane>(x: &Six<T>, arm: f64) -> Six<T> {
     let arm = x[0].like(arm);

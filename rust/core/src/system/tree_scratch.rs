@@ -48,9 +48,9 @@ pub struct TreeScratch {
     pub(super) system: ContactSystem,
     /// Joints with dry friction, and W's entry of their normals.
     pub(super) friction: Vec<(usize, f64)>,
-    /// Of a machine on soft ground.
+    /// Sand under the machine; none on firm ground.
     pub(super) sand: Option<Box<SandContact<f64>>>,
-    /// Of a machine with closed loops.
+    /// Closed loops of the machine; none if it has none.
     pub(super) loops: Option<Box<Loops<f64>>>,
 }
 
@@ -164,7 +164,8 @@ impl TreeScratch {
         self.loops.as_ref().map_or(&[], |loops| loops.impulses())
     }
 
-    /// The same, to be set by a step that was taken elsewhere.
+    /// Impulses of the rows of the loops, N s and N m s, to be set by a step that was taken
+    /// elsewhere; empty without loops.
     pub(crate) fn loop_impulses_mut(&mut self) -> &mut [f64] {
         self.loops
             .as_mut()
@@ -245,7 +246,7 @@ impl TreeScratch {
         keep(&mut self.joints_middle, &q.joints);
     }
 
-    /// The same at its end.
+    /// Places the bodies at the end of the step.
     #[inline]
     pub(super) fn place_end(&mut self, model: &Model, q: &Configuration) {
         self.kinematics_end.update_for_step(model, q);

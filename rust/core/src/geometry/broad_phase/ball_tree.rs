@@ -136,7 +136,8 @@ impl BallTree {
         self.visit_column_indexed(x, z, |index| visit(self.ball(index as usize)));
     }
 
-    /// The same with the numbers of the balls in the input.
+    /// Visits exactly the balls that the vertical line through (x, z) meets, by their numbers in
+    /// the input.
     pub fn visit_column_indexed(&self, x: f64, z: f64, mut visit: impl FnMut(u32)) {
         let line = Vector3::new(x, 0.0, z);
         self.search(&line, &[0.0, f64::INFINITY, 0.0], |ball| {
@@ -153,7 +154,8 @@ impl BallTree {
         self.search(centre, &reach, |ball| visit(&ball.sphere));
     }
 
-    /// The same with their numbers in the input.
+    /// Visits all balls that come closer than `radius` to `centre`, seen from above, and some more,
+    /// by their numbers in the input.
     pub fn visit_pillar_indexed(
         &self,
         centre: &Vector3<f64>,

@@ -290,7 +290,7 @@ struct Faces {
     incident: Side,
     /// Whether the reference is the second box's.
     is_of_second: bool,
-    /// Of both boxes, m.
+    /// Sum of the bounding radii of both boxes, m.
     size: f64,
 }
 

@@ -50,8 +50,9 @@ pub fn nearest_local(
     through_side(x, half_size, axis, side)
 }
 
-/// The same of a point inside, through one of the sides across an axis: the positive one (1) or the
-/// other (−1).
+/// Surface point straight through one side of a box from a point x inside, the normal into the box
+/// there and the signed distance of x, all in the box's axes. `side`: 1 or −1, for the positive or
+/// the negative side across `axis`.
 #[inline]
 #[must_use]
 pub fn through_side(

@@ -11,11 +11,11 @@ pub(super) const LIES: f64 = 0.1;
 /// An end of a chord.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
-    /// Of the circle, m.
+    /// End point of the chord, on the circle, m.
     pub point: Vector3<f64>,
-    /// Of the line under it, from the line's origin, m.
+    /// Position along the line, from its `start`, of the point under the end of the chord, m.
     pub place: f64,
-    /// Of the circle's point over the line's along the given normal, m.
+    /// Height of the end of the chord over the line, along the given normal, m.
     pub height: f64,
 }
 

@@ -103,7 +103,8 @@ const CLOSE: f64 = 1e-2;
 /// Most times that it does so.
 const MAX_MOVES: usize = 8;
 
-/// The same with normals that are accurate, and continuous, where the shapes touch.
+/// Nearest points of two shapes or, if they overlap, the ends of the shortest way out, with normals
+/// that are accurate and continuous where the shapes touch.
 ///
 /// Let the separation along n be `−d`. Moved by `(d + ε) n`, the shapes are at least ε apart, and
 /// their distance δ has a direction n' with a separation of `δ − (d + ε) n·n' ≥ −d`. At the
@@ -328,7 +329,7 @@ const MOST_FACES: usize = 2 * MOST_VERTICES;
 struct Face {
     corners: [usize; 3],
     normal: Vector3<f64>,
-    /// Of its plane from the origin, m; negative where the origin is outside.
+    /// Distance of the face's plane from the origin, m; negative where the origin is outside.
     distance: f64,
 }
 

@@ -82,7 +82,7 @@ pub fn rim_point_over(
 struct Rim<'a> {
     disc: &'a Disc,
     normal: &'a Vector3<f64>,
-    /// Of the centre, m.
+    /// Height of the disc's centre over the plane, m.
     height: f64,
     rolling: Vec3<f64>,
     /// `|n × s| = |w|`.
@@ -108,7 +108,7 @@ impl<'a> Rim<'a> {
         }
     }
 
-    /// Of a point, m.
+    /// Gap of the rim point of a feature, m.
     #[inline]
     fn gap(&self, feature: usize) -> f64 {
         if self.length <= FLAT {

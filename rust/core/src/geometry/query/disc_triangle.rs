@@ -150,7 +150,8 @@ pub fn point_at_edge(
     end.unwrap_or_else(|| nearest_at_edge(disc, edge, base))
 }
 
-/// The same anywhere along the edge's line.
+/// Rim point over the line of an edge, also beyond the edge's ends, if its normal lies between
+/// those of the faces.
 #[inline]
 #[must_use]
 pub(super) fn rim_point_between(
@@ -315,7 +316,7 @@ fn slope(disc: &Disc, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) -> (f
 struct Slopes {
     /// At τ = 0, and what is added at τ = 1: of `(m × e) · d`, `(m × e) · s` and `m · s`.
     levels: [[f64; 2]; 3],
-    /// Of m², by powers of τ.
+    /// Coefficients of m² in ascending powers of τ.
     squares: [f64; 3],
     radius: f64,
 }

@@ -32,8 +32,9 @@ const ALONG: f64 = 1e-5;
 /// Sine below which the axes of two treads have no common normal worth using.
 const PARALLEL: f64 = 0.1;
 
-/// The same where one of the lines is an edge. Where edges of two outlines cross at less, cutting
-/// off their corner takes 0.025 % of their length at most.
+/// Sine below which two lines, at least one of them an edge, have no common normal worth using.
+/// Where edges of two outlines cross at a smaller angle, cutting off their corner takes 0.025 % of
+/// their length at most.
 const SKEW: f64 = 1e-3;
 
 /// Sine of the angle between a common normal of lines and the direction between the shapes, at

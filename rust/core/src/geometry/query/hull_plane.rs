@@ -48,7 +48,8 @@ pub fn vertices(
     }
 }
 
-/// Of the vertices in a set those that are furthest along directions around a vector.
+/// Vertices of the set `near` (bit k for vertex k) that are furthest along eight directions across
+/// `down`.
 fn outermost(vertices: &[Vector3<f64>], near: u64, down: &Vector3<f64>) -> u64 {
     let along = any_tangent(down);
     let across = down.cross(&along);

@@ -48,7 +48,8 @@ pub fn nearest_local(polytope: &Polytope, x: &Vector3<f64>) -> (Vector3<f64>, Ve
     (point, inward, distance)
 }
 
-/// The same through a face, `distance` (m) from its plane.
+/// Nearest point of a face's plane, unit normal into the polytope and signed distance of a place x,
+/// which is `distance` (m) over the plane, all in the polytope's coordinates.
 #[must_use]
 pub fn through_face(
     face: &PolytopeFace,

@@ -123,7 +123,7 @@ struct Crossing {
     /// Place along the edge of the surface from its start, and along the polytope's, m.
     place: f64,
     own: f64,
-    /// Of the polytope's edge, m.
+    /// Length of the polytope's edge, m.
     length: f64,
 }
 

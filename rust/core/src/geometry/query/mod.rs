@@ -81,7 +81,7 @@ pub struct SurfacePoint {
     pub point: Vector3<f64>,
     /// Unit normal from the ground to the shape.
     pub n: Vector3<f64>,
-    /// Of a disc: its rolling direction where its axle is along n.
+    /// Rolling direction of a disc where its axle is along n; zero for shapes that do not roll.
     pub rolling: Vector3<f64>,
     /// m, negative inside.
     pub gap: f64,
@@ -131,7 +131,7 @@ impl PairPoint {
         }
     }
 
-    /// The same pair in reverse order.
+    /// Exchanges the first and the second shape: reverses the normal.
     #[inline]
     #[must_use]
     pub fn swapped(self) -> Self {

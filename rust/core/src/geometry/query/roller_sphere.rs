@@ -76,7 +76,7 @@ impl<'a> Seen<'a> {
         }
     }
 
-    /// Whether it is in the rectangle.
+    /// Whether the place is in the wheel's rectangle, without its rounding.
     #[inline]
     fn is_inside(&self) -> bool {
         self.depth(Side::Tread) > 0.0 && self.depth(Side::Near) > 0.0

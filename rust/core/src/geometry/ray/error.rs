@@ -5,7 +5,7 @@ use thiserror::Error;
 /// Rays that cannot be cast.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum RayError {
-    /// As many origins as directions are needed.
+    /// Different numbers of origins and directions.
     #[error("directions: needs one for each of the {origins} origins, has {directions}")]
     MismatchedLengths {
         /// Number of origins.

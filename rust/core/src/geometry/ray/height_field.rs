@@ -192,7 +192,9 @@ impl Walk<'_> {
         }
     }
 
-    /// The same of the face that is under the ray between two distances.
+    /// The crossing of the face that is under the ray between the distances `t` and `until`, m.
+    /// `over`: height of the ray over the surface at `t`, m, if it is known; on return that at
+    /// `until`.
     fn cross_face(
         &self,
         cell: [usize; 2],

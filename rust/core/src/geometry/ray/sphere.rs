@@ -25,7 +25,7 @@ pub fn distance(ray: &Ray, sphere: &Sphere, reach: f64) -> Option<f64> {
     (distance >= 0.0 && distance <= reach).then_some(distance)
 }
 
-/// The same with the normal there.
+/// Distance at which a ray hits a sphere within `reach` (m), and the normal there.
 #[inline]
 #[must_use]
 pub fn hit(ray: &Ray, sphere: &Sphere, reach: f64) -> Option<Hit> {

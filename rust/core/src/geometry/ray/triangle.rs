@@ -20,7 +20,7 @@ pub struct Sheared {
 }
 
 impl Sheared {
-    /// Of a ray.
+    /// Shears the coordinates so that a ray is their axis.
     #[inline]
     #[must_use]
     pub fn new(ray: &Ray) -> Self {

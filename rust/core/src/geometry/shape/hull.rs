@@ -12,7 +12,7 @@ pub struct Hull<'a> {
     pub centre: Vector3<f64>,
     /// Rotation from the polytope's axes to the world's.
     pub R: Matrix3<f64>,
-    /// Its vertices, faces and edges.
+    /// Vertices, faces and edges of the hull, about its centroid.
     pub polytope: &'a Polytope,
 }
 

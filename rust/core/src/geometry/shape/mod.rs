@@ -85,7 +85,7 @@ impl PlacedShape<'_> {
         }
     }
 
-    /// The same shape moved by `shift`, m.
+    /// The shape moved by `shift`, m.
     #[must_use]
     pub fn moved(mut self, shift: &Vector3<f64>) -> Self {
         *match &mut self {

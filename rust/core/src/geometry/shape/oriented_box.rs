@@ -38,7 +38,7 @@ impl OrientedBox {
         (middle, self.axis(k), self.half_size[k])
     }
 
-    /// The same with each side moved out by `reach`, m.
+    /// The box with each side moved out by `reach`, m.
     #[inline]
     #[must_use]
     pub fn grown(&self, reach: f64) -> Self {

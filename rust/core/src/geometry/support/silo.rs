@@ -64,7 +64,7 @@ impl Silo {
         self.radius
     }
 
-    /// Its floor.
+    /// Floor of the silo, if there is one.
     #[must_use]
     pub fn floor(&self) -> Option<Floor> {
         self.floor

@@ -45,7 +45,7 @@ impl Area {
         from < to
     }
 
-    /// Its parts between the borders of others.
+    /// Cells into which the borders of other rectangles cut this one.
     #[allow(clippy::needless_pass_by_value)] // an iterator that is cloned
     pub fn cut(&self, others: impl Iterator<Item = Self> + Clone) -> impl Iterator<Item = Self> {
         let borders = [0, 1].map(|axis| {

@@ -49,7 +49,7 @@ pub enum TerrainError {
         /// Largest allowed, m.
         limit: f64,
     },
-    /// As many centres as radii are needed.
+    /// Different numbers of centres and radii.
     #[error("radii: needs one for each of the {centres} centres, has {radii}")]
     MismatchedLengths {
         /// Number of centres.
@@ -115,7 +115,7 @@ pub enum TerrainError {
     NoSuchVertex {
         /// Number of the triangle.
         index: usize,
-        /// What it names.
+        /// Number of the vertex that the triangle names.
         vertex: usize,
         /// How many there are.
         vertices: usize,

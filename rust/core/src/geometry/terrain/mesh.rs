@@ -46,13 +46,12 @@ pub struct TriangleMesh {
     is_closed: bool,
     /// Their bounding boxes, from the first ray on.
     boxes: OnceLock<BoxTree>,
-    /// Where it is not the default.
+    /// Name of the surface's material, if it is not the default.
     material: Option<Arc<str>>,
 }
 
 impl TriangleMesh {
-    /// The same with another material of the surface; see
-    /// [`is_name`](crate::law::materials::is_name).
+    /// Gives the surface the material `name`; see [`is_name`](crate::law::materials::is_name).
     #[must_use]
     pub fn with_material(mut self, name: &str) -> Self {
         self.material = Some(name.into());

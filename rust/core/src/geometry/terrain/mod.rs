@@ -66,7 +66,7 @@ pub const ROCK: &str = "rock";
 pub enum Coverage {
     /// There is ground.
     Known,
-    /// It says nothing of the ground there: there are only things that lie on it.
+    /// The terrain says nothing of the ground there: it only has things that lie on the ground.
     Silent,
     /// The ground is not known at this place (x, z), m.
     Unknown([f64; 2]),
@@ -85,7 +85,8 @@ pub trait Terrain: Send + Sync {
         self.visit_near(&part.centre, part.radius(), visit);
     }
 
-    /// The same of spheres alone.
+    /// Visits every sphere that comes closer than `reach` (m) to `centre` (world, m), with its
+    /// number, as [`Self::visit_near`] does.
     fn visit_spheres(
         &self,
         centre: &Vector3<f64>,
@@ -126,12 +127,12 @@ pub trait Terrain: Send + Sync {
         true
     }
 
-    /// Whether it is a plane and nothing else.
+    /// Whether the terrain is a plane and nothing else.
     fn is_plane(&self) -> bool {
         false
     }
 
-    /// Whether it has pieces of a surface.
+    /// Whether the terrain has pieces of a surface: faces, edges or vertices.
     fn has_surface(&self) -> bool {
         false
     }

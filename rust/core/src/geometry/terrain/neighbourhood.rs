@@ -10,7 +10,7 @@ const ROUNDING: f64 = 1e-6;
 /// A part, and how near it a primitive must come.
 #[derive(Clone, Copy, Debug)]
 pub struct Neighbourhood<'a> {
-    /// Its shape.
+    /// Shape of the part, in coordinates with their origin at `base`.
     pub shape: &'a PlacedShape<'a>,
     /// Centre of the shape, world, m.
     pub centre: Vector3<f64>,
@@ -23,7 +23,8 @@ pub struct Neighbourhood<'a> {
 }
 
 impl<'a> Neighbourhood<'a> {
-    /// Of a shape whose coordinates have their origin at `base` (world, m), at rest.
+    /// Neighbourhood of a part at rest, by its shape in coordinates with their origin at `base`
+    /// (world, m).
     #[must_use]
     pub fn new(shape: &'a PlacedShape<'a>, base: &'a Vector3<f64>, reach: f64) -> Self {
         Self {

@@ -44,7 +44,7 @@ pub struct Rocks {
     pub area: [f64; 2],
     /// Middle of the area (x, z), world, m.
     pub middle: [f64; 2],
-    /// Of sizes and places.
+    /// Seed of the random sizes and places.
     pub seed: u64,
     /// Largest diameter, m.
     pub max_diameter: f64,

@@ -88,7 +88,7 @@ struct Line<'a> {
 }
 
 impl Seams {
-    /// Of parts whose pieces are numbered from `first` on.
+    /// Finds the seams between parts whose pieces are numbered from `first` on.
     pub fn find(parts: &[Arc<dyn Terrain>], first: &[u32]) -> Self {
         let mut seams = Self::default();
         let has_faces = |part: &Arc<dyn Terrain>| part.has_surface() || part.ground().is_some();
@@ -342,7 +342,7 @@ impl<'a> Line<'a> {
         self.rim.start + self.along * place
     }
 
-    /// Its edge as the part has it.
+    /// Edge of the rim as its part has it, before any of it is replaced.
     fn replaced(&self, first: u32) -> Replaced {
         let rim = self.rim;
         Replaced {
@@ -366,8 +366,8 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Of stretches, those parts that bound the free space: of several faces the highest, if it is
-    /// higher than the face that the part itself has there.
+    /// Parts of stretches that bound the free space: of several faces the highest, if it is higher
+    /// than the face that the part itself has there.
     fn bounding(&self, all: &[Stretch]) -> Vec<Stretch> {
         let own = self
             .rim

@@ -50,7 +50,7 @@ impl SoftGround {
         })
     }
 
-    /// The same sand under another surface.
+    /// A layer of this sand under another surface.
     #[must_use]
     pub fn under(&self, surface: Arc<dyn Terrain>) -> Self {
         Self {

@@ -22,12 +22,12 @@ pub struct SphereField {
     ground: Option<Plane>,
     /// The spheres, which are many: nothing else holds them.
     tree: BallTree,
-    /// Where it is not the default.
+    /// Name of the spheres' material, if it is not the default.
     material: Option<Arc<str>>,
 }
 
 impl SphereField {
-    /// The same with another material of the spheres; see [`is_name`](crate::law::materials::is_name).
+    /// Gives the spheres the material `name`; see [`is_name`](crate::law::materials::is_name).
     #[must_use]
     pub fn with_material(mut self, name: &str) -> Self {
         self.material = Some(name.into());

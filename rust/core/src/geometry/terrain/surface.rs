@@ -24,7 +24,7 @@ pub const OVERLAP: f64 = 1e-10;
 /// One side of a plane through an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
-    /// Of any length.
+    /// Normal of the plane, of any length.
     normal: Vector3<f64>,
     offset: f64,
     /// The open side, where `normal · x < offset`; otherwise the closed one.
@@ -91,7 +91,7 @@ impl Face {
         turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
     }
 
-    /// Its corners, world, m; `near` (world, m): a place near them, for accuracy.
+    /// Corners of the face, world, m; `near` (world, m): a place near them, for accuracy.
     #[must_use]
     pub fn corners(&self, near: &Vector3<f64>) -> [Vector3<f64>; 3] {
         let (n, height) = (self.plane.normal(), self.plane.distance(near));
@@ -108,7 +108,7 @@ impl Face {
 /// A convex edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// Where it begins, world, m.
+    /// Start of the edge, world, m.
     pub start: Vector3<f64>,
     /// Unit direction.
     pub along: Vector3<f64>,
@@ -119,8 +119,8 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// As [`Self::has`], with its ends `slack` (m) further out: where a line ends on the edge's
-    /// end, rounding leaves no gap between them.
+    /// Whether a place along the edge belongs to it, as [`Self::has`], with the ends `slack` (m)
+    /// further out: where a line ends on the edge's end, rounding leaves no gap between them.
     #[inline]
     #[must_use]
     pub fn has_within(&self, place: f64, depth: f64, slack: f64) -> bool {
@@ -135,8 +135,8 @@ impl Edge {
         n.cross(&self.along).dot(x)
     }
 
-    /// Whether its faces meet at such an angle that a rim which touches it may have more than one
-    /// place where the gap is greatest among the admissible normals.
+    /// Whether the edge is so sharp that the gap of a rim which touches it may have more than one
+    /// maximum among the admissible normals.
     #[inline]
     #[must_use]
     pub fn is_sharp(&self) -> bool {
@@ -170,7 +170,7 @@ impl Edge {
         low < slack && high > -slack
     }
 
-    /// Where it ends, world, m.
+    /// End of the edge, world, m.
     #[must_use]
     pub fn end(&self) -> Vector3<f64> {
         self.start + self.along * self.length
@@ -227,8 +227,8 @@ pub struct Vertex {
 }
 
 impl Vertex {
-    /// Of its neighbours, given from it, m. Of more than it can keep it keeps those around the unit
-    /// normal n.
+    /// Vertex at `place` (world, m) with edges to its neighbours, which are given from it, m. Of
+    /// more than [`MAX_SPOKES`] neighbours, those around the unit normal n are kept.
     #[must_use]
     pub fn among(
         place: Vector3<f64>,
@@ -309,8 +309,8 @@ pub struct Hinge {
 }
 
 impl Hinge {
-    /// Of the edge from a to b (world, m) between a face with the unit normal `first`, on the side
-    /// of `first × (b − a)`, and one with the unit normal `second`.
+    /// Hinge at the edge from a to b (world, m) between a face with the unit normal `first`, on the
+    /// side of `first × (b − a)`, and one with the unit normal `second`.
     #[inline]
     #[must_use]
     pub fn new(a: &Vector3<f64>, b: &Vector3<f64>, normals: [&Vector3<f64>; 2]) -> Self {

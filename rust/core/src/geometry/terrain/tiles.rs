@@ -47,7 +47,7 @@ pub(in crate::geometry) struct Tiles {
 }
 
 impl Tiles {
-    /// Of a map of `columns` x `rows` heights at a spacing (dx, dz, m).
+    /// Bounds of the tiles of a map of `columns` x `rows` heights (m) at a spacing (dx, dz, m).
     pub(super) fn new(heights: &[f32], [columns, rows]: [usize; 2], spacing: [f64; 2]) -> Self {
         let cells = [columns - 1, rows - 1];
         let [wide, high] = cells.map(|n| n.div_ceil(FIRST));

@@ -36,7 +36,7 @@ impl fmt::Debug for Union {
 }
 
 impl Union {
-    /// Of its parts.
+    /// Joins several terrains into one.
     ///
     /// # Errors
     /// `NoParts`, `SecondPlane`, `SecondSand`, `TooManyPieces`.
@@ -81,7 +81,7 @@ impl Union {
         })
     }
 
-    /// Its parts in the order of their numbers.
+    /// Parts of the union in the order of their numbers.
     #[must_use]
     pub fn parts(&self) -> &[Arc<dyn Terrain>] {
         &self.parts

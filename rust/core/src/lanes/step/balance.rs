@@ -48,7 +48,7 @@ pub(super) struct Energies<T: Lane> {
 }
 
 impl<T: Lane> Default for Energies<T> {
-    /// Of no cluster.
+    /// Energies of no cluster: all lists are empty.
     fn default() -> Self {
         Self {
             before: Vec::new(),

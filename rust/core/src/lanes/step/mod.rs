@@ -49,9 +49,10 @@ use crate::system::sand::SandContact;
 /// Why a lane fell back in its last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fallback {
-    /// It turns too fast for explicit gyroscopic terms.
+    /// The rover turns too fast for explicit gyroscopic terms.
     Turning,
-    /// It has more contacts than a problem, or its ground is unknown.
+    /// The rover has more contacts than slots or a problem hold, a joint may reach both of its
+    /// stops, or the ground is unknown.
     Contact,
     /// The mass matrix has no factor.
     MassMatrix,
@@ -124,7 +125,7 @@ pub struct Block<T: Lane> {
     persists: Vec<T::Mask>,
     /// By cluster: lanes in which the contacts of its group are those of the last step.
     is_same: Vec<T::Mask>,
-    /// Of each velocity, its cluster.
+    /// Cluster of each velocity.
     cluster_of: Vec<usize>,
     start: LaneConfiguration<T>,
     v: Vec<T>,

@@ -15,7 +15,7 @@ pub enum LoopKind {
 }
 
 impl LoopKind {
-    /// Its name in a file.
+    /// Name of the kind in a file.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -30,9 +30,9 @@ impl LoopKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoopDescription {
-    /// Its name.
+    /// Name of the loop.
     pub name: String,
-    /// What it holds together.
+    /// Kind of the loop: what it holds together.
     pub kind: LoopKind,
     /// The first solid, or the solid of the joint that follows.
     pub solid: String,

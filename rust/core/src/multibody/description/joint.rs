@@ -21,13 +21,14 @@ pub enum JointKind {
 }
 
 impl JointKind {
-    /// Whether it has an axis, and the coordinate that springs, limits and couplings act on.
+    /// Whether a joint of this type has an axis, and with it the coordinate that springs, limits
+    /// and couplings act on.
     #[must_use]
     pub fn has_axis(self) -> bool {
         matches!(self, Self::Revolute | Self::Prismatic)
     }
 
-    /// Its name in a file.
+    /// Name of the joint type in a file.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -88,9 +89,9 @@ pub struct DriveDescription {
 pub struct CouplingDescription {
     /// The solid whose joint it follows; must be listed earlier.
     pub joint: String,
-    /// Its rate per unit rate of the other joint; −1 for a differential.
+    /// Rate of the joint per unit rate of the joint that it follows; −1 for a differential.
     pub ratio: f64,
-    /// Its coordinate at the other joint's zero, rad or m; 0 by default.
+    /// Coordinate of the joint at the zero of the joint that it follows, rad or m; 0 by default.
     #[serde(default)]
     pub offset: f64,
 }

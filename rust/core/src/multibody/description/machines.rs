@@ -2,16 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One of several machines: a name for some of the trees.
+/// Machine in a model of several: a named group of the model's trees.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MachineDescription {
-    /// Its name.
+    /// Name of the machine.
     pub name: String,
     /// Name of its first solid, a root. All solids before the first one of the next machine are its
     /// own.
     pub first: String,
-    /// As [`super::ModelDescription::self_contact`], for the trees of this machine.
+    /// Whether parts of one tree of the machine collide with each other, except across a joint.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub self_contact: bool,
 }

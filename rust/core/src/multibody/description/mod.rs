@@ -79,7 +79,7 @@ pub struct ModelDescription {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TagDescription {
-    /// Its name.
+    /// Name of the tag.
     pub name: String,
     /// The solid that carries it.
     pub solid: String,
@@ -96,7 +96,7 @@ pub struct TagDescription {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialDescription {
-    /// Its name, as wheels and shapes state it.
+    /// Name of the material, by which wheels and shapes refer to it.
     pub name: String,
     /// Coulomb's coefficient.
     pub friction: f64,
@@ -142,11 +142,12 @@ pub struct SolidDescription {
     pub axis: Option<[f64; 3]>,
     /// Mass, kg.
     pub mass: f64,
-    /// Its only shape, centred at its mass centre; defines the inertia and the appearance.
+    /// Only shape of the solid, centred at its mass centre; defines the appearance and, by default,
+    /// the inertia.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<Shape>,
-    /// Its shapes, each with a pose, instead of `shape` and `collides`. Optional for a solid with a
-    /// given inertia.
+    /// Shapes of the solid, each with a pose, instead of `shape` and `collides`. Optional for a
+    /// solid with a given inertia.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeDescription>,
     /// Meshes that are drawn in place of its shapes that are not visible. They touch nothing and
@@ -161,11 +162,11 @@ pub struct SolidDescription {
     /// Computed from the shape or the shapes by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia: Option<[f64; 6]>,
-    /// Whether its box or ball collides with the ground and with other bodies. In a solid with
-    /// `shapes` each shape has its own flag.
+    /// Whether `shape` collides with the ground and with other bodies; a disc cannot. In a solid
+    /// with `shapes` each shape has its own flag.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
-    /// Name of the material of that shape; `body` by default.
+    /// Name of the material of `shape`; `body` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
     /// PD gains that hold the joint at a set-point.

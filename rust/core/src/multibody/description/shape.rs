@@ -127,12 +127,12 @@ impl Shape {
     }
 }
 
-/// One of several shapes of a solid.
+/// Shape in the list `shapes` of a solid, with its pose.
 ///
 /// Where shapes overlap, the overlap counts twice: in the mass, in the inertia and in the contacts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapeDescription {
-    /// Its type and dimensions.
+    /// Type and dimensions of the shape.
     #[serde(flatten)]
     pub shape: Shape,
     /// Centre in the solid's frame, m; the origin by default.
@@ -142,20 +142,20 @@ pub struct ShapeDescription {
     /// rad; the identity by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<[f64; 3]>,
-    /// Whether it collides with the ground and with other bodies; all but discs can.
+    /// Whether the shape collides with the ground and with other bodies; a disc cannot.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
     /// Name of its material; `body` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// Its colour: red, green, blue, 0 to 1; by default that of its kind.
+    /// Colour of the shape: red, green, blue, 0 to 1; by default that of its kind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colour: Option<[f64; 3]>,
-    /// Whether it is drawn.
+    /// Whether the shape is drawn; true by default.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub visible: bool,
-    /// Its share of the solid's mass, kg. By default the mass that remains after the specified ones
-    /// is divided by volume.
+    /// Mass of the shape, part of the solid's mass, kg. By default the mass that remains after the
+    /// specified ones is divided by volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
 }
@@ -195,7 +195,8 @@ impl ShapeDescription {
         (self.rotation).map(|turn| *exp_rotation(&turn.into()).to_rotation_matrix().matrix())
     }
 
-    /// Whether it is a disc about an axle through the origin, like a wheel fixed to the solid.
+    /// Whether the shape is a disc about an axle through the origin, like a wheel fixed to the
+    /// solid.
     #[must_use]
     pub fn is_disc_about(&self, axle: &[f64; 3]) -> bool {
         let Shape::Disc { radius } = self.shape else {

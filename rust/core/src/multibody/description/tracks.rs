@@ -12,8 +12,8 @@ use crate::multibody::motor::Motor;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrackDescription {
-    /// Its name, also of its first wheel and of the joint that drives it. The further wheels have
-    /// this name and their number, such as `left_2`.
+    /// Name of the track, of its first wheel and of the joint that drives it. The further wheels
+    /// have this name and their number, such as `left_2`.
     pub name: String,
     /// The solid that carries it.
     pub solid: String,

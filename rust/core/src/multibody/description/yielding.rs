@@ -35,13 +35,13 @@ impl WheelDescription {
         self.relaxation_length = None;
     }
 
-    /// Whether it touches a plane along a line: it has a width, and its edges are not rounded to a
-    /// torus.
+    /// Whether the wheel touches a plane along a line: it has a width, and its edges are not
+    /// rounded to a torus.
     fn stands_on_a_line(&self) -> bool {
         0.5 * self.width.unwrap_or(0.0) > self.rounding.unwrap_or(0.0)
     }
 
-    /// Its tread; `None` for a rigid wheel.
+    /// Tread of the wheel; `None` for a rigid wheel.
     fn tread(&self, share: Share) -> Option<Tread> {
         let radius = self.contact_radius.unwrap_or(self.radius);
         let stated = self
@@ -118,7 +118,8 @@ impl Share {
         [stiffness.min(1e12), (time * stiffness).min(1e12)]
     }
 
-    /// As [`Self::yielding`], of a cylinder that states nothing.
+    /// Stiffness (N/m) and critical damping (N s/m) of a cylinder of a radius (m) with the default
+    /// deflection.
     pub fn of_cylinder(self, radius: f64) -> [f64; 2] {
         self.yielding(DEFLECTION, radius)
     }

@@ -5,9 +5,9 @@ use crate::scalar::Lane;
 /// How a joint follows another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
-    /// Its rate per unit rate of the other joint: 1, rad/m or m/rad.
+    /// Rate of the joint per unit rate of the joint that it follows; dimensionless, rad/m or m/rad.
     pub ratio: f64,
-    /// Its coordinate at the other joint's zero, rad or m.
+    /// Coordinate of the joint at the zero of the joint that it follows, rad or m.
     pub offset: f64,
     /// For a joint further along the path of the joint that it follows: the index of the motion
     /// that the velocity imparts to its carrier, and of the motion that it imparts to everything
@@ -16,7 +16,7 @@ pub struct Coupling {
 }
 
 impl Coupling {
-    /// Its coordinate, rad or m, where the other joint has the coordinate `q`.
+    /// Coordinate of the joint, rad or m, where the joint that it follows has the coordinate `q`.
     #[inline(always)]
     #[must_use]
     pub fn value<T: Lane>(&self, q: T) -> T {

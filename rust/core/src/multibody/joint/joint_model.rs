@@ -53,7 +53,7 @@ pub trait JointModel {
         self.nv()
     }
 
-    /// Whether it displaces its body's origin.
+    /// Whether the joint displaces its body's origin along an axis.
     fn slides(&self) -> bool {
         false
     }

@@ -11,7 +11,7 @@ use crate::scalar::{Lane, Mat3};
 /// A prismatic joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prismatic {
-    /// Its axis, the same in the joint's frame and the body's.
+    /// Axis of the joint, the same in the joint's frame and the body's.
     pub axis: JointAxis,
     /// Index of its displacement (m) in
     /// [`Configuration::joints`](crate::multibody::Configuration::joints).

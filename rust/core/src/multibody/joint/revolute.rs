@@ -12,7 +12,7 @@ use crate::scalar::{Lane, Mat3};
 /// A revolute joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Revolute {
-    /// Its axis, the same in the joint's frame and the body's.
+    /// Axis of the joint, the same in the joint's frame and the body's.
     pub axis: JointAxis,
     /// Index of its angle (rad) in
     /// [`Configuration::joints`](crate::multibody::Configuration::joints).

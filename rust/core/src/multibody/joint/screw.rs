@@ -39,8 +39,8 @@ impl<T: Lane> Motion<T> {
     }
 }
 
-/// The same at the origin of the body that the joint carries; what is `None` is zero, and costs
-/// nothing.
+/// The motion that a unit of a joint velocity imparts to the body that the joint carries, at the
+/// origin of that body. World axes. A part that is `None` is zero, and costs nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Screw<T> {
     /// Angular velocity relative to the carrier.

@@ -13,7 +13,8 @@ use crate::scalar::{Lane, Mat3, Vec3};
 /// A spherical joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Spherical {
-    /// Its index in [`Configuration::rotations`](crate::multibody::Configuration::rotations).
+    /// Index of the joint's rotation in
+    /// [`Configuration::rotations`](crate::multibody::Configuration::rotations).
     pub rotation: usize,
 }
 

@@ -27,7 +27,7 @@ pub struct Body {
     pub motion: usize,
     /// See [`Self::motions`].
     pub n_motions: usize,
-    /// Whether its joint follows another joint.
+    /// Whether the body's joint follows another joint.
     pub is_coupled: bool,
     /// kg.
     pub mass: f64,
@@ -44,7 +44,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Whether its mass centre coincides with its frame's origin.
+    /// Whether the mass centre coincides with the origin of the body's frame.
     #[inline]
     #[must_use]
     pub fn is_centred(&self) -> bool {
@@ -61,7 +61,8 @@ impl Body {
         }
     }
 
-    /// Its joint's motions in [`Kinematics::motions`](crate::multibody::Kinematics::motions).
+    /// Indices of the joint's motions in
+    /// [`Kinematics::motions`](crate::multibody::Kinematics::motions).
     #[inline]
     #[must_use]
     pub fn motions(&self) -> Range<usize> {

@@ -19,9 +19,9 @@ pub(in crate::multibody) struct BodyPose<T> {
 /// A constraint of a machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loop {
-    /// Its name.
+    /// Name of the loop.
     pub name: String,
-    /// What it holds together.
+    /// Kind of the loop: what it holds together.
     pub kind: LoopKind,
     pub(in crate::multibody) closure: Closure,
 }
@@ -59,7 +59,7 @@ pub(in crate::multibody) struct JointReading {
     pub velocity: usize,
     pub ratio: f64,
     pub offset: f64,
-    /// Whether it is an angle.
+    /// Whether the coordinate is an angle.
     pub turns: bool,
 }
 
@@ -75,7 +75,7 @@ pub struct LoopGap {
 }
 
 impl JointReading {
-    /// Of the joint of a body; none if it has no coordinate.
+    /// Reading of a joint's coordinate; `None` if the joint has no coordinate.
     pub(super) fn of(joint: &Joint, joint_velocities: &[usize]) -> Option<Self> {
         let index = joint.coordinate()?;
         let coupling = joint.coupling();

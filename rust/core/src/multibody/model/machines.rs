@@ -9,15 +9,15 @@ use crate::multibody::description::ModelDescription;
 /// What belongs to one of the machines of a model, in the order of its arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MachineSpan {
-    /// Its name.
+    /// Name of the machine.
     pub name: String,
-    /// Its solids.
+    /// Indices of the machine's solids.
     pub solids: Range<usize>,
-    /// Its velocities, and its coordinates in public arrays.
+    /// Indices of the machine's velocities, and of its coordinates in public arrays.
     pub velocities: Range<usize>,
-    /// Its joints.
+    /// Indices of the machine's joints.
     pub joints: Range<usize>,
-    /// Its wheels.
+    /// Indices of the machine's wheels.
     pub wheels: Range<usize>,
 }
 

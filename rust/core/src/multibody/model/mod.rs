@@ -145,7 +145,7 @@ impl Model {
         &self.rubbing
     }
 
-    /// Its closed loops, in description order; none for a tree.
+    /// Closed loops of the model, in description order.
     #[inline]
     #[must_use]
     pub fn loops(&self) -> &[Loop] {
@@ -158,7 +158,7 @@ impl Model {
         self.loops.iter().any(Loop::holds_the_world)
     }
 
-    /// Its machines, in description order; one if the description names none.
+    /// Machines of the model, in description order; one if the description names none.
     #[must_use]
     pub fn machines(&self) -> &[MachineSpan] {
         &self.machines
@@ -238,7 +238,7 @@ impl Model {
         self.mechanism.n_rotations
     }
 
-    /// Whether it is a single tree on a free base, like a rover.
+    /// Whether the model is a single tree on a free base, like a rover.
     #[inline]
     #[must_use]
     pub fn is_free_tree(&self) -> bool {

@@ -72,7 +72,7 @@ pub struct Wheel {
 }
 
 impl Wheel {
-    /// Whether it is not a thin disc.
+    /// Whether the wheel has a width, unlike a thin disc.
     #[inline]
     #[must_use]
     pub fn is_wide(&self) -> bool {
@@ -138,7 +138,7 @@ pub struct Collider {
     pub centre: Vector3<f64>,
     /// Rotation from the collider's axes to the body's.
     pub rotation: Matrix3<f64>,
-    /// Its shape.
+    /// Type and dimensions of the collider's shape.
     pub form: ColliderForm,
 }
 

@@ -13,13 +13,14 @@ pub struct JointProperties {
     pub velocity: usize,
     /// PD gains of its position control.
     pub hold: Hold,
-    /// Its spring, damper, rotor and dry friction, including those of all joints that follow it.
+    /// Spring, damper, rotor and dry friction of the joint, including those of all joints that
+    /// follow it.
     pub passive: Passive,
-    /// Its stops.
+    /// Stops of the joint, if any.
     pub limits: Option<Limits>,
-    /// Its drive, unless it is a wheel's joint.
+    /// Drive of the joint, if any; a wheel's joint has none.
     pub drive: Option<DriveDescription>,
-    /// Whether it has a spring or a damper.
+    /// Whether the joint has a spring or a damper.
     pub is_passive: bool,
 }
 

@@ -8,14 +8,14 @@ use crate::multibody::joint::{Joint, JointModel, free};
 /// Bodies and velocities of a tree: one root and everything it carries.
 #[derive(Clone, Debug)]
 pub struct Tree {
-    /// Its bodies; the first is the root.
+    /// Bodies of the tree; the first is the root.
     pub bodies: Range<usize>,
-    /// Its velocities; those of a free root come first.
+    /// Velocities of the tree; those of a free root come first.
     pub velocities: Range<usize>,
-    /// Whether its root is free. Positions in the tree are then relative to the root's origin,
+    /// Whether the root is free. Positions in the tree are then relative to the root's origin,
     /// otherwise to the world's.
     pub is_free: bool,
-    /// Whether its parts collide with each other, except across a joint.
+    /// Whether parts of the tree collide with each other, except across a joint.
     pub self_contact: bool,
     /// kg.
     pub mass: f64,
@@ -35,9 +35,9 @@ impl Tree {
 /// Velocities and motions of all bodies, from the root outwards, as they are numbered.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Paths {
-    /// Of each body.
+    /// Path of each body.
     pub(super) of: Vec<Path>,
-    /// Of each body, the number of velocities of a free root at the start of its path.
+    /// Number of velocities of a free root at the start of each body's path.
     leads: Vec<usize>,
     pub(super) n_motions: usize,
     pub(super) body_of_velocity: Vec<usize>,
@@ -47,7 +47,7 @@ pub(super) struct Paths {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Path {
     pub(super) velocities: Vec<usize>,
-    /// Of the velocities beyond the lead.
+    /// Motions of the path's velocities without those of a free root.
     pub(super) motions: Vec<usize>,
 }
 

@@ -189,7 +189,7 @@ impl BlockSparseDelassus {
         part
     }
 
-    /// The same pattern with every entry times `factor`.
+    /// Operator with every entry multiplied by `factor`.
     pub(crate) fn scaled(&self, factor: f64) -> Self {
         let mut scaled = self.clone();
         for x in &mut scaled.blocks {
@@ -396,7 +396,7 @@ impl BlockSparseDelassus {
         self.row_starts[i]
     }
 
-    /// The same operator as a dense row-major matrix, 1/kg.
+    /// Dense form of the operator, a row-major `n × n` matrix, 1/kg.
     #[must_use]
     pub fn to_dense(&self) -> Vec<f64> {
         let mut W = Vec::new();

@@ -25,7 +25,7 @@ pub(super) const PLACES: usize = MAX_DENSE + MAX_DRY;
 /// Operators of contacts and dry joints.
 #[derive(Clone, Debug)]
 pub(super) struct DrySystem<T: Lane> {
-    /// Of the contacts.
+    /// Lower triangle of the contacts' `W` by 3 x 3 blocks, row-major, 1/kg: [`block`].
     W: [Block<T>; DENSE_BLOCKS],
     q: [Triple<T>; PLACES],
     /// The row t of W of each joint and the contacts, and the joints, 1/kg.
@@ -44,7 +44,7 @@ pub(super) struct DrySystem<T: Lane> {
     zero: T,
 }
 
-/// What is at the places of the contacts, and of the joints.
+/// Entries at the places of the contacts, and of the joints.
 #[inline(always)]
 fn split<X>(all: &[X; PLACES]) -> (&[X; MAX_DENSE], &[X]) {
     match all.split_first_chunk() {
@@ -53,7 +53,7 @@ fn split<X>(all: &[X; PLACES]) -> (&[X; MAX_DENSE], &[X]) {
     }
 }
 
-/// The same, to be changed.
+/// Mutable entries at the places of the contacts, and of the joints.
 #[inline(always)]
 fn split_mut<X>(all: &mut [X; PLACES]) -> (&mut [X; MAX_DENSE], &mut [X]) {
     match all.split_first_chunk_mut() {

@@ -20,12 +20,12 @@ pub struct Pattern {
     stride: usize,
     /// Velocities that two slots share: `shared[a * n + b]`.
     shared: Vec<usize>,
-    /// Whether it has all entries.
+    /// Whether the pattern has all entries.
     is_whole: bool,
 }
 
 impl Pattern {
-    /// That of contacts along paths over `nv` velocities, a path a slot. None if a path does not
+    /// Pattern of contacts along paths over `nv` velocities, a path a slot. None if a path does not
     /// begin with the base, or if a velocity has other ancestors on another path.
     #[must_use]
     pub fn new(nv: usize, paths: &[Vec<usize>]) -> Option<Self> {
@@ -65,7 +65,7 @@ impl Pattern {
         })
     }
 
-    /// That of `n` slots with all entries of `nv` velocities, those of the base among them.
+    /// Pattern of `n` slots with all entries of `nv` velocities, those of the base among them.
     #[must_use]
     pub fn whole(nv: usize, n: usize) -> Self {
         let joints: Vec<usize> = (0..nv - BASE).collect();
@@ -80,7 +80,7 @@ impl Pattern {
         }
     }
 
-    /// Whether it has all entries, and every slot all velocities.
+    /// Whether the pattern has all entries, and every slot all velocities.
     #[inline(always)]
     #[must_use]
     pub fn is_whole(&self) -> bool {

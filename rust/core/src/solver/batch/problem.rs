@@ -9,10 +9,10 @@ pub(crate) use crate::solver::pivoting::Triple;
 /// Most contacts of a problem.
 pub const MAX_CONTACTS: usize = 32;
 
-/// Most contacts of a problem with `W` itself, and most dry joints beside them.
+/// Most contacts of a problem with `W` itself, besides its dry joints.
 pub const MAX_DENSE: usize = 8;
 
-/// See above.
+/// Most dry joints of a problem with `W` itself.
 pub const MAX_DRY: usize = 10;
 
 /// Most contacts of a problem with factors that is solved with the operator that they give.
@@ -59,9 +59,9 @@ pub struct ContactProblem {
     /// Impulses, N s: those of the last step, and the answer. Of answers that the machine cannot
     /// tell apart one near them is found, or the least one: [`Self::asks_least`].
     pub p: [f64; MAX_UNKNOWNS],
-    /// Impulses from which a solve starts if `has_start`, rather than from those of the last step.
+    /// Impulses, N s, from which a solve starts if `has_start`.
     pub start: [f64; MAX_UNKNOWNS],
-    /// See above.
+    /// Whether a solve starts from `start` rather than from the impulses of the last step.
     pub has_start: bool,
     /// Whether of the answers with the same motion that of least norm is taken.
     pub asks_least: bool,
@@ -92,10 +92,11 @@ pub struct Factored {
     pub diagonal: Vec<[f64; 9]>,
     /// Diagonal of D by contact, along n, t, b, 1/kg; the latter two are equal.
     pub softness: Vec<Triple<f64>>,
-    /// Whether it is solved with the operator itself: at most [`MAX_LARGE`] contacts, of a pattern
-    /// that has all entries.
+    /// Whether the problem is solved with the operator itself: at most [`MAX_LARGE`] contacts, of a
+    /// pattern that has all entries.
     pub is_multiplied: bool,
-    /// What it has more along a normal that nothing moves, 1/kg: that of a joint's dry friction.
+    /// Addition to `Zᵀ Z + D` along the normal of each contact, 1/kg: where nothing moves the
+    /// normal, as with a joint's dry friction; 0 elsewhere.
     pub normal: Vec<f64>,
 }
 
@@ -249,7 +250,7 @@ impl ContactProblem {
         }
     }
 
-    /// Whether it has the factors of its operator.
+    /// Whether the problem has the factors of its operator.
     #[inline(always)]
     #[must_use]
     pub fn is_factored(&self) -> bool {

@@ -72,9 +72,9 @@ pub struct Queue<T: Lane> {
     many: Box<DenseSolver<T, MAX_DENSE, DENSE_BLOCKS>>,
     dry: Box<DrySolver<T>>,
     large: Option<Box<LargeSolver<T>>>,
-    /// Those of problems with factors, by pattern.
+    /// Solvers of problems with factors, by pattern.
     factored: Vec<(Arc<Pattern>, Box<FactoredSolver<T>>)>,
-    /// Problems that wait for a lane of each: [`Kind::index`].
+    /// Problems that wait for a lane of each solver: [`Kind::index`].
     waiting: Vec<VecDeque<usize>>,
     groups: Groups,
 }
@@ -86,12 +86,12 @@ enum Kind {
     Many,
     Dry,
     Large,
-    /// That of a pattern, by its place.
+    /// Solver of a pattern, by its place in `Queue::factored`.
     Factored(usize),
 }
 
 impl Kind {
-    /// That of a problem with the whole operator.
+    /// Kind of solver of a problem with the whole operator.
     fn of_dense(problem: &ContactProblem) -> Self {
         if problem.n_dry > 0 {
             Self::Dry
@@ -102,7 +102,7 @@ impl Kind {
         }
     }
 
-    /// Its place among all.
+    /// Place of the solver among all kinds.
     #[inline(always)]
     fn index(self) -> usize {
         match self {
@@ -119,9 +119,9 @@ impl Kind {
 #[derive(Debug, Default)]
 struct Groups {
     size: usize,
-    /// Problems of each that have not ended.
+    /// Number of problems of each group that have not ended.
     left: Vec<usize>,
-    /// Those without any left, in the order in which they ended.
+    /// Groups without any problem left, in the order in which they ended.
     ready: VecDeque<usize>,
 }
 

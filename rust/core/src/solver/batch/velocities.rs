@@ -400,7 +400,8 @@ pub(super) mod tests {
     use crate::solver::pivoting::rests;
     use proptest::prelude::*;
 
-    /// Of a rover with six wheels of two slots each, four of them steered, on rockers and bogies.
+    /// Pattern of a rover with six wheels of two slots each, four of them steered, on rockers and
+    /// bogies.
     fn pattern() -> Arc<Pattern> {
         let wheels: [&[usize]; 6] = [
             &[6, 7, 8],

@@ -31,9 +31,9 @@ pub(crate) struct Mode<T: Lane> {
     pub a: [T; 2],
     /// `(−e2, e1)`; (1, 0) if sticking, zero if open or without friction.
     pub b: [T; 2],
-    /// Whether it is closed.
+    /// Lanes where the contact is closed.
     pub closed: T::Mask,
-    /// Whether it sticks.
+    /// Lanes where the contact sticks.
     pub stick: T::Mask,
     /// Turning stiffness of the second equation, 1/kg; 1 where `b` is zero.
     pub gamma: T,
@@ -67,7 +67,7 @@ pub(crate) struct Violations<T> {
 const AT_THE_LIMIT: f64 = 1e-9;
 
 impl<T: Lane> Law<T> {
-    /// Sets that of a lane.
+    /// Sets the law of a lane's contact.
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, mu: f64, scales: ContactScales) {
         let [rho_N, rho_T] = scales.modes;
@@ -79,7 +79,7 @@ impl<T: Lane> Law<T> {
         self.mass_squared.set(lane, scales.mass * scales.mass);
     }
 
-    /// That of a contact without data.
+    /// Law of a contact without data: no friction, unit scales.
     #[inline(always)]
     pub(crate) fn new(zero: T) -> Self {
         let one = zero.like(1.0);

@@ -8,7 +8,7 @@ pub(crate) trait Store: Clone + Debug + 'static {
     /// One `X` a contact.
     type Of<X: Copy + Debug>: IndexMut<usize, Output = X> + Clone + Debug;
 
-    /// The same for every contact that there is room for.
+    /// Storage filled with `x` for every contact that there is room for.
     fn filled<X: Copy + Debug>(x: X) -> Self::Of<X>;
 }
 

@@ -16,7 +16,7 @@ pub(crate) trait System<T: Lane, B: Store> {
     /// rover, whose impulses hardly change, collects it step by step: its `α` may be larger.
     const ALPHA: f64 = 1e-8;
 
-    /// The same for a parked rover.
+    /// First `α` for a parked rover, relative to the mean diagonal of `W`: see [`Self::ALPHA`].
     const PARKED_ALPHA: f64 = 1e-6;
 
     /// Smallest `α`, relative to the mean diagonal of `W`, for which the systems are accurate.

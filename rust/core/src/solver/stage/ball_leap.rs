@@ -51,7 +51,7 @@ pub(super) struct Leaping<'a> {
     pub rows: &'a mut [BallRow],
     pub machine: &'a mut [MachineRow],
     pub balls: &'a mut [Ball],
-    /// Of the machine, in its factor coordinates.
+    /// Velocity of the machine due to the impulses, in its factor coordinates.
     pub own: &'a mut [f64],
     /// Where each slab's balls begin; the first of each is fixed.
     pub slabs: &'a [usize],

@@ -77,7 +77,7 @@ fn invert(w: f64) -> f64 {
 pub(super) struct Judged {
     /// Square, (m/s)².
     pub square: f64,
-    /// Of the contact, kg.
+    /// Mass of the contact, kg.
     pub mass: f64,
     /// pᵀu, pᵀq, J.
     pub work: f64,
@@ -179,7 +179,7 @@ impl BallRow {
         self.before = self.p;
     }
 
-    /// As [`crate::law::coulomb::violation`] has it.
+    /// Violation of Coulomb's law, measured as by [`crate::law::coulomb::violation`].
     #[inline(always)]
     pub(super) fn judge(&self, balls: &[Ball]) -> Judged {
         let u = self.velocity(balls);
@@ -250,7 +250,8 @@ impl RollRow {
         self.law.project(&row.n, dot(&row.n, &row.p), s)
     }
 
-    /// As [`BallRow::visit`].
+    /// Solves the law of rolling friction from the impulse extrapolated by `share`; returns the
+    /// square of its change.
     #[inline(always)]
     pub(super) fn visit(&mut self, row: &BallRow, share: f64, balls: &mut [Ball]) -> f64 {
         let w = self.velocity(row, balls);
@@ -267,7 +268,8 @@ impl RollRow {
         dot(&change, &change)
     }
 
-    /// As [`BallRow::take_back`].
+    /// Takes the rolling impulse's part of velocities extrapolated by `share` back; the impulse
+    /// stays.
     #[inline]
     pub(super) fn take_back(&mut self, row: &BallRow, share: f64, balls: &mut [Ball]) {
         let back = std::array::from_fn(|k| -share * (self.s[k] - self.before[k]));
@@ -275,7 +277,7 @@ impl RollRow {
         self.before = self.s;
     }
 
-    /// As [`BallRow::judge`].
+    /// Violation of the law of rolling friction under the row's normal impulse.
     #[inline(always)]
     pub(super) fn judge(&self, row: &BallRow, balls: &[Ball]) -> Judged {
         let w = self.velocity(row, balls);

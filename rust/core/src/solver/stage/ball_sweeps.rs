@@ -136,7 +136,7 @@ pub(super) struct BallSweeps {
     /// The contacts block by block.
     sorted: Vec<u32>,
     next: Vec<usize>,
-    /// Of the machine, in its factor coordinates.
+    /// Velocity of the machine due to the impulses, in its factor coordinates.
     own: Vec<f64>,
     own_before: Vec<f64>,
     data: Magnitudes,

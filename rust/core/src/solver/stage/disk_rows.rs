@@ -72,7 +72,8 @@ impl RollRow {
         }
     }
 
-    /// As [`Row::visit`].
+    /// Solves the law of rolling friction from the impulse extrapolated by `share`; returns the
+    /// square of its change.
     #[inline]
     pub(super) fn visit(&mut self, row: &Row, share: f64, velocity: &mut [Velocity]) -> f64 {
         let start = self.s + share * (self.s - self.before);

@@ -25,7 +25,7 @@ pub(super) struct DiskSweeps {
     /// stands for everything fixed.
     velocity: Vec<Velocity>,
     velocity_before: Vec<Velocity>,
-    /// Of the machine, in its factor coordinates.
+    /// Velocity of the machine due to the impulses, in its factor coordinates.
     own: Vec<f64>,
     own_before: Vec<f64>,
 }

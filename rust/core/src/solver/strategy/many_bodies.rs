@@ -46,7 +46,7 @@ impl<const D: usize> std::fmt::Debug for ManyBodies<'_, D> {
 }
 
 impl<'a, const D: usize> ManyBodies<'a, D> {
-    /// The same problem with `W`.
+    /// Friction-contact problem of the bodies, with `W` assembled.
     fn problem(&self) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled_sparse((self.operator)(), self.q, self.mu)
     }

@@ -9,9 +9,10 @@ use crate::system::grains::{GrainContact, GrainKey};
 /// A contact of a part of the tree with a grain. Its normal points from the grain to the part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GrainTouch {
-    /// Its key among all contacts of grains: the part's code after the grains, then the grain.
+    /// Key among all contacts of grains: the part, as the number of grains plus its code, then the
+    /// grain.
     pub key: GrainKey,
-    /// As a contact of the tree.
+    /// The touch as a contact of the tree.
     pub contact: Contact,
     /// Gap at the start of the step, m.
     pub gap_start: f64,
@@ -28,22 +29,22 @@ impl GrainTouch {
 /// A contact of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CompositeContact {
-    /// Of the grains.
+    /// Contact of a grain with anything but the tree.
     Grains(GrainContact<3>),
-    /// Of the tree, with anything else.
+    /// Contact of the tree with anything but a grain.
     Tree(Contact),
-    /// Between them.
+    /// Contact of the tree with a grain.
     Touch(GrainTouch),
 }
 
 /// Key of a contact, in the order of the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CompositeKey {
-    /// Of the grains.
+    /// Key of a grain's contact with anything but the tree.
     Grains(GrainKey),
-    /// Of the tree.
+    /// Key of the tree's contact with anything but a grain.
     Tree(ContactKey),
-    /// Of a touch.
+    /// Key of a contact of the tree with a grain.
     Touch(GrainKey),
 }
 

@@ -91,8 +91,7 @@ impl<const D: usize> Grains<D> {
         })
     }
 
-    /// The same grains, with those marked (n) kinematic: neither weight nor contact changes their
-    /// velocity.
+    /// Makes the marked grains (n) kinematic: neither weight nor contact changes their velocity.
     ///
     /// # Errors
     /// Another number of marks.
@@ -107,14 +106,14 @@ impl<const D: usize> Grains<D> {
         Ok(Self { kinematic, ..self })
     }
 
-    /// The same grains, which attract each other and what they lie on.
+    /// Adds cohesion: the grains attract each other and what they lie on.
     #[must_use]
     pub fn with_cohesion(self, cohesion: Cohesion) -> Self {
         let cohesion = Some(cohesion);
         Self { cohesion, ..self }
     }
 
-    /// Those that stay.
+    /// Grains that stay, with their new numbers.
     ///
     /// # Errors
     /// None would be left.

@@ -27,7 +27,7 @@ pub struct GrainKey {
 /// A contact of a grain or of a wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GrainContact<const D: usize> {
-    /// Its key from step to step.
+    /// Key of the contact from step to step.
     pub key: GrainKey,
     /// Unit normal, from the second body into the first.
     pub n: SVector<f64, D>,

@@ -40,9 +40,9 @@ pub enum GrainError {
     Overlap {
         /// What they are called.
         noun: &'static str,
-        /// The one of smaller number.
+        /// Index of the first grain, the smaller one.
         first: usize,
-        /// The other.
+        /// Index of the second grain, the larger one.
         second: usize,
         /// Their gap, m: negative.
         value: f64,
@@ -62,7 +62,7 @@ pub enum GrainError {
     WheelIn {
         /// Which wheel.
         wheel: usize,
-        /// What it reaches into, in words.
+        /// Grain, wall or ground that the wheel penetrates, in words.
         what: String,
         /// The gap, m: negative.
         value: f64,

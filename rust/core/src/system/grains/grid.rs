@@ -14,7 +14,7 @@ pub struct Item<const D: usize> {
     pub centre: [f64; D],
     /// m.
     pub radius: f64,
-    /// Its number.
+    /// Number of the grain.
     pub index: u32,
 }
 

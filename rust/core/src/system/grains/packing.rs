@@ -26,7 +26,7 @@ pub struct Packing<const D: usize> {
     /// Sides of the box that they are filled into, m; it is open above, so
     /// that of y does not count.
     pub sides: [f64; D],
-    /// Of radii and places.
+    /// Seed of the random radii and places.
     pub seed: u64,
 }
 

@@ -276,7 +276,7 @@ pub(super) fn embedded<const D: usize>(x: &Vector2<f64>) -> SVector<f64, D> {
     SVector::from_fn(|k, _| if k < 2 { x[k] } else { 0.0 })
 }
 
-/// Its part in the plane.
+/// Part of a vector in the plane: x and y.
 pub(super) fn flat<const D: usize>(x: &SVector<f64, D>) -> Vector2<f64> {
     Vector2::new(x[0], x[1])
 }

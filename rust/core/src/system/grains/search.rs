@@ -27,7 +27,7 @@ pub(super) struct Neighbour<const D: usize> {
 /// A round body as detection sees it.
 #[derive(Clone, Copy)]
 pub(super) struct Seeker<const D: usize> {
-    /// Its name.
+    /// Number of the body in [`GrainKey::a`].
     pub a: u32,
     pub centre: SVector<f64, D>,
     pub radius: f64,

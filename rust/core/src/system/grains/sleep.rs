@@ -107,9 +107,9 @@ pub struct StepTaken<'a, const D: usize> {
     pub q: &'a [f64],
     /// Velocities after it; those of grains that fall asleep become 0.
     pub v: &'a mut [f64],
-    /// Its contacts.
+    /// Contacts of the step.
     pub contacts: &'a [GrainContact<D>],
-    /// Their impulses (D n_c), N s.
+    /// Impulses of the contacts (D n_c), N s.
     pub impulses: &'a [f64],
     /// How many steps have been taken.
     pub count: usize,
@@ -122,7 +122,7 @@ pub struct StepTaken<'a, const D: usize> {
 pub struct Mover<const D: usize> {
     /// m.
     pub centre: SVector<f64, D>,
-    /// Of a ball that holds it, m.
+    /// Radius of a ball about the centre that holds the mover, m.
     pub radius: f64,
     /// Speed of its fastest point, m/s.
     pub speed: f64,
@@ -162,7 +162,7 @@ impl Sleep {
         }
     }
 
-    /// Of the grains that stay.
+    /// Sleep and loads of the grains that stay.
     #[must_use]
     pub fn without(&self, renumbering: &Renumbering) -> Self {
         let dormant = self.dormant.iter();

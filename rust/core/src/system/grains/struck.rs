@@ -78,7 +78,8 @@ where
         std::array::from_fn(|k| own[k])
     }
 
-    /// The same of a grain that ends in a wall or in the ground.
+    /// Adds grain `i` to `struck` if it ends the step in a wall or in the ground and no contact
+    /// with either was forecast. `before`, `after`: velocities at the two ends of the step.
     fn find_struck_fixed(
         &mut self,
         i: usize,

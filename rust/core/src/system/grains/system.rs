@@ -111,7 +111,7 @@ pub struct GrainSystem<'a, const D: usize> {
     pub inputs: &'a [f64],
     /// A force at the machine's origin, N.
     pub pull: SVector<f64, D>,
-    /// Its scratch.
+    /// Scratch of the system.
     pub parts: &'a mut GrainParts<D>,
 }
 
@@ -301,7 +301,7 @@ const fn dimension(dimensions: usize) -> Dimension {
     }
 }
 
-/// Its energy is not audited: frames are those of the start of the step and grains have no
+/// Dynamics without an energy audit: frames are those of the start of the step and grains have no
 /// gyroscopic terms, so a step with θ ≥ ½ is passive by construction.
 impl<const D: usize> Dynamics for GrainSystem<'_, D>
 where
@@ -604,7 +604,7 @@ where
         gap_law(options, contact.gap_start, u_N_before)
     }
 
-    /// Its sweeps end at a loose tolerance, and a pile that bounces needs many.
+    /// Always false: sweeps end at a loose tolerance, and a pile that bounces needs many.
     fn solves_to_the_end(&self) -> bool {
         false
     }

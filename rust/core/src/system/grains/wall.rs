@@ -42,7 +42,7 @@ impl<const D: usize> Wall<D> {
         })
     }
 
-    /// The same wall at time 0, moving at `velocity` (m/s).
+    /// Makes the wall move at `velocity` (m/s) from its place at time 0.
     ///
     /// # Errors
     /// An entry that is not finite or beyond any speed.
@@ -83,7 +83,7 @@ impl<const D: usize> Wall<D> {
         }
     }
 
-    /// Its velocity, m/s.
+    /// Velocity of the wall, m/s.
     #[must_use]
     pub fn velocity(&self) -> SVector<f64, D> {
         self.velocity

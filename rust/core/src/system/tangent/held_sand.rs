@@ -56,7 +56,7 @@ pub(crate) struct HeldSand {
 /// A wheel at the end of a step in sand.
 #[derive(Clone, Debug)]
 pub(super) struct HeldWheel {
-    /// What it begins with.
+    /// Memory and energy of the sand at the start of the step.
     pub memory: Six<f64>,
     pub stored: f64,
     pub wrench: Six<f64>,
@@ -74,7 +74,7 @@ pub(super) struct HeldWheel {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SandError {
     pub residual: Vector6<f64>,
-    /// Of the force at the end, N, with moments at the wheel's radius.
+    /// Size of the wrench at the end, N, with moments at the wheel's radius.
     pub size: f64,
     pub is_touching: bool,
 }

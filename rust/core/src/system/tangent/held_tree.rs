@@ -28,7 +28,7 @@ pub(crate) struct HeldTree {
 pub(super) struct HeldContact {
     pub slope: ContactSlope,
     pub restitution: f64,
-    /// Whether it yields.
+    /// Whether the contact yields.
     pub is_soft: bool,
     /// Index of the joint, of a stop or of dry friction.
     pub joint: Option<usize>,

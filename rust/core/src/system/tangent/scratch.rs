@@ -64,12 +64,13 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) d_mu: T,
     pub(super) d_stiffness: T,
     pub(super) d_damping: T,
-    /// Of each group of clusters, by its first one; and the group of each cluster.
+    /// Correction of each group of clusters, at the index of its first one; and the group of each
+    /// cluster.
     pub(super) corrections: Vec<Correction>,
     pub(super) group_of: Vec<usize>,
-    /// Of a machine with closed loops.
+    /// Closed loops of the machine; none if it has none.
     pub(super) loops: Option<VaryingLoops<T>>,
-    /// Of a machine on soft ground.
+    /// Wheels of the machine in sand; none before the first step on soft ground.
     pub(super) sand: Option<VaryingSand<T>>,
 }
 

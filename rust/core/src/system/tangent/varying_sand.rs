@@ -13,7 +13,7 @@ pub(super) struct VaryingWheel<T: Lane> {
     pub wheel: PlacedWheel,
     pub map: TwistMap<Dual<T>>,
     pub pose: LanePose<Dual<T>>,
-    /// What it begins with: memory and energy of the sand.
+    /// Memory and energy of the sand at the start of the step.
     pub memory: Six<Dual<T>>,
     pub stored: Dual<T>,
     /// Derivative of its wrench by what varies of the soil.

@@ -48,7 +48,7 @@ struct Lowest {
     /// From that place, m.
     point: Vector3<f64>,
     gap: f64,
-    /// Whether it moves as the disc does.
+    /// Whether the disc's motion bounds that of the lowest point; see [`STEADY`].
     is_steady: bool,
 }
 

@@ -27,7 +27,7 @@ pub(super) struct Cells {
     pub places: [[usize; 2]; CELLS],
     /// Place of the wheel's centre from each along x and z, m.
     pub from: [[f64; CELLS]; 2],
-    /// Of [`CORNERS`], m.
+    /// Heights of the [`CORNERS`] of each cell, m.
     pub heights: [[f64; CELLS]; CORNERS.len()],
 }
 

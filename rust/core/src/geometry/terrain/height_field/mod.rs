@@ -47,11 +47,11 @@ pub struct HeightField {
     /// x₀, z₀, m.
     origin: [f64; 2],
     tiles: Tiles,
-    /// Where it is not the default.
+    /// Name of the surface's material, if it is not the default.
     material: Option<Arc<str>>,
 }
 
-/// One of the two faces of a cell.
+/// Face of a cell: the part on one side of its diagonal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::geometry) enum Half {
     /// u ≥ v.
@@ -80,7 +80,7 @@ impl Half {
 type Place = [isize; 2];
 
 impl HeightField {
-    /// The same with another material of the surface; see [`is_name`](crate::law::materials::is_name).
+    /// Gives the surface the material `name`; see [`is_name`](crate::law::materials::is_name).
     #[must_use]
     pub fn with_material(mut self, name: &str) -> Self {
         self.material = Some(name.into());

@@ -8,7 +8,7 @@ pub(super) const HIGH: usize = 1;
 const BEFORE: usize = 2;
 const LEFT: usize = 3;
 
-/// Those at the edges k = 2, 3, 4 of a corner, in the order of
+/// Faces at the edges k = 2, 3, 4 of a corner, in the order of
 /// [`Hinge`](crate::geometry::terrain::surface::Hinge).
 pub(super) const AT_EDGE: [[usize; 2]; 3] = [[BEFORE, LOW], [HIGH, LEFT], [LOW, HIGH]];
 

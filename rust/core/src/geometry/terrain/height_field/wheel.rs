@@ -52,12 +52,12 @@ pub(super) struct Wheel<'a> {
 
 /// A circle of the wheel over the planes at a cell.
 struct Circle<T: Lane> {
-    /// Its lowest points, from the cell's corner, m.
+    /// Lowest points of the circle over each plane, from the cell's corner, m.
     lows: [Vec3<T>; 4],
     /// Heights of its centre and of these points, in units of the normals' lengths, m.
     heights: [T; 4],
     gaps: [T; 4],
-    /// Where it is out of reach.
+    /// Cells where the circle is out of reach, for each plane.
     is_beyond: [T::Mask; 4],
 }
 
