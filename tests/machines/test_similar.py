@@ -81,7 +81,7 @@ MACHINES = {
     "box": (box, {"friction": 0.5}),
     "box that rebounds": (box, {"friction": 0.3, "restitution": 0.4}),
     "cart": (cart, {"time_step": 0.005}),
-    "rover": (lambda: RoverModel.named("open-rover").to_dict(), {}),
+    **{name: (RoverModel.named(name).to_dict, {}) for name in RoverModel.names()},
 }
 
 
@@ -102,7 +102,7 @@ def turned_about(angle: float, x: np.ndarray) -> np.ndarray:
     return np.array([c * x[0] + s * x[2], x[1], c * x[2] - s * x[0]])
 
 
-@pytest.mark.parametrize("name", ["box", "cart", "rover"])
+@pytest.mark.parametrize("name", ["box", "cart", "open-rover"])
 def test_a_world_that_is_turned_about_the_vertical_is_the_same_world(name):
     """The size of a displacement was its largest component, so that what was projected depended on the heading."""
     make, options = MACHINES[name]
