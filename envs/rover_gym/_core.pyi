@@ -191,23 +191,23 @@ class Motor:
 
 @final
 class Machine:
-    """One of the machines of a model, as parts of arrays."""
+    """A machine of a model, with its slices of the model's arrays."""
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the machine."""
     @property
     def solids(self) -> list[str]:
-        """Names of its solids."""
+        """Names of the machine's solids."""
     @property
     def coordinates(self) -> slice:
-        """Its part of coordinates and velocities, such as `Simulation.q`."""
+        """The machine's slice of coordinates and velocities, such as `Simulation.q`."""
     @property
     def joints(self) -> slice:
-        """Its part of arrays with one entry a joint."""
+        """The machine's slice of arrays with one entry a joint."""
     @property
     def wheels(self) -> slice:
-        """Its part of arrays with one entry a wheel, such as `Simulation.wheel_forces`."""
+        """The machine's slice of arrays with one entry a wheel, such as `Simulation.wheel_forces`."""
 
 @final
 class RoverModel:
@@ -276,7 +276,7 @@ class RoverModel:
         """
     @property
     def machines(self) -> dict[str, Machine]:
-        """Its machines by name; one, of the model's own name, unless several were joined."""
+        """Machines of the model by name; one, of the model's own name, unless several were joined."""
     @staticmethod
     def named(name: str) -> RoverModel:
         """Returns a model of the gallery by name.
@@ -3509,7 +3509,7 @@ class SolverReport:
 
     @property
     def status(self) -> Literal["converged", "relaxed", "not_converged", "budget_exhausted"]:
-        """One of "converged", "relaxed", "not_converged" and "budget_exhausted".
+        """Outcome of the solve, "converged", "relaxed", "not_converged" or "budget_exhausted".
 
         "relaxed": the convex relaxation is solved, which differs from Coulomb's law.
         "budget_exhausted": the `budget` is spent, and the best solution found is returned.

@@ -10,6 +10,7 @@ use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
 use super::warm_start::WarmStart;
 use crate::contact::Activation;
+use crate::law::newton_impact::{hovering_height, slow_approach};
 use crate::solver::{SolveReport, SolverOptions};
 
 /// The contact forecast, measured from `q_m`, with the margin within which a resting contact stays
@@ -17,21 +18,13 @@ use crate::solver::{SolveReport, SolverOptions};
 ///
 /// `measured`: seconds after the start of the step at which the gaps are measured.
 pub(super) fn activation(options: &StepOptions, measured: f64) -> Activation {
-    let h = options.time_step;
-    // In one step gravity moves a resting body by g h²/2 and accelerates it by g h.
-    let g = options.gravity.norm();
+    let (g, h) = (options.gravity.norm(), options.time_step);
     Activation {
         lead: options.forecast * h - measured,
-        hover: (0.5 * g * h * h).max(1e-9),
-        slow: slow(options),
+        hover: hovering_height(g, h),
+        slow: slow_approach(g, h),
         margin: 0.0,
     }
-}
-
-/// Normal speed, m/s, up to which no approach is an impact: gravity explains it in two steps, or it
-/// is rounding.
-fn slow(options: &StepOptions) -> f64 {
-    (2.0 * options.gravity.norm() * options.time_step).max(1e-9)
 }
 
 /// Change of the contacts' impulses since the last step, as a fraction of the approach that they
@@ -62,7 +55,7 @@ pub(super) fn find_impacts<S: MechanicalSystem>(
     ws: &mut ScratchOf<S>,
 ) {
     let d = S::DIMENSION.components();
-    let slow = slow(options);
+    let slow = slow_approach(options.gravity.norm(), options.time_step);
     let is_fast = |(u, contact): (&[f64], &S::Contact)| u[0].abs() * system.lever(contact) > slow;
     ws.impact.clear();
     let local = ws.u_before.chunks_exact(d).zip(&ws.contacts);

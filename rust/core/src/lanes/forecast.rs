@@ -1,5 +1,6 @@
 //! Which candidates are contacts, rover by rover.
 
+use crate::law::newton_impact::{hovering_height, slow_approach};
 use crate::scalar::{Lane, LaneMask, Vec3};
 
 /// Which candidates are contacts: [`crate::contact::Activation`] of each rover.
@@ -23,11 +24,11 @@ impl<T: Lane> Forecast<T> {
             #[inline(always)]
             || {
                 let g = gravity.norm();
-                let (h_all, least) = (g.like(h), g.like(1e-9));
+                let h_all = g.like(h);
                 Self {
                     lead: forecast * h - measured,
-                    hover: (g.like(0.5) * g * h_all * h_all).max(least),
-                    slow: (g.like(2.0) * g * h_all).max(least),
+                    hover: hovering_height(g, h_all),
+                    slow: slow_approach(g, h_all),
                 }
             },
         )

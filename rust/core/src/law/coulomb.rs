@@ -66,7 +66,7 @@ pub fn violation<const D: usize>(
 }
 
 /// Impulses below the limit of friction by less than this share slide.
-const AT_THE_LIMIT: f64 = 1e-9;
+pub(crate) const AT_THE_LIMIT: f64 = 1e-9;
 
 /// The law with its coefficient μ.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,27 @@
 //! Newton's impact law `u_N⁺ + e u_N⁻ ≥ 0`, folded into the free velocity
-//! of the friction-contact problem.
+//! of the friction-contact problem, and which approaches are impacts.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+
+use crate::scalar::Lane;
+
+/// Least distance (m) and speed (m/s) that are no rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Normal speed up to which no approach is an impact, m/s: gravity `g` (m/s²) explains it in two
+/// steps of h (s), or it is rounding.
+#[inline(always)]
+#[must_use]
+pub fn slow_approach<T: Lane>(g: T, h: T) -> T {
+    (g.like(2.0) * g * h).max(g.like(ROUNDING))
+}
+
+/// Height within which a resting contact stays closed, m: gravity `g` (m/s²) moves a body as far
+/// in a step of h (s), or it is rounding.
+#[inline(always)]
+#[must_use]
+pub fn hovering_height<T: Lane>(g: T, h: T) -> T {
+    (g.like(0.5) * g * h * h).max(g.like(ROUNDING))
+}
 
 /// `e u_N⁻`, m/s: added to the normal free velocity, it makes the problem's
 /// `u_N` mean `u_N⁺ + e u_N⁻`.

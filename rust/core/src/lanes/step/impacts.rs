@@ -2,6 +2,7 @@
 
 use super::Block;
 use crate::integrator::step_contacts::STEADY;
+use crate::law::newton_impact::slow_approach;
 use crate::scalar::{Lane, LaneMask};
 
 impl<T: Lane> Block<T> {
@@ -9,7 +10,7 @@ impl<T: Lane> Block<T> {
     #[inline(always)]
     pub(super) fn find_impacts(&mut self) {
         let (h, _) = self.time_step();
-        let slow = (h.like(2.0) * self.gravity.norm() * h).max(h.like(1e-9));
+        let slow = slow_approach(self.gravity.norm(), h);
         self.has_impact.fill(T::mask(self.token, 0));
         for &slot in self.contacts.used() {
             let active = self.contacts.slot(slot).active;

@@ -2,6 +2,7 @@
 //! projection of `z = p − ρ u` (Alart and Curnier 1991).
 
 use super::store::Store;
+use crate::law::coulomb::AT_THE_LIMIT;
 use crate::problem::ContactScales;
 use crate::scalar::{Lane, LaneMask};
 
@@ -62,9 +63,6 @@ pub(crate) struct Violations<T> {
     /// `max |v_i|²`, (m/s)².
     pub largest: T,
 }
-
-/// Impulses below the limit of friction by less than this share slide.
-const AT_THE_LIMIT: f64 = 1e-9;
 
 impl<T: Lane> Law<T> {
     /// Sets the law of a lane's contact.

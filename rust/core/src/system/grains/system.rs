@@ -16,7 +16,7 @@ use super::struck_pairs::{MOST_REPETITIONS, Struck};
 use crate::contact::Activation;
 use crate::geometry::Facing;
 use crate::integrator::{Contacting, Dynamics, Forces, Stabilisation, Start, StepOptions};
-use crate::law::newton_impact::rebound_at_gap;
+use crate::law::newton_impact::{rebound_at_gap, slow_approach};
 use crate::planar::{PlanarPoses, PlanarTree};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
@@ -656,7 +656,7 @@ pub(in crate::system) fn gap_law(options: &StepOptions, gap_start: f64, u_N_befo
     if excess < 0.0 && options.stabilisation == Stabilisation::PushOut {
         return PUSHED_OUT * excess / h;
     }
-    let slow = 2.0 * options.gravity.norm() * h;
+    let slow = slow_approach(options.gravity.norm(), h);
     rebound_at_gap(options.restitution, u_N_before, gap_start, (h, slow))
 }
 
