@@ -140,7 +140,9 @@ def test_what_is_too_long() -> None:
 
 
 #: Words with which a comment says nothing where an editor or a page shows it alone.
-LEANS = re.compile(r"(?:That of|Those|The same|Of|Its|It|As|See above|Also|The other|One of|(?:Whether|What|Where) it)\b")
+LEANS = re.compile(
+    r"(?:That of|Those|The same|Of|Its|It|As|See above|Also|The other|One of|(?:Whether|What|Where) it)\b"
+)
 
 DOC = re.compile(r"\s*(?:///|//!|#:) ?(.*)")
 
