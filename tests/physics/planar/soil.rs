@@ -81,7 +81,6 @@ fn collisions_in_free_space_keep_momentum_to_rounding() {
 }
 
 #[test]
-#[ignore = "tests/physics/grains.rs::balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows"]
 fn energy_never_grows_without_restitution() {
     // The default options; sweeps cut short; solved well and without
     // projection; solved coarsely, mostly by the proximal point.
