@@ -6,6 +6,7 @@ from models.robot_files import write
 
 from rover_gym import CommandError, ModelError, Plane, RoverModel, Simulation
 from rover_gym.models import RobotFileWarning, check_statics, read_robot
+from rover_gym.models.import_report import solid_rows
 
 pytest.importorskip("yourdfpy")
 
@@ -271,3 +272,22 @@ def test_a_robot_with_a_caster_brakes_by_its_driven_wheels(tmp_path):
     sim.brake()
     sim.step(200)
     assert np.linalg.norm((sim.q - start)[:3]) < 0.01
+
+
+def test_the_rows_of_a_model_with_two_wheels_on_one_solid_name_it_once() -> None:
+    ball = {"kind": "sphere", "radius": 0.1}
+    body = {"name": "body", "mass": 5.0, "shape": ball}
+    axle = {
+        "name": "axle",
+        "parent": "body",
+        "position": [0.0, -0.1, 0.0],
+        "axis": [0, 0, 1],
+        "mass": 1.0,
+        "shape": ball,
+    }
+    wheel = {"solid": "axle", "axle": [0, 0, 1], "radius": 0.1, "torque_limit": 1.0, "drive_sign": -1.0}
+    wheels = [{"name": name, "deflection": 1e-3, **wheel} for name in ("left", "right")]
+    model = RoverModel.from_dict({"format": 1, "name": "m", "solids": [body, axle], "wheels": wheels})
+    stiffness = 6.0 * 9.81 / 2 / 1e-4
+    assert model.wheel_stiffnesses == pytest.approx([stiffness] * 2)
+    assert solid_rows(model)[1][4] == f"wheel of radius 0.1 m, {stiffness:.2g} N/m, 1 N m"

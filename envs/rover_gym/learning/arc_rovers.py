@@ -24,7 +24,7 @@ from rover_gym.policy.evaluation import EvaluatedEpisode, drive_all
 from rover_gym.policy.rover_view import LARGEST
 from rover_gym.policy.scan_policy import ScanPolicy
 
-#: Steps of a scan's byte to a metre.
+#: Steps of a scan's byte for each unit of a feature.
 STEPS = 127.0 / LARGEST
 
 Labels = dict[str, npt.NDArray[Any]]

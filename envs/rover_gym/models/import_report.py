@@ -66,7 +66,7 @@ def solid_rows(model: RoverModel) -> tuple[tuple[str, str, str, float, str], ...
     """Name, joint, carrier, mass (kg) and role of every solid of a model."""
     description = model.to_dict()
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
-    stiffnesses = dict(zip(wheels, model.wheel_stiffnesses, strict=True))
+    stiffnesses = dict(zip((wheel["solid"] for wheel in description["wheels"]), model.wheel_stiffnesses, strict=True))
     steered: dict[str, list[str]] = {}
     for wheel in description["wheels"]:
         if wheel.get("steering"):

@@ -294,7 +294,6 @@ fn flat_shapes_rest(supports: &[Support], n_places: usize, every: usize) {
 
 /// A straight line of a body along an edge touches it at both ends of what they share.
 #[test]
-#[ignore = "tests/physics/surfaces/supports.rs::a_flat_shape_rests_half_over_an_edge_and_on_two_walls"]
 fn what_lies_along_two_edges_rests_in_the_slot_between_them() {
     let in_slot = |radius: f64| (radius * radius - 0.01).sqrt();
     let along = [QUARTER, 0.0, 0.0];
