@@ -17,7 +17,7 @@ class Registration:
     """The registration of one environment with Gymnasium.
 
     Attributes:
-        entry_point: The environment's class, or the function that makes it, as "module:name".
+        entry_point: The function that makes the environment, as "module:name".
         vector_entry_point: The same of the vector environment.
         max_episode_steps: Steps until truncation.
         arguments: Keyword arguments that differ from the class's defaults.
@@ -35,6 +35,12 @@ def _rover(arguments: Mapping[str, Any]) -> Registration:
     return Registration(*makers, MAX_EPISODE_STEPS, arguments)
 
 
+def _task(name: str, max_episode_steps: int, arguments: Mapping[str, Any]) -> Registration:
+    """The registration of a class of `rover_gym.policy`, by the name of its makers."""
+    makers = "rover_gym.policy.makers"
+    return Registration(f"{makers}:make_{name}_rover", f"{makers}:make_{name}_vector", max_episode_steps, arguments)
+
+
 ENVIRONMENTS: Mapping[str, Registration] = {
     "Rover-v0": _rover({}),
     "RoverRocks-v0": _rover({"terrain": "rocks"}),
@@ -47,16 +53,10 @@ ENVIRONMENTS: Mapping[str, Registration] = {
         {"waypoints": 5, "goal_distance": (4.0, 8.0)},
     ),
     "RoverBattery-v0": _rover({"terrain": "rocks", "goal_distance": (10.0, 14.0), "battery": 7000.0}),
-    "RoverCommand-v0": Registration(
-        "rover_gym.policy:RoverCommandEnv", "rover_gym.policy:RoverCommandVectorEnv", MAX_COMMANDS
-    ),
-    "RoverArcs-v0": Registration(
-        "rover_gym.policy:RoverArcsEnv", "rover_gym.policy:RoverArcsVectorEnv", MAX_ARCS, {"terrain": "rocks"}
-    ),
-    "RoverGoal-v0": Registration("rover_gym.policy:RoverGoalEnv", "rover_gym.policy:RoverGoalVectorEnv", MAX_COMMANDS),
-    "RoverTrap-v0": Registration(
-        "rover_gym.policy:RoverTrapEnv", "rover_gym.policy:RoverTrapVectorEnv", MAX_TRAP_STEPS
-    ),
+    "RoverCommand-v0": _task("command", MAX_COMMANDS, {}),
+    "RoverArcs-v0": _task("arcs", MAX_ARCS, {"terrain": "rocks"}),
+    "RoverGoal-v0": _task("goal", MAX_COMMANDS, {}),
+    "RoverTrap-v0": _task("trap", MAX_TRAP_STEPS, {}),
     "RoverGrains-v0": Registration("rover_gym.sensors:make_grains_rover", "rover_gym.vector:make_grains_vector"),
 }
 

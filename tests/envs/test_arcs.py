@@ -81,6 +81,20 @@ def test_a_vector_gives_the_bits_of_single_environments(mode: str, model: str | 
     assert ends >= 2 * n
 
 
+def test_readings_of_sensors_stand_beside_the_entries_of_the_observation() -> None:
+    plain = gym.make("RoverArcs-v0")
+    env = gym.make("RoverArcs-v0", sensors=[{"LaserScanner": {"name": "laser", "rays": 5}}])
+    seen, own = env.reset(seed=2)[0], plain.reset(seed=2)[0]
+    for arc in (12, 44, None):
+        assert seen.keys() == own.keys() | {"laser"}
+        assert env.observation_space.contains(seen)
+        for key, part in own.items():
+            np.testing.assert_array_equal(seen[key], part)
+        if arc is not None:
+            assert env.get_wrapper_attr("expert_action")() == plain.get_wrapper_attr("expert_action")()
+            seen, own = env.step(arc)[0], plain.step(arc)[0]
+
+
 def test_the_expert_drives_to_the_goal_as_the_planner_does() -> None:
     env = RoverArcsEnv(terrain="rocks", difficulty=1.0)
     seen, _ = env.reset(seed=4)

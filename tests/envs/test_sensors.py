@@ -147,6 +147,21 @@ def test_snapshots_carry_the_sensors() -> None:
     assert other.snapshot().env.random_state == before.env.random_state
 
 
+def test_readings_are_added_to_readings() -> None:
+    """The sensors of the inner wrapper became part of `state`."""
+    inner, outer = WheelEncoders(gain=(0.9, 1.1)), HeadingSensor(noise_deg=1.0)
+    env, other = (
+        SensorObservation(gym.make("Rover-v0", sensors=[inner]), [outer]),
+        gym.make("Rover-v0", sensors=[inner]),
+    )
+    both, one = env.reset(seed=1)[0], other.reset(seed=1)[0]
+    for action in [*actions(3), None]:
+        assert both.keys() == {"state", "encoders", "heading"}
+        same(one, {name: both[name] for name in one})
+        if action is not None:
+            both, one = env.step(action)[0], other.step(action)[0]
+
+
 def test_encoders_are_exact_by_default() -> None:
     """The documentation calls the defaults ideal, but encoders counted 4096 ticks a turn."""
     env = SensorObservation(RoverEnv(), [WheelEncoders()])
@@ -418,6 +433,13 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: gym.make("Rover-v0", sensors=[DepthCamera(mount=Mount(solid="mast"))]), "mount.solid"),
     (lambda: gym.make("Rover-v0", sensors=[InertialUnit(mount=Mount(solid="wheel_FL"))]), "mount.solid"),
     (lambda: SensorObservation(gym.make("CartPole-v1"), NOISY), "env"),
+    (lambda: SensorVectorObservation(gym.make_vec("CartPole-v1", 1), NOISY), "env"),
+    (lambda: gym.make("RoverArcs-v0", sensors=[WheelEncoders(), LaserScanner()]), "sensors[1].name"),
+    (lambda: gym.make_vec("RoverArcs-v0", 1, sensors=[LaserScanner()]), "sensors[0].name"),
+    (lambda: gym.make("RoverCommand-v0", sensors=["imu"]), "sensors[0]"),
+    (lambda: gym.make_vec("RoverGoal-v0", 1, sensors=[]), "sensors"),
+    (lambda: gym.make_vec("RoverTrap-v0", 1, sensors=[WheelEncoders(rate=7.0)]), "sensors[0].rate"),
+    (lambda: SensorObservation(gym.make("Rover-v0", sensors=[WheelEncoders()]), [WheelEncoders()]), "sensors[0].name"),
 ]
 
 

@@ -35,15 +35,20 @@ def same(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
         np.testing.assert_array_equal(ours[name], part, err_msg=name)
 
 
-def test_same_step_autoreset_was_refused_with_sensors() -> None:
+@pytest.mark.parametrize("name", ["Rover-v0", "RoverCommand-v0", "RoverArcs-v0", "RoverGoal-v0"])
+def test_same_step_autoreset_was_refused_with_sensors(name: str) -> None:
     """The final readings were lost; they are those of a `SyncVectorEnv`."""
-    arguments: dict[str, Any] = {"max_episode_steps": LIMIT, "sensors": SENSORS}
-    ours = gym.make_vec("Rover-v0", 2, autoreset_mode="SameStep", **arguments)
+    sensors = [*SENSORS[::2], LaserScanner(name="laser", rays=5, dropout=(0.1, 0.3))]
+    arguments: dict[str, Any] = {"max_episode_steps": LIMIT, "sensors": sensors}
+    ours = gym.make_vec(name, 2, autoreset_mode="SameStep", **arguments)
     mode = {"autoreset_mode": gym.vector.AutoresetMode.SAME_STEP}
-    theirs = gym.make_vec("Rover-v0", 2, vectorization_mode="sync", vector_kwargs=mode, **arguments)
+    theirs = gym.make_vec(name, 2, vectorization_mode="sync", vector_kwargs=mode, **arguments)
+    assert ours.single_observation_space == theirs.single_observation_space
     same(ours.reset(seed=4)[0], theirs.reset(seed=4)[0])
+    ours.action_space.seed(2)
     ended = 0
-    for action in actions(2 * LIMIT + 1, 2):
+    for _ in range(2 * LIMIT + 1):
+        action = ours.action_space.sample()
         first, second = ours.step(action), theirs.step(action)
         same(first[0], second[0])
         for k in (1, 2, 3):

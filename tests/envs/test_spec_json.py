@@ -25,7 +25,7 @@ from rover_gym.env.spec_json import as_json, terrain_from_json
 from rover_gym.mechanics import SoftGround
 from rover_gym.registration import ENVIRONMENTS
 from rover_gym.sand import named_soil
-from rover_gym.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner, Mount, WheelEncoders
+from rover_gym.sensors import ColourCamera, DepthCamera, HeadingSensor, InertialUnit, LaserScanner, Mount, WheelEncoders
 
 HILL = np.outer(np.hanning(40), np.hanning(40))
 HOLE = np.where(HILL > 0.9, np.nan, HILL)
@@ -55,6 +55,10 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
     "soil": {"terrain": "sand", "soil": [named_soil("grc-1").having(density=1500.0)]},
     "map": {"terrain": GROUNDS["spheres"], "height_scan": (3, 2, np.float64(0.3)), "heading_deg": np.float32(10.0)},
 }
+
+
+class OwnSensor(HeadingSensor):
+    """A sensor that is not of the package."""
 
 
 def through_json(spec: EnvSpec | None) -> EnvSpec:
@@ -91,6 +95,20 @@ def test_the_spec_of_each_environment_comes_back(name: str) -> None:
     spec = gym.make(name).spec
     made = gym.make(through_json(spec)).spec
     assert made.to_json() == spec.to_json()  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_the_spec_of_each_environment_keeps_its_sensors(name: str) -> None:
+    """Those that drive by commands and arcs, and the one with the trap, took no sensors."""
+    sensors = [InertialUnit(rate=10.0, gyroscope_noise=1e-3), LaserScanner(name="laser", rays=6)]
+    for make in (gym.make, gym.make_vec):
+        spec = make(name, sensors=sensors).spec
+        made: Any = make(through_json(spec))
+        assert {"imu", "laser"} < set(made.observation_space)
+        assert made.spec.to_json() == spec.to_json()  # type: ignore[union-attr]
+        own = make(name, sensors=[OwnSensor(name="own")]).spec
+        with refused(OptionError, "sensors[0]"):
+            own.to_json()  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("name", GROUNDS)

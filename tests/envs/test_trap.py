@@ -26,6 +26,7 @@ from rover_gym.policy import (
 from rover_gym.policy import trap_env as trap
 from rover_gym.policy.comparison import other_ends
 from rover_gym.policy.evaluation import drive_each
+from rover_gym.sensors import HeadingSensor, InertialUnit
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +87,16 @@ def test_an_evaluation_counts_rovers_that_come_free() -> None:
     summary = summarise("scan", episodes)
     assert summary.successes == ends.count("free") + ends.count("goal")
     assert other_ends([summary]) == [] or "free" not in other_ends([summary])[0]
+
+
+def test_who_is_trapped_has_sensors() -> None:
+    arguments: dict[str, Any] = {"sensors": [InertialUnit(gyroscope_noise=1e-3)], "max_episode_steps": 2}
+    ours, theirs = (gym.make_vec("RoverTrap-v0", 1, vectorization_mode=mode, **arguments) for mode in (None, "sync"))
+    first, second = ours.reset(seed=4)[0], theirs.reset(seed=4)[0]
+    for action in np.linspace(-1.0, 1.0, 4 * 12, dtype=np.float32).reshape(4, 1, 12):
+        assert first.keys() == second.keys() == {"state", "imu"}
+        assert all(first[name].tobytes() == second[name].tobytes() for name in first)
+        first, second = ours.step(action)[0], theirs.step(action)[0]
 
 
 def test_a_goal_beside_the_trap_is_a_success_too(env: RoverTrapEnv) -> None:
@@ -171,6 +182,31 @@ def test_it_is_the_wrapper_around_the_rover() -> None:
         assert one[1:] == other[1:]
 
 
+def test_sensors_are_sampled_while_a_command_is_held() -> None:
+    """A `SensorObservation` took one sample a command: means over 0.3 s, and late by up to a command."""
+    sensors = [
+        InertialUnit(gyroscope_noise=1e-3),
+        InertialUnit(name="slow", rate=10.0, latency=(0.05, 0.2)),
+        HeadingSensor(rate=5.0, noise_deg=0.3),
+    ]
+    command, held = np.array([0.5, 0.4, 0.0], np.float32), 7
+    env = gym.make("RoverCommand-v0", sensors=sensors, repeat=held)
+    rover = gym.make("Rover-v0", sensors=sensors)
+    controller = CommandController(rover.unwrapped)  # type: ignore[arg-type] # a RoverEnv
+    seen, stepped = env.reset(seed=2)[0], rover.reset(seed=2)[0]
+    for _ in range(3):
+        assert seen.keys() == stepped.keys()
+        assert all(seen[name].tobytes() == stepped[name].tobytes() for name in ("imu", "slow", "heading"))
+        seen = env.step(command)[0]
+        for _ in range(held):
+            stepped = rover.step(controller.act(stepped["state"][None], command[None])[0])[0]
+    plain = gym.make("RoverCommand-v0", repeat=held)
+    plain.reset(seed=2)
+    for _ in range(3):
+        features = plain.step(command)[0]
+    assert features.tobytes() == seen["state"].tobytes()
+
+
 def test_an_episode_ends_after_a_minute_of_commands() -> None:
     envs: Any = gym.make_vec("RoverCommand-v0", 2, goal_distance=50.0, threads=1, time_step=0.025)
     envs.reset(seed=0)
@@ -242,18 +278,19 @@ def test_it_keeps_the_contract_of_a_goal_env(reward_type: Any, raw: bool) -> Non
     env: Any = (
         GoalObservation(gym.make("Rover-v0", **arguments), reward_type)
         if raw
-        else gym.make("RoverGoal-v0", reward_type=reward_type, **arguments)
+        else gym.make("RoverGoal-v0", reward_type=reward_type, sensors=[HeadingSensor()], **arguments)
     )
-    while not hasattr(env, "compute_reward"):  # Gymnasium's own wrappers do not pass it on
-        env = env.env
+    goal_env = env
+    while not hasattr(goal_env, "compute_reward"):  # other wrappers do not pass it on
+        goal_env = goal_env.env
     ends = 0
     for _, seen, reward, terminated, info in driven(env, 60):
-        assert set(seen) == {"observation", "achieved_goal", "desired_goal"}
+        assert set(seen) == {"observation", "achieved_goal", "desired_goal"} | (set() if raw else {"heading"})
         assert seen in env.observation_space
         goals = seen["achieved_goal"], seen["desired_goal"]
-        assert reward == env.compute_reward(*goals, info)
-        assert terminated == env.compute_terminated(*goals, info)
-        assert not env.compute_truncated(*goals, info)
+        assert reward == goal_env.compute_reward(*goals, info)
+        assert terminated == goal_env.compute_terminated(*goals, info)
+        assert not goal_env.compute_truncated(*goals, info)
         assert info["distance_to_goal"] == pytest.approx(np.hypot(*(goals[0] - goals[1])))
         ends += terminated
     assert ends or raw
@@ -314,6 +351,7 @@ def test_what_it_cannot_do_is_refused() -> None:
         (lambda: RoverGoalEnv(reward_type="rich"), "reward_type"),  # type: ignore[arg-type]
         (lambda: GoalObservation(gym.wrappers.FrameStackObservation(gym.make("Rover-v0"), 2)), "env.observation_space"),
         (lambda: GoalObservation(RoverGoalEnv()), "env.observation_space"),
+        (lambda: DriveByCommand(gym.make("Rover-v0", sensors=[HeadingSensor()])), "env.observation_space"),
     ):
         with refused(OptionError, field):
             make()

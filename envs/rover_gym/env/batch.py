@@ -5,7 +5,7 @@ rovers and threads. Each control period is one call of the compiled core: the th
 its observation, reward and termination.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Unpack
@@ -166,6 +166,7 @@ class RoverBatch:
         self._difficulties: list[Range | None] = [None] * self.n
         self._begun = np.zeros(self.n, np.bool_)
         self._started = False
+        self._watchers: list[Callable[[Mask], None]] = []
 
     def make_task(self, given: Mapping[str, Any]) -> Task:
         """The task of checked arguments."""
@@ -318,20 +319,28 @@ class RoverBatch:
                 if not beyond.any():
                     raise
                 stepped = self.episodes.step(actions, active, has_scan=has_scan, among=self.movers)
-        moved = slice(None) if active is None else np.asarray(active)
+        moved = np.ones(self.n, np.bool_) if active is None else np.asarray(active)
         self._clipped[moved] = 0 if beyond is None else beyond[moved]
         if before is not None:
-            self._earn(before, actions, stepped, np.ones(self.n, np.bool_) if active is None else np.asarray(active))
+            self._earn(before, actions, stepped, moved)
+        for watcher in self._watchers:
+            watcher(moved)
         return stepped
 
-    def step_on(
-        self,
-        actions: object,
-        *,
-        same_step: bool,
-        has_scan: bool = True,
-        at_end: Callable[[Collection[int]], None] = lambda _resting: None,
-    ) -> tuple[Stepped, Finals]:
+    @contextmanager
+    def watched(self, watcher: Callable[[Mask], None]) -> Iterator[None]:
+        """Calls a function at the end of each control period, before next episodes begin.
+
+        Args:
+            watcher: The function. It takes the mask `(n,)` of the rovers that have moved.
+        """
+        self._watchers.append(watcher)
+        try:
+            yield
+        finally:
+            self._watchers.remove(watcher)
+
+    def step_on(self, actions: object, *, same_step: bool, has_scan: bool = True) -> tuple[Stepped, Finals]:
         """Applies actions for one control period; rovers whose episode is over start the next.
 
         Args:
@@ -339,7 +348,6 @@ class RoverBatch:
             same_step: Whether an episode is followed by the next in the step that ends it. If not, the next one begins
                 in the following step, in which its rover does not move and earns nothing.
             has_scan: As of `step`.
-            at_end: Called at the end of the period, before the next episodes begin, with the rovers that have rested.
 
         Returns:
             What `step` returns, and with `same_step` the last observations and infos of the episodes that have ended.
@@ -358,7 +366,6 @@ class RoverBatch:
             drawn = self.draw(starting)
             active = np.isin(np.arange(self.n), starting, invert=True)
         stepped = self.step(actions, active, has_scan=has_scan)
-        at_end(starting)
         observation, rewards, terminated, truncated, over = stepped
         if drawn is not None:
             self.begin(drawn)

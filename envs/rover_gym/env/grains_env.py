@@ -259,7 +259,8 @@ class RoverGrainsEnv(RoverEnv):
     ## Observation
 
     `wheel_gap` and `wheel_contact` count grains as ground. The forces of a wheel are sums over all grains and ground
-    that it touches. There is no height scan.
+    that it touches. There is no height scan. With `gymnasium.make(..., sensors=[...])` cameras and scanners see the
+    grains.
 
     ## Start
 

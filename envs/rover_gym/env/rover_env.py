@@ -118,7 +118,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ## Sensors
 
     `gymnasium.make(..., sensors=[...])` adds readings of encoders, motors, an inertial unit, cameras and scanners: the observation
-    is then a `Dict` with this one as `state` (`docs/sensors.md`).
+    is then a `Dict` with this one as `state` (`docs/sensors.md`). All registered environments take `sensors`.
 
     ## Reward
 

@@ -83,6 +83,9 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
 
     The clocks are the memory of `ScanPolicy`, which the environment updates. A backward arc begins a retreat, too.
 
+    `gymnasium.make(..., sensors=[...])` adds an entry for each sensor, by its name; a `LaserScanner` needs another name
+    than "scan". Sensors are sampled every control period, also while an arc is held.
+
     ## Reward
 
     The sum over the held periods of `Rover-v0`'s reward; `info["reward_terms"]` has the terms of the last of them.

@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.batch import BatchSnapshot
+from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.observation import Array, Mask, Observations
 from rover_gym.env.play_keys import keys_to_action
 from rover_gym.env.rover_env import RoverEnv
@@ -115,13 +116,13 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
     environments. The height scan is taken once a command, in the last of its steps, and where an episode ends.
 
     Args:
-        env: A `Rover-v0`, wrapped or not.
+        env: A `Rover-v0`, wrapped or not, with its observation.
         repeat: Steps that a command is held.
         pool: Height-scan points per pooling cell, lengthwise and crosswise.
         **limits: Fields of `CommandLimits`.
 
     Raises:
-        OptionError: An argument is out of range.
+        OptionError: An argument is out of range, or `env` has another observation.
     """
 
     def __init__(
@@ -132,6 +133,9 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
         **limits: float,
     ) -> None:
         self._rover = find_rover_env(env)
+        if env.observation_space.shape != self._rover.observation_space.shape:
+            reason = "must be that of Rover-v0; sensors go around this wrapper"
+            refuse(OptionError, "env.observation_space", type(env.observation_space).__name__, reason)
         self._held = HeldCommands(self._rover, 1, repeat=repeat, pool=pool, limits=limits)
         super().__init__(env)
         self.features, self.repeat = self._held.features, self._held.repeat
@@ -157,6 +161,19 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
         (reward,), (terminated,), (truncated,) = self._held.hold(command, np.ones(1, np.bool_), self._step)
         self._info["clipped_actions"] = int(_n_clipped(command)[0])
         return self._held.observe()[0], float(reward), bool(terminated), bool(truncated), self._info
+
+    def snapshot(self) -> EnvSnapshot:
+        """Returns the state of the rover, as `RoverEnv.snapshot`."""
+        return self._rover.snapshot()
+
+    def restore(self, snapshot: EnvSnapshot) -> None:
+        """Restores a snapshot, as `RoverEnv.restore`.
+
+        Raises:
+            StateError: As `RoverEnv.restore`; nothing has changed.
+        """
+        self._rover.restore(snapshot)
+        self._held.seen = self._rover.progress.observation[None]
 
     def _step(self, actions: Observations, _: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
         """A step of the environment as one of a batch of one."""
@@ -385,6 +402,9 @@ class RoverCommandEnv(DriveByCommand):
     `Box(-5, 5, (size,), float32)`: the features of `rover_gym.policy.Features`, which leave out place, heading and
     wheel angles and give the goal as direction and distance. With `height_scan` the highest points of cells of `pool`
     by `pool` scan points follow, over the plane of the ground.
+
+    With `gymnasium.make(..., sensors=[...])` the features are `state`, beside the readings, as in `Rover-v0`. Sensors
+    are sampled every control period, also while a command is held.
 
     ## Reward
 

@@ -231,6 +231,9 @@ class RoverGoalEnv(GoalObservation):
     | achieved_goal | `Box((2,), float64)`     | x and z of the trunk's origin on the map, m                          |
     | desired_goal  | `Box((2,), float64)`     | x and z of the goal, m                                               |
 
+    `gymnasium.make(..., sensors=[...])` adds an entry for each sensor, by its name. Sensors are sampled every control
+    period, also while a command is held.
+
     ## Reward
 
     `compute_reward(achieved_goal, desired_goal, info)`: with `reward_type="sparse"` 1 within `goal_tolerance` of the

@@ -144,7 +144,7 @@ class TrapBatch(RoverBatch):
 class RoverTrapEnv(RoverEnv):
     """Bring a rover free that is stuck on rocks.
 
-    Action, observation and arguments are those of `Rover-v0`, whose card describes them. What differs:
+    Action, observation, sensors and arguments are those of `Rover-v0`, whose card describes them. What differs:
 
     ## Start
 

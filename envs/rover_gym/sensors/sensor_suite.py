@@ -1,7 +1,8 @@
 """The sensors of rovers: when each is sampled, and the wrapper that adds readings to observations."""
 
 import copy
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -11,10 +12,10 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
-from rover_gym.env.batch import BatchSnapshot, RoverBatch
+from rover_gym.env.batch import BatchSnapshot
 from rover_gym.env.env_snapshot import EnvSnapshot
-from rover_gym.env.generators import row_of
 from rover_gym.env.grains_env import RoverGrainsEnv
+from rover_gym.env.observation import Mask
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError, RoverModel, StateError
 from rover_gym.rendering.render_options import RENDER_MODES, check_display
@@ -22,7 +23,7 @@ from rover_gym.sensors.named_sensor import sensor_of
 from rover_gym.sensors.sensor import Array, Moment, Sensor, Values, uniform
 from rover_gym.validation import refuse
 
-#: Key of the environment's own observation.
+#: Key of the environment's own observation, unless that is a dictionary.
 STATE = "state"
 
 #: Distinguishes the sensors' random numbers from the environment's.
@@ -141,8 +142,17 @@ class SensorSuite:
         return {name: own.reading.astype(self.sensors[name].reading_type) for name, own in state.sensors.items()}
 
     def space(self, inner: gym.Space[Any]) -> gym.spaces.Dict:
-        """The space of an environment's observation with the readings."""
-        return gym.spaces.Dict({STATE: inner, **self.spaces})
+        """The space of an environment's observation with the readings.
+
+        Raises:
+            OptionError: The environment's observation is a dictionary that has an entry of a sensor's name.
+        """
+        own = inner.spaces if isinstance(inner, gym.spaces.Dict) else {STATE: inner}
+        for i, name in enumerate(self.spaces):
+            if name in own:
+                reason = f"is an entry of the environment's observation ({', '.join(own)}): name the sensor otherwise"
+                refuse(OptionError, f"sensors[{i}].name", name, reason)
+        return gym.spaces.Dict({**own, **self.spaces})
 
     def check_state(self, state: object) -> SuiteState:
         """Checks that a state belongs to these sensors, and returns a copy.
@@ -175,26 +185,25 @@ class SensedRovers:
         suite: The sensors.
     """
 
-    def set_sensors(self, inner: Any, rover: RoverEnv, n: int, sensors: Sequence[SensorLike]) -> None:
+    def set_sensors(self, inner: Any, rovers: Sequence[RoverEnv], sensors: Sequence[SensorLike]) -> None:
         """Sets the sensors.
 
         Args:
             inner: The environment or the vector whose snapshots are kept.
-            rover: The environment of one rover, read once.
-            n: Number of rovers.
+            rovers: Its rovers, all of one batch.
             sensors: The sensors that each rover has, with different names.
 
         Raises:
             OptionError: A sensor does not fit the rover.
         """
-        self._inner = inner
-        self.suite = SensorSuite(sensors, rover.model, rover.dt)
-        self._states: list[SuiteState | None] = [None] * n
+        self._inner, self._rovers = inner, rovers
+        self.suite = SensorSuite(sensors, rovers[0].model, rovers[0].dt)
+        self._states: list[SuiteState | None] = [None] * len(rovers)
 
     def _state(self, i: int) -> SuiteState:
         state = self._states[i]
         if state is None:
-            raise ResetNeeded(f"{type(self).__name__}: call reset() first")
+            raise ResetNeeded(f"the sensors of rover {i}: call reset() first")
         return state
 
     def snapshot(self) -> SensedSnapshot:
@@ -222,15 +231,26 @@ class SensedRovers:
         self._inner.restore(snapshot.env)
         self._states[:] = states
 
-    def begin_sensors(self, batch: RoverBatch, rovers: Sequence[RoverEnv], chosen: Sequence[int]) -> None:
+    def begin_sensors(self, chosen: Iterable[int]) -> None:
         """Draws the sensors' properties for the rovers whose episodes have begun, and takes their first samples."""
-        for i, row in zip(chosen, batch.generator_rows(chosen), strict=True):
-            self._states[i] = self.suite.begin(moment_of(rovers[i]), row)
+        for i in chosen:
+            rover = self._rovers[i]
+            (row,) = rover.batch.generator_rows([rover.i])
+            self._states[i] = self.suite.begin(moment_of(rover), row)
 
-    def advance_sensors(self, rovers: Sequence[RoverEnv], resting: Collection[int] = ()) -> None:
-        """Takes the samples that are due of the rovers that have moved, which are all but those at rest."""
-        for i, rover in enumerate(rovers):
-            if i not in resting:
+    def sampling(self) -> AbstractContextManager[None]:
+        """A context in which the samples that are due are taken at the end of every control period.
+
+        Raises:
+            ResetNeeded: A rover has not been reset.
+        """
+        for i in range(len(self._states)):
+            self._state(i)
+        return self._rovers[0].batch.watched(self._advance)
+
+    def _advance(self, moved: Mask) -> None:
+        for i, rover in enumerate(self._rovers):
+            if moved[rover.i]:
                 self.suite.advance(self._state(i), moment_of(rover))
 
     def readings_of(self, i: int) -> Readings:
@@ -243,6 +263,11 @@ class SensedRovers:
         return {name: np.stack([one[name] for one in each]) for name in self.suite.spaces}
 
 
+def with_readings(observation: Any, readings: Readings) -> dict[str, Any]:
+    """An environment's observation with readings; a dictionary keeps its entries, anything else is `state`."""
+    return {**(observation if isinstance(observation, dict) else {STATE: observation}), **readings}
+
+
 def moment_of(env: RoverEnv) -> Moment:
     """A rover, for its sensors."""
     simulation, mover = env.simulation, env.mover
@@ -252,14 +277,16 @@ def moment_of(env: RoverEnv) -> Moment:
 class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
     """Observations of a `Dict` space: the environment's own as `state`, and each sensor's reading by its name.
 
-    Readings are float32 in SI units, not scaled. They are taken at the end of a step. Their random numbers are derived
-    from the environment's generator, so a seed gives the same episode with and without sensors, and the same readings.
+    If the environment's own observation is a dictionary, its entries stay as they are, without `state`. Readings are
+    float32 in SI units, not scaled. They are taken at the end of each control period, also while a command is held.
+    Their random numbers are derived from the environment's generator, so a seed gives the same episode with and without
+    sensors, and the same readings.
 
     Example:
         >>> env = SensorObservation(gym.make("Rover-v0"), [InertialUnit(gyroscope_noise=2e-4), DepthCamera()])
 
     Args:
-        env: A `RoverEnv`, or wrappers around one that keep its steps.
+        env: A `RoverEnv`, or wrappers around one, such as `DriveByCommand`.
         sensors: The sensors, with different names.
 
     Raises:
@@ -272,8 +299,10 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
             refuse(OptionError, "env", given, "must be a RoverEnv")
         RecordConstructorArgs.__init__(self, sensors=sensors)
         gym.Wrapper.__init__(self, env)
-        self._rover: RoverEnv = given.unwrapped
-        self.set_sensors(self._rover, self._rover, 1, sensors)
+        inner: Any = env
+        while not hasattr(inner, "snapshot"):
+            inner = inner.env
+        self.set_sensors(inner, [given.unwrapped], sensors)
         self.observation_space = self.suite.space(env.observation_space)
 
     @property
@@ -298,15 +327,14 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts an episode of the environment and draws the sensors' properties."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._states[0] = self.suite.begin(moment_of(self._rover), row_of(self._rover.np_random))
-        return {STATE: observation, **self.readings()}, info
+        self.begin_sensors([0])
+        return with_readings(observation, self.readings()), info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Applies an action, as the environment does, then takes the samples that are due."""
-        state = self.sensor_state
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        self.suite.advance(state, moment_of(self._rover))
-        return {STATE: observation, **self.readings()}, float(reward), terminated, truncated, info
+        """Applies an action, as the environment does; the samples that are due are taken in each control period."""
+        with self.sampling():
+            observation, reward, terminated, truncated, info = self.env.step(action)
+        return with_readings(observation, self.readings()), float(reward), terminated, truncated, info
 
 
 def make_rover(
@@ -316,7 +344,7 @@ def make_rover(
 
     Args:
         sensors: The sensors; None for the environment as it is.
-        make: `RoverEnv` or a subclass.
+        make: `RoverEnv`, a subclass, or a wrapper that makes its own.
         **arguments: Its arguments; with `render_mode="human"` a window shows the frames.
 
     Raises:

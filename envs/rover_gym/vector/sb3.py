@@ -7,7 +7,8 @@ model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 """
 
 import copy
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any, Unpack
 
@@ -23,7 +24,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import check_actions
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, StateError
-from rover_gym.sensors.sensor_suite import STATE, SensedRovers, SensedSnapshot, SensorLike
+from rover_gym.sensors.sensor_suite import SensedRovers, SensedSnapshot, SensorLike, with_readings
 from rover_gym.validation import Range, refuse
 from rover_gym.vector.vector_env import RoverVectorEnv
 
@@ -96,7 +97,7 @@ class RoverVecEnv(VecEnv):
         space: gym.Space[Any] = self.batch.observation_space
         if sensors is not None:
             self._sensed = SensedRovers()
-            self._sensed.set_sensors(self.rovers, self.prototype, self.batch.n, sensors)
+            self._sensed.set_sensors(self.rovers, self.rovers.envs, sensors)
             space = self._sensed.suite.space(space)
         super().__init__(self.batch.n, space, self.batch.action_space)
 
@@ -163,9 +164,8 @@ class RoverVecEnv(VecEnv):
         if waiting := self.batch.over:
             check_actions(self._actions, (self.num_envs, self.batch.task.n_actions))
             self._begin(self.batch.draw(waiting))
-        stepped, finals = self.batch.step_on(
-            self._actions, same_step=True, has_scan=self.has_scan, at_end=self._take_samples
-        )
+        with nullcontext() if self._sensed is None else self._sensed.sampling():
+            stepped, finals = self.batch.step_on(self._actions, same_step=True, has_scan=self.has_scan)
         observation, earned, terminated, timed_out, ended = stepped
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
@@ -173,7 +173,7 @@ class RoverVecEnv(VecEnv):
             last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
             last["terminal_observation"] = seen
             if self._sensed is not None:
-                last["terminal_observation"] = {STATE: seen, **self._sensed.readings_of(i)}
+                last["terminal_observation"] = with_readings(seen, self._sensed.readings_of(i))
             infos[i] = last
         if not self.batch.over:
             self._tell_resets(ended)
@@ -190,14 +190,10 @@ class RoverVecEnv(VecEnv):
         for i in begun:
             self.reset_infos[i] = self.batch.info(i)
         if self._sensed is not None:
-            self._sensed.begin_sensors(self.batch, self.rovers.envs, begun)
-
-    def _take_samples(self, resting: Collection[int]) -> None:
-        if self._sensed is not None:
-            self._sensed.advance_sensors(self.rovers.envs, resting)
+            self._sensed.begin_sensors(begun)
 
     def _observed(self, observation: Observations) -> VecEnvObs:
-        return observation if self._sensed is None else {STATE: observation, **self._sensed.all_readings()}
+        return observation if self._sensed is None else with_readings(observation, self._sensed.all_readings())
 
     def snapshot(self) -> VecEnvSnapshot:
         """Returns the state of all rovers, of their episodes and random generators, for `restore`; picklable.

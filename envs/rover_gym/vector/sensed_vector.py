@@ -1,12 +1,11 @@
 """Vectors of rovers with sensors."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium.vector import AutoresetMode, VectorWrapper
+from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.grains_env import RoverGrainsEnv
@@ -15,7 +14,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_COURSE_STEPS
 from rover_gym.mechanics import OptionError
 from rover_gym.sensors.sensor import Array
-from rover_gym.sensors.sensor_suite import STATE, SensedRovers, SensorLike, SuiteState
+from rover_gym.sensors.sensor_suite import SensedRovers, SensorLike, SuiteState, with_readings
 from rover_gym.validation import refuse
 from rover_gym.vector.vector_env import RoverVectorEnv
 
@@ -24,20 +23,20 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
     """Adds each rover's sensors to its observation, bit for bit as `SensorObservation` does for one rover.
 
     Args:
-        env: A `RoverVectorEnv`; wrappers go around this one.
+        env: A `RoverVectorEnv`, or wrappers around one that keep its resets, such as `CommandVectorEnv`.
         sensors: The sensors that each rover has, with different names.
 
     Raises:
         OptionError: `env` is another environment, or a sensor does not fit the rover.
     """
 
-    def __init__(self, env: RoverVectorEnv, sensors: Sequence[SensorLike]) -> None:
-        if not isinstance(env, RoverVectorEnv):
+    def __init__(self, env: VectorEnv[Any, Any, Any], sensors: Sequence[SensorLike]) -> None:
+        rovers = getattr(env, "unwrapped", None)
+        if not isinstance(rovers, RoverVectorEnv):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
         VectorWrapper.__init__(self, env)
-        self._rovers, self._same_step = env, env.autoreset_mode == AutoresetMode.SAME_STEP
-        env.at_end = self._advance
-        self.set_sensors(env, env.prototype, env.num_envs, sensors)
+        self._batch, self._same_step = rovers.batch, rovers.autoreset_mode == AutoresetMode.SAME_STEP
+        self.set_sensors(env, rovers.envs, sensors)
         self.single_observation_space = self.suite.space(env.single_observation_space)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
@@ -53,43 +52,36 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts episodes, as `RoverVectorEnv.reset`."""
-        observation, infos = self._rovers.reset(seed=seed, options=options)
+        observation, infos = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type] # seeds of rovers, too
         mask = (options or {}).get("reset_mask")
-        self._begin(range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist())
-        return {STATE: observation, **self.all_readings()}, infos
+        self.begin_sensors(range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist())
+        return with_readings(observation, self.all_readings()), infos
 
-    def step(self, actions: npt.NDArray[np.float32]) -> tuple[dict[str, Any], Array, Mask, Mask, dict[str, Any]]:
-        """Applies actions, as `RoverVectorEnv.step`; the samples that are due are taken at the end of the period."""
-        for i in range(self.num_envs):
-            self._state(i)  # has been reset
-        begun = set(self._rovers.batch.over)
-        observation, reward, terminated, truncated, infos = self._rovers.step(actions)
+    def step(self, actions: npt.NDArray[Any]) -> tuple[dict[str, Any], Array, Mask, Mask, dict[str, Any]]:
+        """Applies actions, as the vector does; the samples that are due are taken in each control period."""
+        begun = set(self._batch.over)
+        with self.sampling():
+            observation, reward, terminated, truncated, infos = self.env.step(actions)
         for i in np.flatnonzero(infos.get("_final_obs", ())).tolist():
-            infos["final_obs"][i] = {STATE: infos["final_obs"][i], **self.readings_of(i)}
+            infos["final_obs"][i] = with_readings(infos["final_obs"][i], self.readings_of(i))
             begun.add(i)
-        self._begin(sorted(begun - set(self._rovers.batch.over) if self._same_step else begun))
-        return {STATE: observation, **self.all_readings()}, reward, terminated, truncated, infos
-
-    def _advance(self, resting: Collection[int]) -> None:
-        self.advance_sensors(self._rovers.envs, resting)
-
-    def _begin(self, chosen: Iterable[int]) -> None:
-        self.begin_sensors(self._rovers.batch, self._rovers.envs, list(chosen))
+        self.begin_sensors(sorted(begun - set(self._batch.over) if self._same_step else begun))
+        return with_readings(observation, self.all_readings()), reward, terminated, truncated, infos
 
 
 def make_rover_vector(
     num_envs: int = 1,
     *,
     sensors: Sequence[SensorLike] | None = None,
-    make: Callable[..., RoverVectorEnv] = RoverVectorEnv,
+    make: Callable[..., VectorEnv[Any, Any, Any]] = RoverVectorEnv,
     **arguments: Any,
-) -> gym.vector.VectorEnv[Any, Any, Any]:
+) -> VectorEnv[Any, Any, Any]:
     """Makes a `RoverVectorEnv`, wrapped in `SensorVectorObservation` if there are sensors.
 
     Args:
         num_envs: Number of rovers.
         sensors: The sensors that each rover has; None for the environment as it is.
-        make: `RoverVectorEnv` or a subclass.
+        make: `RoverVectorEnv`, a subclass, or a wrapper that makes its own.
         **arguments: Its arguments.
     """
     env = make(num_envs, **arguments)
@@ -103,7 +95,7 @@ class RoverCourseVectorEnv(RoverVectorEnv):
     own_limit: ClassVar[int] = MAX_COURSE_STEPS
 
 
-def make_course_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
+def make_course_vector(num_envs: int = 1, **arguments: Any) -> VectorEnv[Any, Any, Any]:
     """Makes a `RoverCourseVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
     return make_rover_vector(num_envs, make=RoverCourseVectorEnv, **arguments)
 
@@ -115,6 +107,6 @@ class RoverGrainsVectorEnv(RoverVectorEnv):
     env_class: ClassVar[type[RoverEnv]] = RoverGrainsEnv
 
 
-def make_grains_vector(num_envs: int = 1, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
+def make_grains_vector(num_envs: int = 1, **arguments: Any) -> VectorEnv[Any, Any, Any]:
     """Makes a `RoverGrainsVectorEnv`, with `sensors` a `SensorVectorObservation` of it."""
     return make_rover_vector(num_envs, make=RoverGrainsVectorEnv, **arguments)

@@ -1,6 +1,6 @@
 """`RoverVectorEnv`: the Gymnasium vector environment that `gymnasium.make_vec` creates."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar, Unpack
 
 import numpy as np
@@ -65,8 +65,6 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         limit = episode_limit(max_episode_steps, self.own_limit)
         self.batch = self.env_class.make_batch(num_envs, threads=threads, max_episode_steps=limit, **arguments)
         self.num_envs = self.batch.n
-        #: Called at the end of each period, before the next episodes begin, with the rovers that have rested.
-        self.at_end: Callable[[Collection[int]], None] = _nothing
         self.envs = tuple(self.env_class.row(self.batch, i) for i in range(self.num_envs))
         self.metadata = {**self.prototype.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = self.prototype.render_mode
@@ -152,10 +150,9 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 check_actions(actions, (self.num_envs, self.batch.task.n_actions))
                 raise ResetNeeded(f"rovers {over}: call reset() with reset_mask first")
             observation, reward, terminated, truncated, _ = self.batch.step(actions)
-            self.at_end(())
             return observation, reward, terminated, truncated, self.batch.infos()
         same_step = mode == AutoresetMode.SAME_STEP
-        stepped, finals = self.batch.step_on(actions, same_step=same_step, at_end=self.at_end)
+        stepped, finals = self.batch.step_on(actions, same_step=same_step)
         observation, reward, terminated, truncated, _ = stepped
         infos = self.batch.infos()
         for i, (last, info) in finals.items():
@@ -231,10 +228,6 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
-
-
-def _nothing(_resting: Collection[int]) -> None:
-    """What happens at the end of a period without sensors."""
 
 
 def episode_limit(given: object, own: int) -> int | None:
