@@ -286,7 +286,7 @@ def _steps(simulation: Simulation, kind: Kind) -> Decision:
     return Decision(
         "steps",
         f"fast: in lanes, {register} ({SimulationBatch([simulation]).instruction_set})",
-        "an inelastic machine on fixed ground; `report.fallbacks` counts steps that the general step took",
+        "a machine on fixed ground; `report.fallbacks` counts steps that the general step took",
     )
 
 

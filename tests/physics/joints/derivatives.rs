@@ -109,13 +109,10 @@ fn the_coriolis_matrix_has_both_of_its_properties() {
         let (q, v) = somewhere(&model, 1.9);
         let kinematics = Kinematics::of(&model, &q);
         let mut C = DMatrix::zeros(nv, nv);
-        coriolis_matrix(
-            &model,
-            &kinematics,
-            &v,
-            &mut CoriolisScratch::default(),
-            &mut C,
-        );
+        let mut scratch = CoriolisScratch::new(Single::best());
+        let (mechanism, inertias) = (model.mechanism(), model.inertias());
+        let (poses, out) = (kinematics.poses(), C.as_mut_slice());
+        coriolis_matrix(mechanism, inertias, poses, &v, &mut scratch, out);
         let rate = (mass_matrix(&model, &moved(&model, &q, &v, H))
             - mass_matrix(&model, &moved(&model, &q, &v, -H)))
             / (2.0 * H);

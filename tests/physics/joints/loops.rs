@@ -149,7 +149,7 @@ fn a_free_four_bar_keeps_its_energy_and_stays_closed() {
         };
         let report = run.step(n).unwrap();
         assert!(report.is_converged() && report.loop_gap < 1e-12);
-        assert_eq!(report.fallbacks, n);
+        assert_eq!(report.fallbacks > n / 1000, variant == Variant::Newton);
         let (lost, kinetic) = (before - energy(&run), 7.0);
         assert!(lost.abs() < 1e-4 * kinetic, "{variant:?}: {lost} J");
     }

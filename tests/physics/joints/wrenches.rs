@@ -94,10 +94,9 @@ fn a_parked_rover_is_pushed_away_beyond_its_friction() {
         assert!(run.fallback_reason().is_none());
         run.apply_wrench("trunk", [0.0, 0.0, push], [0.0; 3], [0.0; 3])
             .unwrap();
-        let reason = run.fallback_reason().unwrap().to_string();
-        assert_eq!(reason, "a wrench is applied");
+        assert!(run.fallback_reason().is_none());
         let report = run.step(100).unwrap();
-        assert!(report.is_converged() && report.fallbacks == 100);
+        assert!(report.is_converged() && report.fallbacks == 0);
         assert_eq!(run.q().position.z > 1e-2, moves, "{}", run.q().position.z);
         let snapshot = run.snapshot();
         let mut again = run.clone();
@@ -108,7 +107,6 @@ fn a_parked_rover_is_pushed_away_beyond_its_friction() {
         assert_eq!(run.v(), again.v());
         assert!(run.linearise(&[], None).is_ok());
         run.clear_wrenches();
-        assert!(run.fallback_reason().is_none());
     }
 }
 

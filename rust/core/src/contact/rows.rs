@@ -91,8 +91,9 @@ impl<'a> Path<'a> {
         self.lead() + self.movers.len()
     }
 
+    /// Number of velocities of the base.
     #[inline(always)]
-    fn lead(&self) -> usize {
+    pub(crate) fn lead(&self) -> usize {
         if self.base.is_some() { BASE } else { 0 }
     }
 

@@ -82,7 +82,7 @@ const MOST_ATTEMPTS: usize = 16;
 const MOST_HALVINGS: usize = 3;
 
 /// Rotation of a frame in a step, rad, above which the step is split.
-const MOST_TURN: f64 = 0.5;
+pub(crate) const MOST_TURN: f64 = 0.5;
 
 /// Most parts of a step that fast rotation is given. Faster rotation is not resolved; the audit
 /// controls its energy.
@@ -237,7 +237,7 @@ impl Part<'_> {
 
 /// Passes over the mean velocity at which implicit gyroscopic terms are frozen: the second makes
 /// the step second order.
-const GYROSCOPIC_PASSES: usize = 2;
+pub(crate) const GYROSCOPIC_PASSES: usize = 2;
 
 /// One attempt at the step: `ws.v`, `ws.end`, `ws.p` and `ws.gap_end`. None if the mass matrix
 /// cannot be factored.

@@ -18,18 +18,6 @@ pub enum FallbackReason {
     /// Wheels sink into the ground and meet planes, surfaces or spheres of another kind there.
     #[error("wheels meet a firm plane or surface beside the soft ground, or spheres under it")]
     FirmBesideSoft,
-    /// A wrench acts from outside.
-    #[error("a wrench is applied")]
-    Wrench,
-    /// Contacts bounce.
-    #[error("the restitution is {0}, not 0")]
-    Restitution(f64),
-    /// Contacts of two materials bounce.
-    #[error("the restitution between two materials is not 0")]
-    ElasticMaterials,
-    /// The solver does not start from the last impulses.
-    #[error("warm_start is off")]
-    WarmStart,
     /// The solver's method is not [`Method::Auto`].
     #[error("solver is not \"auto\"")]
     Method,
@@ -43,12 +31,6 @@ pub enum FallbackReason {
 pub fn admit(options: &StepOptions) -> Result<(), FallbackReason> {
     if options.variant != Variant::Linearised {
         Err(FallbackReason::Variant)
-    } else if options.restitution != 0.0 {
-        Err(FallbackReason::Restitution(options.restitution))
-    } else if options.materials.is_elastic() {
-        Err(FallbackReason::ElasticMaterials)
-    } else if !options.warm_start {
-        Err(FallbackReason::WarmStart)
     } else if options.solver.method != Method::Auto {
         Err(FallbackReason::Method)
     } else {

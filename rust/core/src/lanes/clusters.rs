@@ -25,6 +25,9 @@ pub(super) struct Clusters {
     of_tree: Vec<usize>,
     /// Velocities of each cluster, ascending; those of a free root come first.
     velocities: Vec<Vec<usize>>,
+    /// Velocities that precede them in the cluster's problems: six that nothing moves, in place of
+    /// those of a free root, if its first root is not free.
+    leads: Vec<usize>,
     /// Whether loops tie the trees of a cluster, or a tree to itself or to the world.
     has_loops: Vec<bool>,
     /// Pattern of the contact problems of each.
@@ -76,15 +79,21 @@ impl Clusters {
         for tree in loops.iter().flat_map(|closure| closure.trees(mechanism)) {
             has_loops[of_tree[tree]] = true;
         }
+        let mut leads: Vec<Option<usize>> = vec![None; n];
+        for (tree, own) in mechanism.trees.iter().zip(&of_tree) {
+            leads[*own].get_or_insert(BASE - tree.lead());
+        }
+        let leads: Vec<usize> = leads.into_iter().map(Option::unwrap_or_default).collect();
         let mut sizes = BTreeSet::from([0]);
-        for own in &velocities {
-            let larger: Vec<usize> = sizes.iter().map(|size| size + own.len()).collect();
+        for (own, lead) in velocities.iter().zip(&leads) {
+            let larger: Vec<usize> = sizes.iter().map(|size| size + lead + own.len()).collect();
             sizes.extend(larger);
         }
         let wide = sizes.into_iter().skip(1);
         Self {
             of_tree,
             velocities,
+            leads,
             has_loops,
             // One each: a copy of a lazy pattern shares what is found.
             patterns: (0..n).map(|_| LazyPattern::default()).collect(),
@@ -107,17 +116,17 @@ impl Clusters {
         self.of_tree.iter().filter(|own| **own == cluster).count()
     }
 
-    /// Number of velocities of a cluster.
+    /// Number of velocities in the problems of a cluster.
     pub(super) fn nv(&self, cluster: usize) -> usize {
-        self.velocities[cluster].len()
+        self.leads[cluster] + self.velocities[cluster].len()
     }
 
-    /// Cluster of each of `nv` velocities, and its place among the cluster's velocities.
+    /// Cluster of each of `nv` velocities, and its place among those of the cluster's problems.
     pub(super) fn places(&self, nv: usize) -> Vec<[usize; 2]> {
         let mut places = vec![[0; 2]; nv];
         for (cluster, own) in self.velocities.iter().enumerate() {
             for (place, &velocity) in own.iter().enumerate() {
-                places[velocity] = [cluster, place];
+                places[velocity] = [cluster, self.leads[cluster] + place];
             }
         }
         places
@@ -133,15 +142,18 @@ impl Clusters {
     /// Equal clusters have the same one.
     pub(super) fn pattern(&self, cluster: usize, paths: &[&[usize]]) -> &Arc<Pattern> {
         self.patterns[cluster].get(|| {
-            let own = &self.velocities[cluster];
-            let place = |velocity: &usize| own.binary_search(velocity).ok();
-            let local = |path: &&[usize]| path.iter().map(place).collect::<Option<Vec<_>>>();
+            let (own, lead) = (&self.velocities[cluster], self.leads[cluster]);
+            let place = |velocity: &usize| Some(lead + own.binary_search(velocity).ok()?);
+            let local = |path: &&[usize]| {
+                let known = path.iter().map(place);
+                (0..lead).map(Some).chain(known).collect::<Option<Vec<_>>>()
+            };
             let paths = paths.iter().map(local).collect::<Option<Vec<_>>>();
             let of_tree = paths
                 .filter(|_| !self.has_loops[cluster])
-                .and_then(|paths| Pattern::new(own.len(), &paths));
+                .and_then(|paths| Pattern::new(self.nv(cluster), &paths));
             let Some(found) = of_tree else {
-                return Arc::clone(self.wide.of(own.len()));
+                return Arc::clone(self.wide.of(self.nv(cluster)));
             };
             let known = self.patterns.iter().filter_map(|own| own.0.get());
             let same = known.into_iter().find(|known| ***known == found);

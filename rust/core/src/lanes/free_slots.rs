@@ -68,6 +68,7 @@ impl Machine {
 
     /// Whether all that moves a body also moves another one.
     pub(super) fn carries(&self, body: usize, other: usize) -> bool {
-        self.path(other).starts_with(self.path(body))
+        self.tree_of_body(body) == self.tree_of_body(other)
+            && self.path(other).starts_with(self.path(body))
     }
 }

@@ -1,6 +1,6 @@
 //! The machine that all rovers of a block share: its mechanism, its wheels and its boxes.
 //!
-//! It has a tree or several, each on a free base. Bodies, velocities, motions and joints are
+//! It has a tree or several. Bodies, velocities, motions and joints are
 //! numbered as in the model. Lengths are in m.
 
 use std::ops::Deref;
@@ -31,9 +31,6 @@ const MAX_SLOTS: usize = 256;
 /// Why a machine has no fast step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Unsupported {
-    /// A root is fixed, or hangs on a joint.
-    #[error("a root of the machine is not free")]
-    FixedRoot,
     /// A problem has no room for the contacts of its wheels with a plane, its stops and its joints
     /// with dry friction.
     #[error("wheels, stops and dry joints can have {0} contacts, more than {MAX_CONTACTS}")]
@@ -136,9 +133,6 @@ impl Machine {
     /// # Errors
     /// Why it has no fast step.
     pub fn of(model: &Model) -> Result<Self, Unsupported> {
-        if !model.is_free() {
-            return Err(Unsupported::FixedRoot);
-        }
         let touches_itself = model.trees().iter().any(|tree| tree.self_contact);
         let mut machine = Self {
             mechanism: model.mechanism().clone(),

@@ -20,9 +20,10 @@ use crate::scalar::{Lane, Mat3, Vec3};
 pub(super) struct Parts {
     pub wheels: Vec<Wheel>,
     pub boxes: Vec<Solid>,
-    /// First velocities of the trees' roots, whose twists come first.
-    roots: Vec<usize>,
-    /// The roots, then bodies after what carries them.
+    /// First velocities of the trees' free roots, whose twists come first; none of a tree that a
+    /// joint connects to the world, whose twist is zero.
+    roots: Vec<Option<usize>>,
+    /// The roots or the world, then bodies after what carries them.
     carriers: Vec<Carrier>,
 }
 
@@ -81,7 +82,8 @@ pub(super) struct Solid {
 /// A body whose twist is needed, or what lies between two velocities of a spherical joint.
 #[derive(Clone, Copy, Debug)]
 struct Carrier {
-    body: usize,
+    /// None of the world.
+    body: Option<usize>,
     /// Twist of what carries it.
     parent: usize,
     /// The velocity that moves it beside.
@@ -100,7 +102,7 @@ impl Parts {
     pub(super) fn of(machine: &Machine) -> Self {
         let mut carriers: Vec<Carrier> = (machine.trees.iter())
             .map(|tree| Carrier {
-                body: tree.bodies.start,
+                body: tree.is_free.then_some(tree.bodies.start),
                 parent: 0,
                 mover: Mover {
                     velocity: 0,
@@ -156,7 +158,7 @@ impl Parts {
             wheels,
             boxes,
             roots: (machine.trees.iter())
-                .map(|tree| tree.velocities.start)
+                .map(|tree| tree.is_free.then_some(tree.velocities.start))
                 .collect(),
             carriers,
         }
@@ -172,12 +174,14 @@ impl Parts {
     pub(super) fn find_twists<T: Lane>(&self, poses: &Poses<T>, v: &[T], twists: &mut [Twist<T>]) {
         let n = self.carriers.len();
         let twists = &mut twists[..n];
-        for (twist, &first) in twists.iter_mut().zip(&self.roots) {
-            let v = &v[first..][..BASE];
-            *twist = Twist {
-                linear: Vec3::new(v[0], v[1], v[2]),
-                angular: Vec3::new(v[3], v[4], v[5]),
-            };
+        for (twist, first) in twists.iter_mut().zip(&self.roots) {
+            if let Some(first) = *first {
+                let v = &v[first..][..BASE];
+                *twist = Twist {
+                    linear: Vec3::new(v[0], v[1], v[2]),
+                    angular: Vec3::new(v[3], v[4], v[5]),
+                };
+            }
         }
         for i in self.roots.len()..n {
             let Carrier { parent, mover, .. } = self.carriers[i];
@@ -299,18 +303,22 @@ fn axle_of(axle: [f64; 3]) -> Axle {
 
 /// Index of a body among the carriers; adds it with all that carry it.
 fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> usize {
-    if let Some(i) = carriers.iter().rposition(|carrier| carrier.body == body) {
+    if let Some(i) = (carriers.iter()).rposition(|carrier| carrier.body == Some(body)) {
         return i;
     }
     let link = &machine.links[body];
-    let mut parent = carrier_of(machine, link.parent, carriers);
+    let mut parent = if link.parent == body {
+        machine.tree_of_body(body)
+    } else {
+        carrier_of(machine, link.parent, carriers)
+    };
     for k in 0..link.joint.n_motions() {
         let mover = Mover {
             velocity: link.velocity + k,
             motion: link.motion + k,
         };
         carriers.push(Carrier {
-            body,
+            body: Some(body),
             parent,
             mover,
         });

@@ -40,8 +40,8 @@ pub struct Rows<T: Lane> {
     /// Bodies of the parts: wheels, spare slots, and joints; none of a spare slot with all
     /// velocities.
     bodies: Vec<Option<usize>>,
-    /// First velocity of the root that carries each part.
-    bases: Vec<usize>,
+    /// First velocity of the free root that carries each part; none where no free root does.
+    bases: Vec<Option<usize>>,
     /// Velocities of the joints that move each part, from the root outwards.
     movers: Vec<Vec<Mover>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
@@ -106,7 +106,9 @@ impl<T: Lane> Rows<T> {
         let common = paths
             .iter()
             .flat_map(|a| paths.iter().map(|b| shared(a, b)));
-        let all = (BASE..machine.nv()).map(|velocity| Mover {
+        let first = (machine.trees.first().filter(|tree| tree.is_free)).map(|_| 0);
+        let n_first = first.map_or(0, |_| BASE);
+        let all = (n_first..machine.nv()).map(|velocity| Mover {
             velocity,
             motion: 0, // not read
         });
@@ -137,7 +139,9 @@ impl<T: Lane> Rows<T> {
         let loops = Loops::new(token, machine, &machine.loops, 0);
         Self {
             token,
-            bases: (paths.iter()).map(|path| path[0]).collect(),
+            bases: (bodies.iter())
+                .map(|body| body.map_or(first, |body| machine.base_of(body)))
+                .collect(),
             bodies,
             movers,
             common: common.collect(),
@@ -240,7 +244,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn path(&self, part: usize) -> Path<'_> {
         Path {
-            base: Some(self.bases[part]),
+            base: self.bases[part],
             movers: &self.movers[part],
         }
     }
@@ -258,7 +262,7 @@ impl<T: Lane> Rows<T> {
     ) {
         let part = contacts.part(slot);
         let path = Path {
-            base: Some(self.bases[part]),
+            base: self.bases[part],
             movers: &self.movers[part],
         };
         let rows = &mut self.Z[self.starts[slot]..][..path.len()];
@@ -591,7 +595,7 @@ impl<T: Lane> Rows<T> {
         let zero = T::splat(self.token, 0.0);
         out.fill(zero);
         // Force and moment on a root; the slots of a tree follow each other, mostly.
-        let mut tree = 0;
+        let mut tree = None;
         let mut sums = [zero; BASE];
         let mut guests = 0;
         for &slot in contacts.used_by_shapes() {
@@ -605,22 +609,27 @@ impl<T: Lane> Rows<T> {
             let here = own.active & lanes & !T::mask(self.token, of_guests);
             let [force, moment] = place_of(own).wrench(p[slot]);
             let Path { base, movers } = self.path(contacts.part(slot));
-            let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-            let base = base.unwrap_or(0);
-            if base != tree {
-                out[tree..][..BASE].copy_from_slice(&sums);
-                sums.copy_from_slice(&out[base..][..BASE]);
-                tree = base;
-            }
-            for k in 0..BASE {
-                add(here, &mut sums[k], both[k]);
+            if let Some(first) = base {
+                let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+                if base != tree {
+                    if let Some(last) = tree {
+                        out[last..][..BASE].copy_from_slice(&sums);
+                    }
+                    sums.copy_from_slice(&out[first..][..BASE]);
+                    tree = base;
+                }
+                for k in 0..BASE {
+                    add(here, &mut sums[k], both[k]);
+                }
             }
             for mover in movers {
                 let power = end.motions[mover.motion].power(force, moment);
                 add(here, &mut out[mover.velocity], power);
             }
         }
-        out[tree..][..BASE].copy_from_slice(&sums);
+        if let Some(last) = tree {
+            out[last..][..BASE].copy_from_slice(&sums);
+        }
         if (lanes & T::mask(self.token, guests)).any() {
             add_impulses_of_guests(machine, contacts, end, lanes, p, out);
         }
@@ -784,9 +793,10 @@ impl<T: Lane> Rows<T> {
             },
         );
         if whole == 0 {
-            self.write_along_path(contacts, slot, rows, problems);
+            self.write_along_path(contacts, slot, problems);
             return;
         }
+        let still = BASE - path.lead();
         for (k, (velocity, z)) in path.velocities().zip(rows).enumerate() {
             let values = store_all(z);
             let [cluster, place] = self.velocities[velocity];
@@ -798,7 +808,7 @@ impl<T: Lane> Rows<T> {
                     let column = if whole >> lane & 1 == 1 {
                         contacts.first_column(cluster, home).map(|k| k + place)
                     } else {
-                        Some(k)
+                        Some(still + k)
                     };
                     let out = &mut problems[home].factored;
                     if let Some(column) = column {
@@ -816,22 +826,25 @@ impl<T: Lane> Rows<T> {
         }
     }
 
-    /// Writes the rows of a slot to problems with the pattern of its cluster.
+    /// Writes the rows of a slot to problems with the pattern of its cluster. Those of a free root
+    /// are zero where there is none.
     #[inline(always)]
     fn write_along_path(
         &self,
         contacts: &Contacts<T>,
         slot: usize,
-        rows: &[Triple<T>],
         problems: &mut [ContactProblem],
     ) {
+        let (path, rows) = self.of(contacts, slot);
+        let none = [[T::splat(self.token, 0.0); 3]; BASE];
+        let still = &none[..BASE - path.lead()];
         let (homes, places) = (contacts.homes(slot), contacts.places(slot));
         let near = T::mask(self.token, contacts.near(slot));
         let Some(cluster) = contacts.cluster_of(slot) else {
             return;
         };
         let stride = self.patterns[cluster].stride();
-        for (k, z) in rows.iter().enumerate() {
+        for (k, z) in still.iter().chain(rows).enumerate() {
             let values = store_all(z);
             each::<T>(
                 near,
@@ -982,7 +995,7 @@ fn write_guest<T: Lane>(
     for_each_row(one, contact, |velocity, row| {
         let is_own = |mover: &Mover| mover.velocity == velocity;
         let own = match path.movers.iter().position(is_own) {
-            Some(k) => &mut rows[BASE + k],
+            Some(k) => &mut rows[path.lead() + k],
             None => &mut rows[velocity - path.base.unwrap_or(0)],
         };
         let v = one.v[velocity].get(lane);

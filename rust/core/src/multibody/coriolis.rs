@@ -26,118 +26,134 @@
 //! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and
 //! Christoffel symbols for rigid-body systems*, J. Comput. Nonlinear Dynam. 16, 091004.
 
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+
 use std::ops::Range;
 
-use nalgebra::DMatrix;
-
 use super::composite::{Composite, Momentum, Symmetric};
-use super::joint::{Joint, Motion, free};
-use super::kinematics::Kinematics;
-use super::model::Model;
-use crate::scalar::Vec3;
+use super::inertias::Inertias;
+use super::joint::{Joint, JointModel, Motion, free};
+use super::mechanism::Mechanism;
+use super::poses::Poses;
+use crate::scalar::{Lane, Vec3};
 
-/// Scratch of [`coriolis_matrix`], allocated once for a model.
-#[derive(Clone, Debug, Default)]
-pub struct CoriolisScratch {
-    velocity: Vec<Motion<f64>>,
-    turning: Vec<Turning>,
-    screws: Vec<Screw>,
+/// Scratch of [`coriolis_matrix`], allocated once for a mechanism.
+#[derive(Clone, Debug)]
+pub struct CoriolisScratch<T: Lane> {
+    token: T::Token,
+    velocity: Vec<Motion<T>>,
+    turning: Vec<Turning<T>>,
+    screws: Vec<Screw<T>>,
     /// The screws of each body's joint.
     own: Vec<Range<usize>>,
 }
 
 /// The screw of a velocity at a body's own joint, and its rate.
 #[derive(Clone, Copy, Debug)]
-struct Screw {
+struct Screw<T> {
     velocity: usize,
-    S: Motion<f64>,
-    S_dot: Motion<f64>,
+    S: Motion<T>,
+    S_dot: Motion<T>,
 }
 
 /// I and B of a composite body.
 #[derive(Clone, Copy, Debug)]
-struct Turning {
-    I: Composite<f64>,
-    K: Symmetric<f64>,
+struct Turning<T> {
+    I: Composite<T>,
+    K: Symmetric<T>,
     /// I V.
-    P: Momentum<f64>,
+    P: Momentum<T>,
 }
 
-/// `C(q, v)` (nv, nv) at the poses of `kinematics`, without gravity; `out` is overwritten.
+/// `C(q, v)` (nv, nv) at the poses of a step, without gravity, column after column; `out` is
+/// overwritten.
 ///
 /// `v`: (nv). Times a velocity it gives N and N m.
-pub fn coriolis_matrix(
-    model: &Model,
-    kinematics: &Kinematics,
-    v: &[f64],
-    scratch: &mut CoriolisScratch,
-    out: &mut DMatrix<f64>,
+///
+/// # Panics
+/// If an argument is of another mechanism.
+pub fn coriolis_matrix<T: Lane>(
+    mechanism: &Mechanism,
+    inertias: &Inertias<T>,
+    poses: &Poses<T>,
+    v: &[T],
+    scratch: &mut CoriolisScratch<T>,
+    out: &mut [T],
 ) {
-    let bodies = model.bodies();
-    let s = scratch;
-    s.velocity.clear();
-    s.turning.clear();
-    s.screws.clear();
-    s.own.clear();
-    for (b, body) in bodies.iter().enumerate() {
-        let first = s.screws.len();
-        let velocity = if let Joint::Free(_) = body.joint {
-            s.add_free(body.velocity, v)
-        } else {
-            let carrier = body.parent.map_or(still(), |parent| s.velocity[parent]);
-            let mut velocity = carrier;
-            for (i, &S) in kinematics.motions()[body.motions()].iter().enumerate() {
-                let k = body.velocity + i;
-                velocity.axis += S.axis * v[k];
-                velocity.swing += S.swing * v[k];
-                s.screws.push(Screw {
-                    velocity: k,
-                    S,
-                    S_dot: carrier.rate_of(&S),
-                });
-            }
-            velocity
-        };
-        s.velocity.push(velocity);
-        s.own.push(first..s.screws.len());
-        let (link, pose) = (&model.mechanism().links[b], &kinematics.poses().bodies[b]);
-        let own = Composite::of(link, &model.inertias().bodies[b], pose);
-        s.turning.push(Turning::of(own, &velocity));
-    }
-    out.fill(0.0);
-    for (b, body) in bodies.iter().enumerate().rev() {
-        let turning = s.turning[b];
-        for t in s.own[b].clone() {
-            let Screw {
-                velocity: k,
-                S,
-                S_dot,
-            } = &s.screws[t];
-            let F1 = turning.I.momentum(S_dot).plus(&turning.B_times(S));
-            let F2 = turning.I.momentum(S);
-            let F3 = turning.B_transposed_times(S);
-            let mut carrier = Some(b);
-            while let Some(a) = carrier {
-                for before in s.screws[s.own[a].clone()]
-                    .iter()
-                    .take_while(|x| a < b || x.velocity < *k)
-                {
-                    out[(before.velocity, *k)] += F1.along(&before.S);
-                    out[(*k, before.velocity)] += F2.along(&before.S_dot) + before.S.axis.dot(F3);
-                }
-                carrier = bodies[a].parent;
-            }
-            out[(*k, *k)] += F1.along(S);
-        }
-        if let Some(parent) = body.parent {
-            s.turning[parent] = s.turning[parent].plus(&turning);
-        }
-    }
+    T::vectorize(
+        scratch.token,
+        #[inline(always)]
+        || {
+            scratch.find_screws(mechanism, inertias, poses, v);
+            scratch.multiply(mechanism, v.len(), out);
+        },
+    );
 }
 
-impl CoriolisScratch {
+impl<T: Lane> CoriolisScratch<T> {
+    /// Empty.
+    #[must_use]
+    pub fn new(token: T::Token) -> Self {
+        Self {
+            token,
+            velocity: Vec::new(),
+            turning: Vec::new(),
+            screws: Vec::new(),
+            own: Vec::new(),
+        }
+    }
+
+    /// The screws of all velocities, and I and B of each body alone.
+    #[inline(always)]
+    fn find_screws(
+        &mut self,
+        mechanism: &Mechanism,
+        inertias: &Inertias<T>,
+        poses: &Poses<T>,
+        v: &[T],
+    ) {
+        self.velocity.clear();
+        self.turning.clear();
+        self.screws.clear();
+        self.own.clear();
+        let none = Vec3::splat(self.token, [0.0; 3]);
+        let still = Motion {
+            axis: none,
+            swing: none,
+        };
+        for (b, link) in mechanism.links.iter().enumerate() {
+            let first = self.screws.len();
+            let velocity = if let Joint::Free(_) = link.joint {
+                self.add_free(link.velocity, v)
+            } else {
+                let carrier = if link.parent == b {
+                    still
+                } else {
+                    self.velocity[link.parent]
+                };
+                let mut velocity = carrier;
+                for i in 0..link.joint.n_motions() {
+                    let (S, k) = (poses.motions[link.motion + i], link.velocity + i);
+                    velocity.axis += S.axis * v[k];
+                    velocity.swing += S.swing * v[k];
+                    self.screws.push(Screw {
+                        velocity: k,
+                        S,
+                        S_dot: carrier.rate_of(&S),
+                    });
+                }
+                velocity
+            };
+            self.velocity.push(velocity);
+            self.own.push(first..self.screws.len());
+            let own = Composite::of(link, &inertias.bodies[b], &poses.bodies[b]);
+            self.turning.push(Turning::of(own, &velocity));
+        }
+    }
+
     /// Adds the six screws of a free body and returns its velocity.
-    fn add_free(&mut self, first: usize, v: &[f64]) -> Motion<f64> {
+    #[inline(always)]
+    fn add_free(&mut self, first: usize, v: &[T]) -> Motion<T> {
         let base = free::velocity(&v[first..]);
         for (k, [S, S_dot]) in free::screws_and_rates(&base).into_iter().enumerate() {
             self.screws.push(Screw {
@@ -148,21 +164,53 @@ impl CoriolisScratch {
         }
         base
     }
-}
 
-fn still() -> Motion<f64> {
-    let zero = Vec3::new(0.0, 0.0, 0.0);
-    Motion {
-        axis: zero,
-        swing: zero,
+    /// The matrix from the screws, from the leaves to the roots.
+    #[inline(always)]
+    fn multiply(&mut self, mechanism: &Mechanism, nv: usize, out: &mut [T]) {
+        out.fill(T::splat(self.token, 0.0));
+        for (b, link) in mechanism.links.iter().enumerate().rev() {
+            let turning = self.turning[b];
+            for t in self.own[b].clone() {
+                let Screw {
+                    velocity: k,
+                    S,
+                    S_dot,
+                } = &self.screws[t];
+                let F1 = turning.I.momentum(S_dot).plus(&turning.B_times(S));
+                let F2 = turning.I.momentum(S);
+                let F3 = turning.B_transposed_times(S);
+                let mut a = b;
+                loop {
+                    for before in self.screws[self.own[a].clone()]
+                        .iter()
+                        .take_while(|x| a < b || x.velocity < *k)
+                    {
+                        let i = before.velocity;
+                        out[k * nv + i] += F1.along(&before.S);
+                        out[i * nv + k] += F2.along(&before.S_dot) + before.S.axis.dot(F3);
+                    }
+                    let parent = mechanism.links[a].parent;
+                    if parent == a {
+                        break;
+                    }
+                    a = parent;
+                }
+                out[k * nv + k] += F1.along(S);
+            }
+            if link.parent != b {
+                self.turning[link.parent] = self.turning[link.parent].plus(&turning);
+            }
+        }
     }
 }
 
-impl Turning {
+impl<T: Lane> Turning<T> {
     /// I and B of a single body with the velocity V.
-    #[inline]
-    fn of(I: Composite<f64>, V: &Motion<f64>) -> Self {
+    #[inline(always)]
+    fn of(I: Composite<T>, V: &Motion<T>) -> Self {
         let (J, w, v, s) = (&I.inertia, V.axis, V.swing, I.moment);
+        let half = I.mass.like(0.5);
         let x = w.cross(Vec3::new(J.xx, J.xy, J.xz));
         let y = w.cross(Vec3::new(J.xy, J.yy, J.yz));
         let z = w.cross(Vec3::new(J.xz, J.yz, J.zz));
@@ -171,9 +219,9 @@ impl Turning {
             xx: x.x - s.x * v.x + along,
             yy: y.y - s.y * v.y + along,
             zz: z.z - s.z * v.z + along,
-            xy: 0.5 * (x.y + y.x - s.x * v.y - s.y * v.x),
-            xz: 0.5 * (x.z + z.x - s.x * v.z - s.z * v.x),
-            yz: 0.5 * (y.z + z.y - s.y * v.z - s.z * v.y),
+            xy: half * (x.y + y.x - s.x * v.y - s.y * v.x),
+            xz: half * (x.z + z.x - s.x * v.z - s.z * v.x),
+            yz: half * (y.z + z.y - s.y * v.z - s.z * v.y),
         };
         Self {
             I,
@@ -183,22 +231,23 @@ impl Turning {
     }
 
     /// `B S`.
-    #[inline]
-    fn B_times(&self, S: &Motion<f64>) -> Momentum<f64> {
+    #[inline(always)]
+    fn B_times(&self, S: &Motion<T>) -> Momentum<T> {
+        let half = self.I.mass.like(0.5);
         Momentum {
-            angular: self.K.times(S.axis) - self.P.angular.cross(S.axis) * 0.5,
+            angular: self.K.times(S.axis) - self.P.angular.cross(S.axis) * half,
             linear: -self.P.linear.cross(S.axis),
         }
     }
 
     /// `Bᵀ S`, whose linear part is zero.
-    #[inline]
-    fn B_transposed_times(&self, S: &Motion<f64>) -> Vec3<f64> {
-        let P = &self.P;
-        self.K.times(S.axis) + P.angular.cross(S.axis) * 0.5 + P.linear.cross(S.swing)
+    #[inline(always)]
+    fn B_transposed_times(&self, S: &Motion<T>) -> Vec3<T> {
+        let (P, half) = (&self.P, self.I.mass.like(0.5));
+        self.K.times(S.axis) + P.angular.cross(S.axis) * half + P.linear.cross(S.swing)
     }
 
-    #[inline]
+    #[inline(always)]
     fn plus(&self, other: &Self) -> Self {
         Self {
             I: self.I.plus(&other.I),
@@ -210,10 +259,11 @@ impl Turning {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{DVector, Vector3};
+    use nalgebra::{DMatrix, DVector, Vector3};
 
     use super::*;
-    use crate::multibody::Configuration;
+    use crate::multibody::{Configuration, Kinematics, Model};
+    use crate::scalar::Single;
 
     fn somewhere(model: &Model) -> (Configuration, Vec<f64>) {
         let mut q = Configuration::zero(model);
@@ -235,19 +285,21 @@ mod tests {
         [rover, welded]
     }
 
+    fn matrix(model: &Model, kinematics: &Kinematics, v: &[f64]) -> DMatrix<f64> {
+        let mut C = DMatrix::zeros(model.nv(), model.nv());
+        let mut scratch = CoriolisScratch::new(Single::best());
+        let (mechanism, inertias) = (model.mechanism(), model.inertias());
+        let (poses, out) = (kinematics.poses(), C.as_mut_slice());
+        coriolis_matrix(mechanism, inertias, poses, v, &mut scratch, out);
+        C
+    }
+
     #[test]
     fn times_the_velocity_it_is_the_bias_of_newton_and_euler() {
         for model in models() {
             let (q, v) = somewhere(&model);
             let kinematics = Kinematics::of(&model, &q);
-            let mut C = DMatrix::zeros(model.nv(), model.nv());
-            coriolis_matrix(
-                &model,
-                &kinematics,
-                &v,
-                &mut CoriolisScratch::default(),
-                &mut C,
-            );
+            let C = matrix(&model, &kinematics, &v);
             let product = &C * DVector::from_column_slice(&v);
             let expected = kinematics.bias(&model, &v, &Vector3::zeros());
             let expected = DVector::from_vec(expected);
@@ -259,15 +311,8 @@ mod tests {
     fn with_its_transpose_it_is_the_rate_of_the_mass_matrix() {
         for model in models() {
             let (q, v) = somewhere(&model);
-            let mut C = DMatrix::zeros(model.nv(), model.nv());
             let kinematics = Kinematics::of(&model, &q);
-            coriolis_matrix(
-                &model,
-                &kinematics,
-                &v,
-                &mut CoriolisScratch::default(),
-                &mut C,
-            );
+            let C = matrix(&model, &kinematics, &v);
             let h = 1e-5;
             let mass_matrix_at = |time: f64| {
                 let mut moved = q.clone();

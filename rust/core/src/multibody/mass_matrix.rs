@@ -256,18 +256,27 @@ impl<T: Lane> MassMatrix<T> {
     #[must_use]
     pub fn to_dense(&self, mechanism: &Mechanism, lane: usize) -> DMatrix<f64> {
         let mut dense = DMatrix::zeros(mechanism.nv(), mechanism.nv());
-        self.add_to_dense(mechanism, lane, &mut dense);
+        self.for_each(mechanism, |i, j, x| {
+            dense[(i, j)] = x.get(lane);
+            dense[(j, i)] = x.get(lane);
+        });
         dense
     }
 
-    /// Adds lane `lane` to a full matrix (nv, nv).
-    pub fn add_to_dense(&self, mechanism: &Mechanism, lane: usize, dense: &mut DMatrix<f64>) {
-        self.for_each(mechanism, |i, j, x| {
-            dense[(i, j)] += x.get(lane);
-            if i != j {
-                dense[(j, i)] += x.get(lane);
-            }
-        });
+    /// Adds it to a full matrix (nv, nv), column after column.
+    #[inline(always)]
+    pub(crate) fn add_to_full(&self, mechanism: &Mechanism, full: &mut [T]) {
+        let nv = mechanism.nv();
+        self.for_each(
+            mechanism,
+            #[inline(always)]
+            |i, j, x| {
+                full[j * nv + i] += x;
+                if i != j {
+                    full[i * nv + j] += x;
+                }
+            },
+        );
     }
 
     /// Computes `M = Lᵀ D L`. Returns where M is positive definite; the factor of any other lane

@@ -297,7 +297,7 @@ impl Mechanism {
 
     /// Velocities from the root up to and including velocity `k`.
     #[inline]
-    pub(super) fn velocity_path(&self, k: usize) -> &[usize] {
+    pub(crate) fn velocity_path(&self, k: usize) -> &[usize] {
         let (b, length) = self.up_to[k];
         &self.path(b)[..length]
     }

@@ -9,9 +9,7 @@ impl RoverSimulation {
     /// report counts as fallbacks.
     #[must_use]
     pub fn fallback_reason(&self) -> Option<FallbackReason> {
-        let own = self.scene.fallback_reason(&self.options);
-        let is_pushed = !self.command.actuators.wrenches.is_empty();
-        own.or(is_pushed.then_some(FallbackReason::Wrench))
+        self.scene.fallback_reason(&self.options)
     }
 
     /// Rovers to a register in its fast steps, in a batch on this machine; 1 if it has none.

@@ -46,9 +46,6 @@ impl RoverScene {
         let quick = &mut step.parts.quick;
         quick.set_last(false);
         let machine = self.fast_machine(step.options)?;
-        if !step.command.actuators.wrenches.is_empty() {
-            return None;
-        }
         let token = Single::best();
         let block = quick
             .block
@@ -110,8 +107,7 @@ impl RoverScene {
 impl RoverSimulation {
     /// The machine of its fast steps; none if it has none.
     pub(super) fn machine(&self) -> Option<&Arc<Machine>> {
-        let machine = self.scene.fast_machine(&self.options);
-        machine.filter(|_| self.command.actuators.wrenches.is_empty())
+        self.scene.fast_machine(&self.options)
     }
 
     /// Whether the machine of another rover is its own. An equal one becomes its own.

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::multibody::{Model, Motor, Poses};
+use crate::multibody::{Mechanism, Model, Motor, Poses};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// A joint held at a set-point by a PD controller that is implicit in the step:
@@ -49,36 +49,39 @@ impl Wrench {
     }
 
     /// The body that it acts on.
-    pub(super) fn body(&self, model: &Model) -> usize {
+    pub(crate) fn body(&self, model: &Model) -> usize {
         model.frames()[self.solid].body
     }
 
-    /// Adds its generalized force (nv), N and N m, at the poses of a step. `R`: attitude of the
-    /// body, also of a spinner.
-    #[allow(clippy::inline_always)] // a call leaves the instructions that its caller is for
-    #[inline(always)]
-    pub(super) fn add_force<T: Lane>(
-        &self,
-        model: &Model,
-        poses: &Poses<T>,
-        R: &Mat3<T>,
-        out: &mut [T],
-    ) {
-        let (frame, mechanism) = (&model.frames()[self.solid], model.mechanism());
-        let pose = &poses.bodies[frame.body];
-        let vector = |x: [f64; 3]| Vec3::splat(pose.r.x.token(), x);
+    /// Its numbers on that body: point in the body's frame, m; force, N, and moment, N m.
+    pub(crate) fn on_body(&self, model: &Model) -> [[f64; 3]; 3] {
+        let frame = &model.frames()[self.solid];
         let point = frame.position + frame.rotation * Vector3::from(self.point);
-        let (force, x) = (vector(self.force), pose.r + R.times_shared(point.into()));
-        let moment = x.cross(force) + vector(self.moment);
-        if let Some(first) = mechanism.base_of(frame.body) {
-            let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-            for (out, x) in out[first..].iter_mut().zip(both) {
-                *out += x;
-            }
+        [point.into(), self.force, self.moment]
+    }
+}
+
+/// Adds the generalized force (nv), N and N m, of a wrench with the numbers of [`Wrench::on_body`]
+/// at the poses of a step. `R`: attitude of the body, also of a spinner.
+#[allow(clippy::inline_always)] // a call leaves the instructions that its caller is for
+#[inline(always)]
+pub(crate) fn add_wrench<T: Lane>(
+    mechanism: &Mechanism,
+    body: usize,
+    [point, force, moment]: [Vec3<T>; 3],
+    (poses, R): (&Poses<T>, &Mat3<T>),
+    out: &mut [T],
+) {
+    let x = poses.bodies[body].r + R.times(point);
+    let moment = x.cross(force) + moment;
+    if let Some(first) = mechanism.base_of(body) {
+        let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+        for (out, x) in out[first..].iter_mut().zip(both) {
+            *out += x;
         }
-        for mover in mechanism.movers(frame.body) {
-            out[mover.velocity] += poses.motions[mover.motion].power(force, moment);
-        }
+    }
+    for mover in mechanism.movers(body) {
+        out[mover.velocity] += poses.motions[mover.motion].power(force, moment);
     }
 }
 

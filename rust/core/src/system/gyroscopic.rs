@@ -8,164 +8,230 @@
 //! transform, whatever the spin. Its symmetric part `½ Ṁ` can make the matrix singular if a frame
 //! rotates by radians in a step. It is then left out for the whole cluster of trees, and the audit
 //! ([`crate::integrator::energy_audit`]) corrects the resulting change of the energy.
-
-use nalgebra::{DMatrix, DVector, DVectorView};
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
-use crate::multibody::{Kinematics, MassMatrix, Model};
+use crate::multibody::{Inertias, MassMatrix, Mechanism, Poses};
+use crate::scalar::{Lane, LaneMask};
 
-/// Scratch, filled at the first step that needs it.
-#[derive(Clone, Debug, Default)]
-pub(super) struct GyroscopicScratch {
-    coriolis: CoriolisScratch,
-    C: DMatrix<f64>,
-    matrix: DMatrix<f64>,
+/// Scratch, sized at the first step that needs it. Matrices are stored column after column.
+#[derive(Clone, Debug)]
+pub(crate) struct Gyroscopic<T: Lane> {
+    token: T::Token,
+    coriolis: CoriolisScratch<T>,
+    C: Vec<T>,
+    matrix: Vec<T>,
     /// `h (τ − G − C v) + J`, then Δv.
-    load: DVector<f64>,
-    /// Whether the symmetric part of C is left out, for each cluster.
-    is_skew: Vec<bool>,
+    load: Vec<T>,
+    /// Where the symmetric part of C is left out, for each cluster.
+    is_skew: Vec<T::Mask>,
+    /// Where a pivot of the last elimination was not positive, for each cluster.
+    is_lost: Vec<T::Mask>,
 }
 
-impl GyroscopicScratch {
+/// The machine of a step, at its midpoint.
+pub(crate) struct Turned<'a, T: Lane> {
+    pub mechanism: &'a Mechanism,
+    pub inertias: &'a Inertias<T>,
+    pub poses: &'a Poses<T>,
+    /// M̂.
+    pub mass_matrix: &'a MassMatrix<T>,
+}
+
+impl<T: Lane> Gyroscopic<T> {
+    /// Without memory.
+    pub(crate) fn new(token: T::Token) -> Self {
+        Self {
+            token,
+            coriolis: CoriolisScratch::new(token),
+            C: Vec::new(),
+            matrix: Vec::new(),
+            load: Vec::new(),
+            is_skew: Vec::new(),
+            is_lost: Vec::new(),
+        }
+    }
+
     /// Turns the impulse `y = h (τ − G)` (nv) into `M̂ Δv − J`, see the page above.
     ///
-    /// `mass_matrix` is M̂; `v` the velocity before the step and the one at
-    /// which C is frozen; `impulse` is J (nv).
-    #[allow(clippy::too_many_arguments)] // the letters of the formula
-    pub(super) fn solve(
+    /// `step`: h and θ; `v`: velocity before the step, and the one at which C is frozen; `impulse`:
+    /// J (nv).
+    pub(crate) fn solve(
         &mut self,
-        model: &Model,
-        kinematics: &Kinematics,
-        mass_matrix: &MassMatrix<f64>,
-        (h, theta): (f64, f64),
-        (v, v_frozen): (&[f64], &[f64]),
-        impulse: &[f64],
-        y: &mut [f64],
+        of: &Turned<'_, T>,
+        step: (T, T),
+        [v, v_frozen]: [&[T]; 2],
+        impulse: &[T],
+        y: &mut [T],
     ) {
-        let nv = model.nv();
-        if self.C.nrows() != nv {
-            self.C = DMatrix::zeros(nv, nv);
-            self.matrix = DMatrix::zeros(nv, nv);
-            self.load = DVector::zeros(nv);
+        let (mechanism, nv) = (of.mechanism, v.len());
+        let (zero, nowhere) = (T::splat(self.token, 0.0), T::mask(self.token, 0));
+        for all in [&mut self.C, &mut self.matrix] {
+            all.resize(nv * nv, zero);
         }
-        coriolis_matrix(model, kinematics, v_frozen, &mut self.coriolis, &mut self.C);
-        let v = DVectorView::from_slice(v, nv);
-        let mechanism = model.mechanism();
-        self.is_skew.clear();
-        self.is_skew.resize(mechanism.n_clusters(), false);
+        self.load.resize(nv, zero);
+        for all in [&mut self.is_skew, &mut self.is_lost] {
+            all.clear();
+            all.resize(mechanism.n_clusters(), nowhere);
+        }
+        let (coriolis, C) = (&mut self.coriolis, &mut self.C);
+        coriolis_matrix(mechanism, of.inertias, of.poses, v_frozen, coriolis, C);
         loop {
-            let C = self.C.as_slice();
-            for (entry, c) in self.matrix.as_mut_slice().iter_mut().zip(C) {
-                *entry = theta * h * c;
+            let is_any_lost = T::vectorize(
+                self.token,
+                #[inline(always)]
+                || {
+                    self.set_up(of, step, v, impulse, y);
+                    self.eliminate(mechanism);
+                    self.is_lost.iter().any(|lanes| lanes.any())
+                },
+            );
+            if !is_any_lost {
+                break;
             }
-            mass_matrix.add_to_dense(mechanism, 0, &mut self.matrix);
-            let load = self.load.as_mut_slice();
-            for ((load, y), impulse) in load.iter_mut().zip(&*y).zip(impulse) {
-                *load = y + impulse;
-            }
-            self.load.gemv(-h, &self.C, &v, 1.0);
-            // If the symmetric part is positive definite, every pivot is positive without row
-            // exchanges.
-            let change = self.load.as_mut_slice();
-            let Some(cluster) = eliminate(model, &mut self.matrix, change, &self.is_skew) else {
-                mass_matrix.times(mechanism, change, y);
-                for (y, impulse) in y.iter_mut().zip(impulse) {
-                    *y -= impulse;
+            for cluster in 0..self.is_lost.len() {
+                let lost = self.is_lost[cluster];
+                self.is_skew[cluster] = self.is_skew[cluster] | lost;
+                self.is_lost[cluster] = nowhere;
+                if lost.any() {
+                    keep_skew_part(&mut self.C, nv, lost, |k| {
+                        mechanism.cluster_of_velocity(k) == cluster
+                    });
                 }
-                return;
-            };
-            self.is_skew[cluster] = true;
-            keep_skew_part(&mut self.C, |k| mechanism.cluster_of_velocity(k) == cluster);
+            }
+        }
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                of.mass_matrix.times(mechanism, &self.load, y);
+                for (y, impulse) in y.iter_mut().zip(impulse) {
+                    *y -= *impulse;
+                }
+            },
+        );
+    }
+
+    /// Matrix and right-hand side.
+    #[inline(always)]
+    fn set_up(&mut self, of: &Turned<'_, T>, (h, theta): (T, T), v: &[T], impulse: &[T], y: &[T]) {
+        let (nv, weight) = (v.len(), theta * h);
+        for (entry, c) in self.matrix.iter_mut().zip(&self.C) {
+            *entry = weight * *c;
+        }
+        of.mass_matrix.add_to_full(of.mechanism, &mut self.matrix);
+        for (load, (y, impulse)) in self.load.iter_mut().zip(y.iter().zip(impulse)) {
+            *load = *y + *impulse;
+        }
+        for (column, v) in self.C.chunks_exact(nv).zip(v) {
+            let turned = h * *v;
+            for (load, c) in self.load.iter_mut().zip(column) {
+                *load -= turned * *c;
+            }
+        }
+    }
+
+    /// Solves the system in place of the load, by elimination without exchanges. Notes where a
+    /// pivot is not positive although the symmetric part of C is there: with a positive definite
+    /// symmetric part every pivot is positive.
+    ///
+    /// The matrix has the sparsity of M. Elimination from the leaves to the base preserves it: each
+    /// velocity changes only the rows and columns of its path.
+    #[inline(always)]
+    fn eliminate(&mut self, mechanism: &Mechanism) {
+        let (A, b) = (&mut self.matrix[..], &mut self.load[..]);
+        let n = b.len();
+        for k in (0..n).rev() {
+            let (before, own) = A.split_at_mut(k * n);
+            let pivot = own[k];
+            let cluster = mechanism.cluster_of_velocity(k);
+            let is_lost = !pivot.like(0.0).lt(pivot) & !self.is_skew[cluster];
+            self.is_lost[cluster] = self.is_lost[cluster] | is_lost;
+            let path = mechanism.velocity_path(k);
+            let path = &path[..path.len() - 1];
+            for &j in path {
+                let factor = before[j * n + k] / pivot;
+                for &i in path {
+                    before[j * n + i] -= factor * own[i];
+                }
+            }
+            let factor = b[k] / pivot;
+            for &i in path {
+                b[i] -= factor * own[i];
+            }
+        }
+        for k in 0..n {
+            let path = mechanism.velocity_path(k);
+            let mut rest = b[k];
+            for &j in &path[..path.len() - 1] {
+                rest -= A[j * n + k] * b[j];
+            }
+            b[k] = rest / A[k * n + k];
         }
     }
 }
 
-/// `A ← ½ (A − Aᵀ)` for the velocities of a cluster.
-fn keep_skew_part(A: &mut DMatrix<f64>, is_own: impl Fn(usize) -> bool) {
-    for k in (0..A.ncols()).filter(|k| is_own(*k)) {
+/// `A ← ½ (A − Aᵀ)` of an (n, n) matrix for the velocities of a cluster, in the lanes of a mask.
+fn keep_skew_part<T: Lane>(A: &mut [T], n: usize, lanes: T::Mask, is_own: impl Fn(usize) -> bool) {
+    for k in (0..n).filter(|k| is_own(*k)) {
         for i in (0..=k).filter(|i| is_own(*i)) {
-            let half = 0.5 * (A[(i, k)] - A[(k, i)]);
-            A[(i, k)] = half;
-            A[(k, i)] = -half;
+            let (upper, lower) = (A[k * n + i], A[i * n + k]);
+            let half = upper.like(0.5) * (upper - lower);
+            A[k * n + i] = T::select(lanes, half, upper);
+            A[i * n + k] = T::select(lanes, -half, lower);
         }
     }
-}
-
-/// Solves `A x = b` in place of b, by elimination without exchanges. Returns a cluster of which a
-/// pivot is not positive, unless it is `forced`.
-///
-/// A has the sparsity of M. Elimination from the leaves to the base preserves it: each velocity
-/// changes only the rows and columns of its path.
-fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], forced: &[bool]) -> Option<usize> {
-    let n = b.len();
-    let A = A.as_mut_slice();
-    for k in (0..n).rev() {
-        let (before, own) = A.split_at_mut(k * n);
-        let pivot = own[k];
-        let cluster = model.mechanism().cluster_of_velocity(k);
-        if !forced[cluster] && (pivot.is_nan() || pivot <= 0.0) {
-            return Some(cluster);
-        }
-        let path = model.velocity_path(k);
-        let path = &path[..path.len() - 1];
-        let (base, joints) = path.split_at(model.lead(model.body_of_velocity(k)).min(path.len()));
-        let base_rows = base
-            .first()
-            .map_or(0..0, |&first| first..first + base.len());
-        let subtract = |x: &mut [f64], factor: f64| {
-            for (x, y) in x[base_rows.clone()].iter_mut().zip(&own[base_rows.clone()]) {
-                *x -= factor * y;
-            }
-            for &i in joints {
-                x[i] -= factor * own[i];
-            }
-        };
-        for column in (base.iter().chain(joints)).map(|j| j * n) {
-            let factor = before[column + k] / pivot;
-            subtract(&mut before[column..column + n], factor);
-        }
-        let factor = b[k] / pivot;
-        subtract(b, factor);
-    }
-    for k in 0..n {
-        let path = model.velocity_path(k);
-        let known: f64 = (path[..path.len() - 1].iter())
-            .map(|&j| A[j * n + k] * b[j])
-            .sum();
-        b[k] = (b[k] - known) / A[k * n + k];
-    }
-    None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::multibody::Configuration;
+    use crate::multibody::{Configuration, Kinematics, Model};
+    use crate::scalar::Single;
+
+    /// `(M̂ + θ h C) Δv` of what is found, and what it should be.
+    fn balance(model: &Model, v: &[f64], step: (f64, f64)) -> [Vec<f64>; 2] {
+        let mut q = Configuration::zero(model);
+        q.advance(model, v, 1.0);
+        let (kinematics, token) = (Kinematics::of(model, &q), Single::best());
+        let (mechanism, inertias) = (model.mechanism(), model.inertias());
+        let mut mass_matrix = MassMatrix::new(token, mechanism);
+        mass_matrix.update(mechanism, inertias, kinematics.poses());
+        let of = Turned {
+            mechanism,
+            inertias,
+            poses: kinematics.poses(),
+            mass_matrix: &mass_matrix,
+        };
+        let mut solver = Gyroscopic::new(token);
+        let impulse: Vec<f64> = v.iter().map(|v| 0.3 + v).collect();
+        let mut y: Vec<f64> = v.iter().map(|v| 0.7 * v).collect();
+        let right: Vec<f64> = y.iter().zip(&impulse).map(|(y, j)| y + j).collect();
+        solver.solve(&of, step, [v, v], &impulse, &mut y);
+        let (n, (h, theta)) = (v.len(), step);
+        let mut left = vec![0.0; n];
+        mass_matrix.times(mechanism, &solver.load, &mut left);
+        for k in 0..n {
+            for i in 0..n {
+                left[i] += h * solver.C[k * n + i] * (theta * solver.load[k] + v[k]);
+            }
+        }
+        [left, right]
+    }
 
     #[test]
-    fn elimination_along_the_paths_solves_what_the_dense_matrix_multiplies() {
+    fn the_change_of_velocity_balances_the_step_however_fast_the_machine_turns() {
         let model = Model::rover();
-        let mut q = Configuration::zero(&model);
-        let v: Vec<f64> = (0..model.nv()).map(|k| (1.7 * k as f64).sin()).collect();
-        q.advance(&model, &v, 1.0);
-        let kinematics = Kinematics::of(&model, &q);
-        let mut C = DMatrix::zeros(model.nv(), model.nv());
-        coriolis_matrix(
-            &model,
-            &kinematics,
-            &v,
-            &mut CoriolisScratch::default(),
-            &mut C,
-        );
-        let M = kinematics.mass_matrix(&model);
-        let A = &M + C * 0.01;
-        let mut x = DVector::from_column_slice(&v);
-        let pivot = eliminate(&model, &mut A.clone(), x.as_mut_slice(), &[false]);
-        assert_eq!(pivot, None);
-        assert!((A * x - DVector::from_column_slice(&v)).norm() < 1e-12);
-        let mut turned_round = -M;
-        let mut x = v;
-        let pivot = eliminate(&model, &mut turned_round, &mut x, &[false]);
-        assert_eq!(pivot, Some(0));
+        for speed in [1.0, 100.0, 1e4] {
+            let v: Vec<f64> = (0..model.nv())
+                .map(|k| speed * (1.7 * k as f64).sin())
+                .collect();
+            let [left, right] = balance(&model, &v, (0.01, 0.5));
+            let size = right.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            for (left, right) in left.iter().zip(&right) {
+                let error = (left - right).abs();
+                assert!(error < 1e-9 * speed * size, "{speed}: {left} {right}");
+            }
+        }
     }
 }

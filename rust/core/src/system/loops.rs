@@ -458,6 +458,21 @@ impl<T: Lane> Loops<T> {
         self.middle.solve_transposed(&mut self.impulses);
     }
 
+    /// `out += Aᵀ λ` (nv) with the [impulses](Self::find_impulses) of the last [`Self::close`] and
+    /// those of the contacts.
+    #[inline(always)]
+    pub(crate) fn add_generalized_impulse(
+        &mut self,
+        impulses: &(impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone),
+        out: &mut [T],
+    ) {
+        self.find_impulses(impulses);
+        let rows = self.middle.rows.chunks_exact(out.len());
+        for (row, impulse) in rows.zip(&self.impulses) {
+            add(out, row, *impulse);
+        }
+    }
+
     /// Newton's iteration on `φ(q) = 0` along `M̂⁻¹ Aᵀ`, and the basis at its end. Returns the
     /// widest gap that is left, m or rad.
     pub(crate) fn project_position(
@@ -627,15 +642,6 @@ impl Loops<f64> {
             system.hold(model, c, &free, held);
         }
         system.multiply_spread(model);
-    }
-
-    /// `out += Aᵀ λ` (nv) with the impulses of the last [`Self::close`] and the contacts'.
-    pub(super) fn add_generalized_impulse(&mut self, p: &[f64], out: &mut [f64]) {
-        self.find_impulses(&each(p));
-        let rows = self.middle.rows.chunks_exact(out.len());
-        for (row, impulse) in rows.zip(&self.impulses) {
-            add(out, row, *impulse);
-        }
     }
 
     /// Projects the configuration onto the loops and the velocity onto their rates, and keeps the

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::command::Command;
 use super::extent::{Turning, displacement, tolerated};
+use super::gyroscopic::Turned;
 use super::loops::{each, placed};
 use super::momentum_balance::BalanceScene;
 use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
@@ -330,7 +331,7 @@ impl Dynamics for TreeSystem<'_> {
 
     fn add_loop_impulse(&mut self, p: &[f64], out: &mut [f64]) {
         if let Some(loops) = &mut self.parts.loops {
-            loops.add_generalized_impulse(p, out);
+            loops.add_generalized_impulse(&each(p), out);
         }
     }
 
@@ -388,15 +389,14 @@ impl Forces for TreeSystem<'_> {
     ) {
         self.load_with_bias(options, start, None, y);
         let (parts, model) = (&mut *self.parts, self.model);
-        parts.gyroscopic.solve(
-            model,
-            &parts.kinematics,
-            &parts.mass_matrix,
-            (options.time_step, options.theta),
-            (start.v, v_mean),
-            impulse,
-            y,
-        );
+        let of = Turned {
+            mechanism: model.mechanism(),
+            inertias: model.inertias(),
+            poses: parts.kinematics.poses(),
+            mass_matrix: &parts.mass_matrix,
+        };
+        let velocities = [start.v, v_mean];
+        (parts.gyroscopic).solve(&of, step(options), velocities, impulse, y);
         parts.factor.half_solve(model.mechanism(), y);
     }
 

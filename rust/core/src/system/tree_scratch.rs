@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::command::Wrench;
+use super::command::{Wrench, add_wrench};
 use super::drives::Drives;
-use super::gyroscopic::GyroscopicScratch;
+use super::gyroscopic::Gyroscopic;
 use super::loops::Loops;
 use super::momentum_balance::MomentumBalance;
 use super::sand::SandContact;
@@ -18,7 +18,7 @@ use crate::multibody::{
     Configuration, EnergyScratch, Factor, Kinematics, LaneConfiguration, MassMatrix, Model,
 };
 use crate::sand::{RutMap, SandState};
-use crate::scalar::{MAX_LANES, Single};
+use crate::scalar::{MAX_LANES, Single, Vec3};
 
 /// Poses, matrices and momenta of a tree: scratch, allocated once.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct TreeScratch {
     pub(super) drives: Drives<f64>,
     pub(super) q: LaneConfiguration<f64>,
     pub(super) energy: EnergyScratch<f64>,
-    pub(super) gyroscopic: GyroscopicScratch,
+    pub(super) gyroscopic: Gyroscopic<f64>,
     pub(super) force: Vec<f64>,
     /// Generalized force of the wrenches at the midpoint (nv); empty without any.
     pub(super) applied: Vec<f64>,
@@ -74,7 +74,7 @@ impl TreeScratch {
             drives: Drives::new(token, mechanism),
             q: LaneConfiguration::new(token, mechanism),
             energy: EnergyScratch::new(token, mechanism),
-            gyroscopic: GyroscopicScratch::default(),
+            gyroscopic: Gyroscopic::new(token),
             force: vec![0.0; model.nv()],
             applied: Vec::new(),
             of_sand: Vec::new(),
@@ -218,8 +218,11 @@ impl TreeScratch {
         }
         self.applied.resize(model.nv(), 0.0);
         for wrench in wrenches {
-            let R = self.kinematics.spun(model, wrench.body(model)).into();
-            wrench.add_force(model, self.kinematics.poses(), &R, &mut self.applied);
+            let body = wrench.body(model);
+            let R = self.kinematics.spun(model, body).into();
+            let own = wrench.on_body(model).map(|[x, y, z]| Vec3::new(x, y, z));
+            let placed = (self.kinematics.poses(), &R);
+            add_wrench(model.mechanism(), body, own, placed, &mut self.applied);
         }
     }
 

@@ -34,11 +34,13 @@ impl<T: Lane> Block<T> {
                 .detect_joints(machine, places, end, &self.v, &forecast);
             self.fall_back(Fallback::Contact, too_many);
         }
+        let elastic = self.number(self.options.restitution);
+        let (zero, one) = (self.number(0.0), self.number(1.0));
         for &slot in self.contacts.used() {
-            self.mu[slot] = match self.contacts.joint_row(slot) {
-                None => self.friction,
-                Some((_, JointRow::Stop(_))) => self.number(0.0),
-                Some((_, JointRow::Friction)) => self.number(1.0),
+            (self.mu[slot], self.restitution[slot]) = match self.contacts.joint_row(slot) {
+                None => (self.friction, elastic),
+                Some((_, JointRow::Stop(_))) => (zero, elastic),
+                Some((_, JointRow::Friction)) => (one, zero),
             };
         }
         if !self.options.materials.is_empty() {
@@ -54,9 +56,10 @@ impl<T: Lane> Block<T> {
             *persists = *is_same & *has;
         }
         self.contacts.intersect(&mut self.persists);
+        self.contacts.unite(&mut self.is_gyroscopic);
     }
 
-    /// Friction of contacts whose two materials have a law of their own.
+    /// Friction and restitution of contacts whose two materials have a law of their own.
     #[cold]
     fn mix_materials(&mut self) {
         for lane in (0..T::LANES).filter(|&lane| self.going.get(lane)) {
@@ -66,8 +69,9 @@ impl<T: Lane> Block<T> {
             };
             for (slot, contact) in self.contacts.all_of(&self.machine, lane) {
                 let law = contact.between_materials(model, &**terrain, &self.options.materials);
-                if let Some([mu, _]) = law {
+                if let Some([mu, restitution]) = law {
                     self.mu[slot].set(lane, mu);
+                    self.restitution[slot].set(lane, restitution);
                 }
             }
         }

@@ -4,6 +4,15 @@ use super::Block;
 use crate::multibody::bias::bias;
 use crate::scalar::{Lane, LaneMask};
 
+/// A velocity at which forces are evaluated.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum At {
+    /// Before the step.
+    Start,
+    /// In its mean.
+    Mean,
+}
+
 impl<T: Lane> Block<T> {
     /// The implicit terms of motors, held joints, springs and dampers; `is_first`: their branches
     /// and weights, too.
@@ -34,13 +43,14 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.push_and_drive(is_any, persists),
         );
-        self.weigh(true);
+        self.load_implicitly(is_any);
+        self.weigh(Some(At::Start));
         T::vectorize(
             token,
             #[inline(always)]
             || self.add_torque_and_pushed(is_any),
         );
-        self.weigh(false);
+        self.weigh(Some(At::Mean));
         T::vectorize(
             token,
             #[inline(always)]
@@ -74,11 +84,19 @@ impl<T: Lane> Block<T> {
         if let Some(sand) = &self.sand {
             sand.add_impulse(self.options.time_step, &self.v, &mut self.torque);
         }
+        self.push(step.0);
     }
 
-    /// `y` = the bias at the velocity v, or at the mean velocity.
-    fn weigh(&mut self, at_start: bool) {
-        let v = if at_start { &self.v } else { &self.v_mean };
+    /// `y` = the bias at a velocity; at rest, with `None`, it is that of gravity.
+    pub(super) fn weigh(&mut self, at: Option<At>) {
+        let v = match at {
+            Some(At::Start) => &self.v,
+            Some(At::Mean) => &self.v_mean,
+            None => {
+                self.v_mean.fill(T::splat(self.token, 0.0));
+                &self.v_mean
+            }
+        };
         bias(
             &self.machine,
             &self.inertias,
@@ -111,28 +129,36 @@ impl<T: Lane> Block<T> {
 
     #[inline(always)]
     fn add_torque_and_correction(&mut self, is_any: bool) {
+        let (h, _) = self.time_step();
+        for (y, torque) in self.y.iter_mut().zip(&self.torque) {
+            *y = *torque - h * *y;
+        }
+        self.correct_impulse(is_any);
+        self.take_implicit();
+        self.close_loops();
+        self.rows.local(&self.contacts, &self.y, &mut self.u);
+        self.yields.shift(&self.contacts, &mut self.u);
+        self.rebound(h.like(1.0));
+        self.hold_joints(-h);
+    }
+
+    /// Adds the deferred correction r to the impulse `y`, and turns it into factor coordinates.
+    #[inline(always)]
+    pub(super) fn correct_impulse(&mut self, is_any: bool) {
         let (h, theta) = self.time_step();
         let share = h.like(1.0) - theta;
         let pushed = self.pushed.iter().zip(&self.persistent);
         let pushed = pushed.zip(&self.cluster_of);
-        let y = self.y.iter_mut().zip(&self.torque);
-        for ((y, torque), ((pushed, before), cluster)) in y.zip(pushed) {
-            *y = *torque - h * *y;
-            if is_any {
-                let persists = self.persists[*cluster];
-                *y = T::select(persists, *y + share * (*before - *pushed), *y);
-            }
+        for (y, ((pushed, before), cluster)) in self.y.iter_mut().zip(pushed).filter(|_| is_any) {
+            let persists = self.persists[*cluster];
+            *y = T::select(persists, *y + share * (*before - *pushed), *y);
         }
         self.factor.half_solve(&self.machine, &mut self.y);
-        self.close_loops();
-        self.rows.local(&self.contacts, &self.y, &mut self.u);
-        self.yields.shift(&self.contacts, &mut self.u);
-        self.hold_joints(-h);
     }
 
     /// Makes the free change of the velocity obey the loops.
     #[inline(always)]
-    fn close_loops(&mut self) {
+    pub(super) fn close_loops(&mut self) {
         if let Some(loops) = &mut self.rows.loops {
             loops.close(self.options.theta, &self.v, &self.v, &mut self.y);
         }

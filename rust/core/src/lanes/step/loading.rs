@@ -21,6 +21,7 @@ impl<T: Lane> Block<T> {
         self.friction.set(lane, rover.options.friction_coefficient);
         self.ground.set_lane(lane, rover.terrain);
         self.load_sand(lane, rover);
+        self.wrenches[lane].clone_from(&rover.command.wrenches);
         let joints = rover.model.joints();
         self.drives.set_lane(lane, joints, rover.command);
         self.drives.set_work(lane, rover.drive_work);
@@ -110,6 +111,7 @@ impl<T: Lane> Block<T> {
     /// Empties a lane; its numbers stay, unused.
     pub fn clear(&mut self, lane: usize) {
         self.occupied = self.occupied & !T::mask(self.token, 1 << lane);
+        self.wrenches[lane].clear();
     }
 
     /// Follows after rovers were loaded.

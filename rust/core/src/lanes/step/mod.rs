@@ -1,7 +1,6 @@
 //! The fast step of a block of rovers.
 //!
-//! The formulas are those of [`crate::integrator::moreau_jean`] with explicit gyroscopic terms and
-//! inelastic contact. A step has three parts, between which its contact problems are solved with
+//! The formulas are those of [`crate::integrator::moreau_jean`]. A step has three parts, between which its contact problems are solved with
 //! those of other blocks ([`crate::solver::batch::queue`]):
 //!
 //! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
@@ -13,7 +12,8 @@
 //! A lane whose step cannot be taken falls back to the general one: its state stays as it was.
 //!
 //! `loading`: rovers come and go; `phases`: the three parts, and what they are made of:
-//! `contact_list`, `forces`, `sinking`, `impacts`, `balance`, `projection`, `closing`.
+//! `contact_list`, `forces`, `turning`, `pushing`, `sinking`, `rebound`, `impacts`, `balance`,
+//! `projection`, `closing`.
 
 mod balance;
 mod closing;
@@ -23,11 +23,15 @@ mod impacts;
 mod loading;
 mod phases;
 mod projection;
+mod pushing;
+mod rebound;
 mod sinking;
+mod turning;
 
 use std::sync::Arc;
 
 use self::balance::{Balance, Energies};
+use self::turning::Implicit;
 use super::contacts::Contacts;
 use super::ground::Ground;
 use super::joint_slots::JointRow;
@@ -43,13 +47,14 @@ use crate::multibody::{
 use crate::sand::RutMap;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::solver::batch::problem::{MAX_CONTACTS, Triple};
+use crate::system::command::Wrench;
 use crate::system::drives::Drives;
 use crate::system::sand::SandContact;
 
 /// Why a lane fell back in its last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fallback {
-    /// The rover turns too fast for explicit gyroscopic terms.
+    /// The rover turns too fast for one step.
     Turning,
     /// The rover has more contacts than slots or a problem hold, a joint may reach both of its
     /// stops, or the ground is unknown.
@@ -104,6 +109,10 @@ pub struct Block<T: Lane> {
     /// Friction coefficient of contacts without a law of their materials, and of each slot.
     friction: T,
     mu: Vec<T>,
+    /// Coefficient of restitution of each slot, and the lanes whose contact bounces there although
+    /// its wheel yields.
+    restitution: Vec<T>,
+    bounces: Vec<T::Mask>,
     /// Most dry friction of each joint that has it, N m or N.
     dry_friction: Vec<T>,
     ground: Ground<T>,
@@ -112,6 +121,9 @@ pub struct Block<T: Lane> {
     /// rover.
     sand: Option<Box<SandContact<T>>>,
     ruts: Vec<RutMap>,
+    /// What pushes the rover of each lane, and its generalized force at the midpoint (nv).
+    wrenches: [Vec<Wrench>; MAX_LANES],
+    applied: Vec<T>,
     /// Impulses of each lane's last step, and their generalized impulse (nv) where the contacts
     /// persisted.
     memories: [WarmStart; MAX_LANES],
@@ -139,6 +151,9 @@ pub struct Block<T: Lane> {
     mass_matrix: MassMatrix<T>,
     factor: Factor<T>,
     bias_scratch: BiasScratch<T>,
+    /// By cluster: lanes in which the gyroscopic terms of its group are implicit, and how.
+    is_gyroscopic: Vec<T::Mask>,
+    implicit: Option<Box<Implicit<T>>>,
     energy_scratch: EnergyScratch<T>,
     contacts: Contacts<T>,
     rows: Rows<T>,
@@ -204,6 +219,8 @@ impl<T: Lane> Block<T> {
             drives: Drives::new(token, machine),
             sand: None,
             ruts: vec![RutMap::default(); T::LANES],
+            wrenches: [const { Vec::new() }; MAX_LANES],
+            applied: vector(),
             memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, machine.nv())),
             next_memories: std::array::from_fn(|_| WarmStart::with_capacity(MAX_CONTACTS, 0)),
             persistent: vector(),
@@ -225,6 +242,8 @@ impl<T: Lane> Block<T> {
             mass_matrix: MassMatrix::new(token, machine),
             factor: Factor::new(token, machine),
             bias_scratch: BiasScratch::new(token, machine),
+            is_gyroscopic: masks(),
+            implicit: None,
             energy_scratch: EnergyScratch::new(token, machine),
             rows: Rows::new(token, machine, contacts.n_slots()),
             yields: Yields::new(token, machine, contacts.n_slots()),
@@ -236,6 +255,8 @@ impl<T: Lane> Block<T> {
             impact: vec![nobody; slots.len()],
             has_impact: masks(),
             mu: vec![zero; slots.len()],
+            restitution: vec![zero; slots.len()],
+            bounces: vec![nobody; slots.len()],
             u: slots,
             y: vector(),
             torque: vector(),

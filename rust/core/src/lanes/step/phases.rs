@@ -12,7 +12,6 @@ use crate::law::compliance::Held;
 use crate::multibody::Model;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::batch::problem::ContactProblem;
-use crate::system::extent::Turning;
 
 /// Sweeps before pivoting, of machines with many contacts. Measured on six cylinders with torques
 /// of up to 60 N m, drawn anew every ten steps: 3.4 systems a problem after one, 3.1 after two, 3.0
@@ -57,6 +56,10 @@ impl<T: Lane> Block<T> {
             || self.add_implicit(is_first),
         );
         self.sink(is_first);
+        if is_first {
+            self.apply_wrenches();
+        }
+        self.keep_mass_matrix();
         probe.end(Phase::MassMatrix);
         let is_definite = self
             .mass_matrix
@@ -74,6 +77,10 @@ impl<T: Lane> Block<T> {
                 #[inline(always)]
                 || self.recall(problems),
             );
+            self.bounce_off_treads();
+        }
+        if !self.options.warm_start {
+            self.forget_starts(problems, is_first);
         }
         if !self.yields.is_empty() {
             let laws = &self.yields.laws;
@@ -102,15 +109,37 @@ impl<T: Lane> Block<T> {
     /// `is_first`: the others have their answers.
     #[inline(always)]
     fn begin_near(&mut self, problems: &mut [ContactProblem], is_first: bool) {
-        let lanes = if is_first {
-            self.occupied
+        let lanes = self.asked(is_first);
+        if self.options.warm_start {
+            self.p.copy_from_slice(&self.p_last);
         } else {
-            self.retaken
-        };
-        self.p.copy_from_slice(&self.p_last);
+            let zero = self.number(0.0);
+            self.p.fill([zero; 3]);
+        }
         let data = (&self.u[..], &self.mu[..]);
         self.rows.sweep(&self.contacts, SWEEPS, data, &mut self.p);
         write_start(&self.contacts, lanes, &self.p, problems);
+    }
+
+    /// Lanes whose problems are solved: those of lanes that are retaken unless `is_first`.
+    #[inline(always)]
+    fn asked(&self, is_first: bool) -> T::Mask {
+        if is_first {
+            self.occupied
+        } else {
+            self.retaken
+        }
+    }
+
+    /// Lets the problems start from no impulses.
+    #[cold]
+    fn forget_starts(&self, problems: &mut [ContactProblem], is_first: bool) {
+        let lanes = self.asked(is_first);
+        for (index, problem) in problems[..self.n_problems()].iter_mut().enumerate() {
+            if lanes.get(Self::lane_of(index)) {
+                problem.p.fill(0.0);
+            }
+        }
     }
 
     /// Impulses of the last step by slot, and the laws of contacts that yield.
@@ -178,13 +207,7 @@ impl<T: Lane> Block<T> {
     #[inline(always)]
     fn predict(&mut self) {
         let (h, theta) = (self.options.time_step, self.options.theta);
-        let zero = self.number(0.0);
-        let mut is_fast = T::mask(self.token, 0);
-        for cluster in 0..self.n_clusters() {
-            let turning = Turning::of_cluster(zero, &self.machine, &self.v, cluster);
-            is_fast = is_fast | turning.is_gyroscopic(self.number(h));
-        }
-        self.fall_back(Fallback::Turning, is_fast);
+        self.find_turning();
         let machine = &*self.machine;
         self.middle
             .set_moved(machine, &self.start, &self.v, (1.0 - theta) * h);
@@ -223,6 +246,7 @@ impl<T: Lane> Block<T> {
             let memory = &mut self.next_memories[lane];
             self.contacts.remember(lane, problems, memory);
         }
+        self.forget_bounces();
         self.fall_back(Fallback::Solver, !T::mask(token, solved));
         T::vectorize(
             token,
@@ -238,7 +262,7 @@ impl<T: Lane> Block<T> {
         T::vectorize(
             token,
             #[inline(always)]
-            || self.audit(),
+            || self.audit(problems),
         );
         T::vectorize(
             token,
@@ -301,6 +325,7 @@ impl<T: Lane> Block<T> {
             .read(&self.contacts, problems, Answer::Velocities, &mut self.u);
         self.yields.unshift(&self.contacts, &self.p, &mut self.u);
         let (h, _) = self.time_step();
+        self.rebound(-h.like(1.0));
         self.hold_joints(h);
         self.rows
             .add_impulses(&self.contacts, self.occupied, &self.p, &mut self.y);
@@ -363,13 +388,14 @@ impl<T: Lane> Block<T> {
     /// Lets lanes of which a group does not balance fall back, and corrects the velocity of groups
     /// with a little too much energy.
     #[inline(always)]
-    fn audit(&mut self) {
+    fn audit(&mut self, problems: &[ContactProblem]) {
         let (h, theta) = self.time_step();
         let mut own = std::mem::take(&mut self.energies);
         let mut balances = std::mem::take(&mut self.balances);
         let (places, velocities) = (&self.start.joints, [&self.v[..], &self.v_end]);
         let (machine, step, zero) = (&*self.machine, (h, theta), h.like(0.0));
         (self.drives).work(machine, step, places, velocities, &mut own.of_drives);
+        self.add_work_of_wrenches(&mut own.of_drives);
         let [before, after] = &mut own.stored;
         self.drives.stored(machine, zero, places, before);
         (self.drives).stored(machine, zero, &self.end.joints, after);
@@ -409,7 +435,7 @@ impl<T: Lane> Block<T> {
             is_corrected = is_corrected | balance.is_corrected;
         }
         if is_corrected.any() {
-            self.correct(conditions);
+            self.correct(problems, conditions);
         }
         self.energies = own;
         self.fall_back(Fallback::Energy, is_lost);
@@ -465,7 +491,11 @@ impl<T: Lane> Block<T> {
     }
 
     /// Corrects the velocities, and the local ones. `conditions`: of each group.
-    fn correct(&mut self, conditions: impl Fn(usize) -> Conditions<T>) {
+    fn correct(
+        &mut self,
+        problems: &[ContactProblem],
+        conditions: impl Fn(usize) -> Conditions<T>,
+    ) {
         let found = self.balances.iter().enumerate();
         let mut all: Vec<Correction<T>> = found
             .map(|(c, balance)| balance.correction(&conditions(c)))
@@ -482,6 +512,7 @@ impl<T: Lane> Block<T> {
         for tree in &self.machine.trees {
             all[tree.cluster].apply(tree, &mut self.v_end);
         }
+        self.note_violations(problems, &all);
         let lanes: Vec<T::Mask> = all.iter().map(|own| own.lanes).collect();
         let shares: Vec<T> = all.iter().map(|own| own.share).collect();
         for &slot in self.contacts.used() {

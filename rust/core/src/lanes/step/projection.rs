@@ -154,7 +154,7 @@ impl<T: Lane> Block<T> {
             self.time_step(),
             &self.start.joints,
             [&self.v, &self.v_end, &self.y],
-        );
+        ) + self.work_on_the_way();
         let token = self.token;
         self.weigh_moved();
         T::vectorize(

@@ -141,13 +141,15 @@ pub fn velocity<T: Lane>(v: &[T]) -> Motion<T> {
 }
 
 /// The six screws S of a body that moves at the velocity V, about its origin, and their rates Ṡ.
+#[inline(always)]
 #[must_use]
-pub fn screws_and_rates(V: &Motion<f64>) -> [[Motion<f64>; 2]; NV] {
-    let zero = Vec3::new(0.0, 0.0, 0.0);
+pub fn screws_and_rates<T: Lane>(V: &Motion<T>) -> [[Motion<T>; 2]; NV] {
+    let token = V.swing.x.token();
+    let zero = Vec3::splat(token, [0.0; 3]);
     let slide = |swing| Motion { axis: zero, swing };
     let turn = |axis| Motion { axis, swing: zero };
     let [x, y, z] =
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|[x, y, z]| Vec3::new(x, y, z));
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| Vec3::splat(token, e));
     let linear = |e| [slide(e), slide(zero)];
     let angular = |e| [turn(e), slide(V.swing.cross(e))];
     [

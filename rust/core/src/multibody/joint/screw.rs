@@ -29,7 +29,7 @@ impl<T: Lane> Motion<T> {
 
     /// `V × S`: the rate of a motion S whose axis is fixed in a body that moves at the velocity V,
     /// this one.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn rate_of(&self, S: &Self) -> Self {
         Self {

@@ -319,13 +319,6 @@ impl Model {
         self.mechanism.path(b)
     }
 
-    /// Velocity indices from the root up to and including velocity `k`.
-    #[inline]
-    #[must_use]
-    pub(crate) fn velocity_path(&self, k: usize) -> &[usize] {
-        self.mechanism.velocity_path(k)
-    }
-
     /// Length of the longest path: the stride of all arrays stored along paths.
     #[inline]
     #[must_use]

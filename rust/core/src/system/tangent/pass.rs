@@ -14,6 +14,7 @@ use crate::multibody::Configuration;
 use crate::multibody::bias::bias;
 use crate::multibody::energy::energies;
 use crate::scalar::{Dual, Lane, Vec3};
+use crate::system::command::add_wrench;
 
 /// Positions at the end of a step: before and after the projection.
 #[derive(Clone, Copy, Debug)]
@@ -148,7 +149,9 @@ impl<T: Lane> Tangent<T> {
         for wrench in &scene.command.wrenches {
             let (poses, body) = (&self.poses_middle, wrench.body(scene.model));
             let R = poses.spun(mechanism, &self.middle, body);
-            wrench.add_force(scene.model, poses, &R, &mut self.applied);
+            let own = wrench.on_body(scene.model);
+            let own = own.map(|x| Vec3::splat(self.token, x));
+            add_wrench(mechanism, body, own, (poses, &R), &mut self.applied);
         }
         for (torque, force) in self.torque.iter_mut().zip(&self.applied) {
             *torque += step.0 * *force;

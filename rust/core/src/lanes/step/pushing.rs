@@ -1,0 +1,82 @@
+//! Wrenches that act on the rovers of a block from outside.
+
+use super::Block;
+use crate::integrator::work::Work;
+use crate::scalar::{Lane, Vec3};
+use crate::system::command::add_wrench;
+
+impl<T: Lane> Block<T> {
+    /// Whether anything pushes a rover.
+    #[inline(always)]
+    fn is_pushed(&self) -> bool {
+        self.wrenches.iter().any(|own| !own.is_empty())
+    }
+
+    /// `applied`: generalized force of the wrenches at the midpoint. The first wrenches of all
+    /// lanes that are on one body are added at once, then the second ones.
+    pub(super) fn apply_wrenches(&mut self) {
+        if !self.is_pushed() {
+            return;
+        }
+        let none = Vec3::splat(self.token, [0.0; 3]);
+        self.applied.fill(none.x);
+        let most = self.wrenches.iter().map(Vec::len).max().unwrap_or(0);
+        for place in 0..most {
+            let mut left: Vec<(usize, usize, [[f64; 3]; 3])> = (0..T::LANES)
+                .filter_map(|lane| {
+                    let (model, own) = (self.models[lane].as_ref()?, &self.wrenches[lane]);
+                    let wrench = own.get(place)?;
+                    Some((wrench.body(model), lane, wrench.on_body(model)))
+                })
+                .collect();
+            while let Some(&(body, ..)) = left.first() {
+                let mut all = [none; 3];
+                left.retain(|&(own, lane, numbers)| {
+                    for (all, own) in all.iter_mut().zip(numbers).filter(|_| own == body) {
+                        all.set(lane, own);
+                    }
+                    own != body
+                });
+                let R = self.poses_middle.spun(&self.machine, &self.middle, body);
+                let placed = (&self.poses_middle, &R);
+                add_wrench(&self.machine, body, all, placed, &mut self.applied);
+            }
+        }
+    }
+
+    /// Adds the impulse of the wrenches over the step, of length `h`, to `torque`.
+    #[inline(always)]
+    pub(super) fn push(&mut self, h: T) {
+        if self.is_pushed() {
+            for (torque, force) in self.torque.iter_mut().zip(&self.applied) {
+                *torque += h * *force;
+            }
+        }
+    }
+
+    /// Adds the work of the wrenches on each cluster over the step, J.
+    #[inline(always)]
+    pub(super) fn add_work_of_wrenches(&self, out: &mut [Work<T>]) {
+        if !self.is_pushed() {
+            return;
+        }
+        let (h, theta) = self.time_step();
+        let velocities = self.v.iter().zip(&self.v_end);
+        let forces = self.applied.iter().zip(&self.cluster_of);
+        for ((force, cluster), (v, v_end)) in forces.zip(velocities) {
+            let mean = theta * *v_end + (h.like(1.0) - theta) * *v;
+            out[*cluster].supplied += h * *force * mean;
+        }
+    }
+
+    /// Work of the wrenches over the displacement `y` of the projection, J.
+    pub(super) fn work_on_the_way(&self) -> T {
+        let mut sum = self.number(0.0);
+        if self.is_pushed() {
+            for (force, way) in self.applied.iter().zip(&self.y) {
+                sum += *force * *way;
+            }
+        }
+        sum
+    }
+}
