@@ -41,11 +41,10 @@ quick: $(STAMPS)/core $(STAMPS)/test ## while editing: formatting, lint of Pytho
 pytest-quick:
 	$(BIN)/pytest --quiet --numprocesses 1 --tier quick
 
-test: ## set up, and run the checks and tests that a change must pass (what .ci/run calls)
-	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/test $(STAMPS)/debian-test
-	@$(SIDE_BY_SIDE) test-rust types
-	@$(SIDE_BY_SIDE) lint deny docs
-	@$(MAKE) --no-print-directory test-python
+test: ## set up, and run the tests that a change must pass, Rust and Python side by side
+	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/test $(STAMPS)/debian-demo $(STAMPS)/debian-test
+	@$(MAKE) --no-print-directory $(STAMPS)/fmu
+	@$(SIDE_BY_SIDE) test-python test-rust
 
 # One part goes on after another has failed; the last lines tell how each ended.
 PARTS = lint types deny docs test-rust test-python torture same-bits train-rllib
@@ -57,7 +56,7 @@ test-all: ## every test there is, as long as it takes, and a table of its parts:
 	  table+=$$(printf '%-12s %s %6d s' $$part $$ended $$((SECONDS - begin)))$$'\n'; \
 	done; printf '\n%s' "$$table"; exit $$failed
 
-check: lint types deny ## lint, types, licences and sources, Rust and Python: what the commit hooks call
+check: lint types deny ## lint, types, licences and sources, Rust and Python: what the commit hooks call, and with docs .ci/run after the tests
 
 lint: $(STAMPS)/test ## formatting and lint, Rust and Python
 	cargo fmt --all --check

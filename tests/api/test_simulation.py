@@ -304,7 +304,7 @@ def test_a_step_that_its_budget_ended_says_so():
     solved = boxes_on_each_other().step(20)
     assert solved.is_converged
     assert not solved.budget_exhausted
-    scant = boxes_on_each_other(budget=100, warm_start=False)  # a general step: the fast one needs less than that
+    scant = boxes_on_each_other(budget=100, solver="newton")
     unsolved = scant.step(20)
     assert unsolved.status == "not_converged"
     assert unsolved.budget_exhausted

@@ -122,8 +122,8 @@ struct Met {
 }
 
 /// Drives a machine that is let go `height` above the plane, m, and pushed about by forces of up to
-/// `push` times its weight. It begins to turn, and its wheels to spin, with up to `spin` rad/s about
-/// every axis.
+/// `push` times its weight. It begins to turn, and its wheels to spin, with up to `spin` rad/s
+/// about every axis.
 fn drive(model: &Arc<Model>, options: StepOptions, [height, push, spin]: [f64; 3]) -> Met {
     let mut numbers = Random(5);
     let mass: f64 = model.bodies().iter().map(|body| body.mass).sum();
@@ -254,7 +254,7 @@ fn every_joint_and_force_obeys_the_law_of_the_general_step() {
     }
 }
 
-/// Rovers that bounce, by one number or by pairs of materials, on rigid wheels and on yielding ones;
+/// Rovers that bounce, by one number or by pairs of materials, on rigid and on yielding wheels;
 /// that forces push about; whose solves start from nothing; and that turn too fast for explicit
 /// gyroscopic terms.
 #[test]

@@ -106,16 +106,11 @@ impl<T: Lane> Rows<T> {
         let common = paths
             .iter()
             .flat_map(|a| paths.iter().map(|b| shared(a, b)));
-        let first = (machine.trees.first().filter(|tree| tree.is_free)).map(|_| 0);
-        let n_first = first.map_or(0, |_| BASE);
-        let all = (n_first..machine.nv()).map(|velocity| Mover {
-            velocity,
-            motion: 0, // not read
-        });
+        let (first, all) = whole_path(machine);
         let movers = (bodies.iter())
             .map(|body| match body {
                 Some(body) => machine.movers(*body).to_vec(),
-                None => all.clone().collect(),
+                None => all.clone(),
             })
             .collect();
         let n_clusters = machine.n_problems();
@@ -936,6 +931,18 @@ impl<T: Lane> Rows<T> {
             }
         }
     }
+}
+
+/// First velocity of the base, if the first root is free, and the others of a path with all
+/// velocities.
+fn whole_path(machine: &Machine) -> (Option<usize>, Vec<Mover>) {
+    let is_free = machine.trees.first().is_some_and(|tree| tree.is_free);
+    let (first, lead) = if is_free { (Some(0), BASE) } else { (None, 0) };
+    let others = (lead..machine.nv()).map(|velocity| Mover {
+        velocity,
+        motion: 0, // not read
+    });
+    (first, others.collect())
 }
 
 /// Whether a slot is for the dry friction of a joint.

@@ -163,6 +163,7 @@ impl<T: Lane> Momentum<T> {
         }
     }
 
+    #[inline(always)]
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self {
             linear: self.linear + other.linear,

@@ -53,7 +53,7 @@ impl Wrench {
         model.frames()[self.solid].body
     }
 
-    /// Its numbers on that body: point in the body's frame, m; force, N, and moment, N m.
+    /// Numbers of the wrench on its body: point in the body's frame, m; force, N; moment, N m.
     pub(crate) fn on_body(&self, model: &Model) -> [[f64; 3]; 3] {
         let frame = &model.frames()[self.solid];
         let point = frame.position + frame.rotation * Vector3::from(self.point);

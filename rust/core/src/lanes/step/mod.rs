@@ -1,7 +1,8 @@
 //! The fast step of a block of rovers.
 //!
-//! The formulas are those of [`crate::integrator::moreau_jean`]. A step has three parts, between which its contact problems are solved with
-//! those of other blocks ([`crate::solver::batch::queue`]):
+//! The formulas are those of [`crate::integrator::moreau_jean`]. A step has three parts, between
+//! which its contact problems are solved with those of other blocks
+//! ([`crate::solver::batch::queue`]):
 //!
 //! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
 //! 2. [`Block::conclude`] — the new velocity and configuration, energy audit, and where contacts
@@ -12,14 +13,15 @@
 //! A lane whose step cannot be taken falls back to the general one: its state stays as it was.
 //!
 //! `loading`: rovers come and go; `phases`: the three parts, and what they are made of:
-//! `contact_list`, `forces`, `turning`, `pushing`, `sinking`, `rebound`, `impacts`, `balance`,
-//! `projection`, `closing`.
+//! `contact_list`, `forces`, `turning`, `implicit`, `pushing`, `sinking`, `rebound`, `impacts`,
+//! `balance`, `projection`, `closing`.
 
 mod balance;
 mod closing;
 mod contact_list;
 mod forces;
 mod impacts;
+mod implicit;
 mod loading;
 mod phases;
 mod projection;
@@ -31,7 +33,7 @@ mod turning;
 use std::sync::Arc;
 
 use self::balance::{Balance, Energies};
-use self::turning::Implicit;
+use self::implicit::Implicit;
 use super::contacts::Contacts;
 use super::ground::Ground;
 use super::joint_slots::JointRow;

@@ -57,8 +57,8 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    /// Enters in the reports how far the corrections of the velocity violate the law of restitution:
-    /// a closed contact that is to rebound at u_N separates at a share of it. See
+    /// Enters in the reports how far the corrections of the velocity violate the law of
+    /// restitution: a closed contact that is to rebound at u_N separates at a share of it. See
     /// `crate::integrator::energy_audit`.
     pub(super) fn note_violations(
         &mut self,

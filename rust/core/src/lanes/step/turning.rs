@@ -1,24 +1,11 @@
 //! Implicit gyroscopic terms in a block: [`crate::system::gyroscopic`].
 
+use super::implicit::Implicit;
 use super::{Block, Fallback};
 use crate::integrator::moreau_jean::{GYROSCOPIC_PASSES, MOST_TURN};
-use crate::multibody::MassMatrix;
 use crate::scalar::{Lane, LaneMask};
 use crate::system::extent::Turning;
-use crate::system::gyroscopic::{Gyroscopic, Turned};
-
-/// What steps with implicit gyroscopic terms need beside the others.
-pub(super) struct Implicit<T: Lane> {
-    solver: Gyroscopic<T>,
-    /// M̂.
-    mass_matrix: MassMatrix<T>,
-    /// Impulse of the forces but the gyroscopic ones, and of the contacts and loops as far as it is
-    /// foreseen (nv).
-    given: Vec<T>,
-    foreseen: Vec<T>,
-    /// The free change of velocity in factor coordinates (nv).
-    y: Vec<T>,
-}
+use crate::system::gyroscopic::Turned;
 
 impl<T: Lane> Block<T> {
     /// Finds the clusters that turn too fast for explicit gyroscopic terms. A rover that turns too
@@ -46,16 +33,8 @@ impl<T: Lane> Block<T> {
         if !self.is_any_implicit() {
             return;
         }
-        let nothing = || vec![T::splat(self.token, 0.0); self.v.len()];
-        let own = self.implicit.get_or_insert_with(|| {
-            Box::new(Implicit {
-                solver: Gyroscopic::new(self.token),
-                mass_matrix: MassMatrix::new(self.token, &self.machine),
-                given: nothing(),
-                foreseen: nothing(),
-                y: nothing(),
-            })
-        });
+        let own = &mut self.implicit;
+        let own = own.get_or_insert_with(|| Box::new(Implicit::new(self.token, &self.machine)));
         own.mass_matrix.clone_from(&self.mass_matrix);
     }
 

@@ -146,18 +146,15 @@ pub fn velocity<T: Lane>(v: &[T]) -> Motion<T> {
 pub fn screws_and_rates<T: Lane>(V: &Motion<T>) -> [[Motion<T>; 2]; NV] {
     let token = V.swing.x.token();
     let zero = Vec3::splat(token, [0.0; 3]);
-    let slide = |swing| Motion { axis: zero, swing };
-    let turn = |axis| Motion { axis, swing: zero };
-    let [x, y, z] =
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| Vec3::splat(token, e));
-    let linear = |e| [slide(e), slide(zero)];
-    let angular = |e| [turn(e), slide(V.swing.cross(e))];
-    [
-        linear(x),
-        linear(y),
-        linear(z),
-        angular(x),
-        angular(y),
-        angular(z),
-    ]
+    let [x, y, z] = Mat3::identity(token).columns();
+    let mut both = [[Motion {
+        axis: zero,
+        swing: zero,
+    }; 2]; NV];
+    for (k, e) in [x, y, z].into_iter().enumerate() {
+        both[k][0].swing = e;
+        both[3 + k][0].axis = e;
+        both[3 + k][1].swing = V.swing.cross(e);
+    }
+    both
 }
