@@ -65,20 +65,24 @@ pub(in crate::solver) struct ReducedSystem {
     is_analysed: bool,
 }
 
-/// Moves `p` onto the linearised constraints (`p = 0` if open, `p_e = μ p_N` if sliding); true if
-/// that changed it.
+/// Sets all of `p` to zero; true if that changed it.
+#[inline]
+fn clear(p: &mut [f64]) -> bool {
+    let moved = p.iter().any(|x| x.abs() > 0.0);
+    p.fill(0.0);
+    moved
+}
+
+/// Moves `p` onto the linearised constraints (`p = 0` if open, `p_e = μ p_N` if sliding, `p_T = 0`
+/// if sliding without friction); true if that changed it.
 #[inline]
 fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
     let mut moved = false;
     for ((contact, &mu), p) in contacts.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
         match contact.mode {
             ContactMode::Stick => {}
-            ContactMode::Open => {
-                for x in p {
-                    moved |= x.abs() > 0.0;
-                    *x = 0.0;
-                }
-            }
+            ContactMode::Open => moved |= clear(p),
+            ContactMode::Slip if mu <= 0.0 => moved |= clear(&mut p[1..]),
             ContactMode::Slip => {
                 let wanted = mu * p[0];
                 let along = if D == 2 {
@@ -89,12 +93,8 @@ fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> b
                 let gap = wanted - along;
                 if gap.abs() > 1e-14 * wanted.abs() {
                     moved = true;
-                    if mu > 0.0 {
-                        for k in 1..D {
-                            p[k] += gap * contact.e[k - 1];
-                        }
-                    } else {
-                        p[1..].fill(0.0);
+                    for k in 1..D {
+                        p[k] += gap * contact.e[k - 1];
                     }
                 }
             }
