@@ -157,6 +157,33 @@ fn an_unsymmetric_operator_is_not_symmetrised() {
     }
 }
 
+/// A contact without impulse that approaches counts as sticking at first. Newton's method kept the
+/// tangential impulse of that stick although the contact has no friction, and found no answer.
+#[test]
+fn newton_takes_the_friction_of_a_first_guess_from_a_contact_without_any() {
+    let mut W = [0.0; 36];
+    (0..6).for_each(|k| W[7 * k] = 1.0);
+    let q = [-1.0, 0.5, 0.2, -1.0, 0.3, 0.0];
+    let problem = FrictionContactProblem::new(Dimension::Three, &W, &q, &[0.0, 0.5]).unwrap();
+    let options = SolverOptions {
+        method: Method::Newton,
+        ..SolverOptions::default()
+    };
+    let mut p = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+    let report = solve(
+        &problem,
+        &options,
+        &mut p,
+        &mut [0.0; 6],
+        &mut SolverWorkspace::new(),
+    );
+    assert!(report.is_converged(), "{report:?}");
+    assert!(
+        distance(&p, &[1.0, 0.0, 0.0, 1.0, -0.3, 0.0]) < 1e-9,
+        "{p:?}"
+    );
+}
+
 /// With `W = I/m` the relaxed answer is closed: `p = m Π_K(−q)`, and a
 /// sliding contact parts with `μ|u_T|`.
 #[test]

@@ -7,7 +7,7 @@
 
 use super::associated;
 use super::friction_law::FrictionLaw;
-use super::mode::{ContactMode, Tangent};
+use super::mode::{ContactMode, Mode};
 use super::one_contact::solve_one_contact;
 use super::signorini;
 use crate::cone::{project_on_disc, shortened, split, tangential_norm};
@@ -65,9 +65,6 @@ pub fn violation<const D: usize>(
     Coulomb(friction_coefficient).violation(p, u, rho)
 }
 
-/// Impulses below the limit of friction by less than this share slide.
-pub(crate) const AT_THE_LIMIT: f64 = 1e-9;
-
 /// The law with its coefficient μ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coulomb(pub f64);
@@ -84,26 +81,22 @@ impl<const D: usize> FrictionLaw<D> for Coulomb {
     }
 
     #[inline]
-    fn linearise(&self, p: &[f64; D], u: &[f64; D], [rho_N, rho_T]: [f64; 2]) -> Tangent {
+    fn linearise(&self, p: &[f64; D], u: &[f64; D], [rho_N, rho_T]: [f64; 2]) -> Mode<f64> {
         let mut z: [f64; D] = std::array::from_fn(|k| p[k] - rho_T * u[k]);
         z[0] = p[0] - rho_N * u[0];
-        let with = |mode| Tangent {
-            mode,
-            ..Tangent::default()
-        };
         if z[0] <= 0.0 {
-            return with(ContactMode::Open);
+            return Mode::new(ContactMode::Open);
         }
         let norm = tangential_norm(&z);
         let radius = self.0 * z[0];
         if self.0 <= 0.0 {
-            with(ContactMode::Slip)
+            Mode::new(ContactMode::Slip)
         } else if norm <= radius {
-            with(ContactMode::Stick)
+            Mode::new(ContactMode::Stick)
         } else {
             // A contact about to open would have infinite turning stiffness.
             let gamma = ((norm - radius) / (rho_T * radius)).min(1e12 / rho_T);
-            Tangent::along(&z, norm, gamma)
+            Mode::along(self.0, &z, norm, gamma)
         }
     }
 }
@@ -153,24 +146,6 @@ impl Coulomb {
             square += ((p_t[k] - across[k]) / rho_T).powi(2);
         }
         square
-    }
-
-    /// The mode that an impulse shows by itself, at the velocity `u`, m/s: closed contacts stick
-    /// within the cone and slide on it. A contact without impulse sticks if it approaches.
-    #[inline]
-    #[must_use]
-    pub fn recall<const D: usize>(self, p: &[f64; D], u: &[f64]) -> Tangent {
-        let mut tangent = Tangent::default();
-        if p[0] <= 0.0 {
-            if u[0] < 0.0 {
-                tangent.mode = ContactMode::Stick;
-            }
-        } else if self.0 > 0.0 && tangential_norm(p) < self.0 * p[0] * (1.0 - AT_THE_LIMIT) {
-            tangent.mode = ContactMode::Stick;
-        } else {
-            tangent = Tangent::sliding(p, u);
-        }
-        tangent
     }
 }
 

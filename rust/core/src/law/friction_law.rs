@@ -14,7 +14,7 @@
 //!
 //! Source: Alart and Curnier 1991; Moreau 1988.
 
-use super::mode::{ContactMode, Tangent};
+use super::mode::{ContactMode, Mode};
 use super::signorini;
 use crate::cone::tangential_norm;
 
@@ -89,14 +89,13 @@ pub trait FrictionLaw<const D: usize> {
         p
     }
 
-    /// The law linearised where the projection puts `p − ρ u`, which at a solution is p itself:
-    /// the mode, and of a slide its direction and turning stiffness.
-    fn linearise(&self, p: &[f64; D], u: &[f64; D], [rho_N, rho_T]: [f64; 2]) -> Tangent {
+    /// The law linearised where the projection puts `p − ρ u`, which at a solution is p itself. The
+    /// section is taken to grow in proportion to the normal impulse.
+    fn linearise(&self, p: &[f64; D], u: &[f64; D], [rho_N, rho_T]: [f64; 2]) -> Mode<f64> {
         let mut z: [f64; D] = std::array::from_fn(|k| p[k] - rho_T * u[k]);
         z[0] = p[0] - rho_N * u[0];
-        let mut tangent = Tangent::default();
         if z[0] <= 0.0 {
-            return tangent;
+            return Mode::new(ContactMode::Open);
         }
         let projected = self.project(z[0], &z);
         let mut off = z;
@@ -105,10 +104,9 @@ pub trait FrictionLaw<const D: usize> {
         }
         let (off, norm) = (tangential_norm(&off), tangential_norm(&projected));
         if off <= f64::EPSILON * norm {
-            tangent.mode = ContactMode::Stick;
-            return tangent;
+            return Mode::new(ContactMode::Stick);
         }
         let gamma = (off / (rho_T * norm)).min(LARGEST / rho_T);
-        Tangent::along(&projected, norm, gamma)
+        Mode::along(norm / z[0], &projected, norm, gamma)
     }
 }

@@ -17,7 +17,7 @@
 //! - [`associated`]: the convex relaxation of Coulomb's law;
 //! - [`rolling`]: moments that resist rolling and drilling, bounded by the normal impulse.
 //!
-//! [`mode`] names the states open, stick and slide, in which Newton's method linearises the law.
+//! [`mode`] names the states open, stick and slide, and linearises the law in them.
 //! [`materials`] has the coefficients by pair of materials.
 //!
 //! # One call

@@ -16,7 +16,7 @@
 //! bracket. Its square is the quartic of Bonnefon and Daviet 2011.
 
 use super::frictionless;
-use super::mode::{ContactMode, Tangent};
+use super::mode::ContactMode;
 use crate::cone::tangential_norm;
 
 /// Most steps of the safeguarded Newton on `g(κ)`; bisection alone needs about 60 for all digits.
@@ -35,18 +35,6 @@ pub struct OneContactSolution<const D: usize> {
     pub mode: ContactMode,
     /// Sliding `u_T = −κ p_T`, 1/kg; zero otherwise and without friction.
     pub kappa: f64,
-}
-
-impl<const D: usize> OneContactSolution<D> {
-    /// The law linearised there.
-    #[inline]
-    #[must_use]
-    pub fn tangent(&self) -> Tangent {
-        Tangent {
-            mode: self.mode,
-            ..Tangent::along(&self.impulse, tangential_norm(&self.impulse), self.kappa)
-        }
-    }
 }
 
 /// Solves a single contact under Coulomb's law and Signorini's condition.

@@ -14,9 +14,9 @@
 
 use super::loaded::{Loaded, solve_one};
 use super::problem::{ContactProblem, MAX_DENSE, block};
-use crate::law::mode::ContactMode;
+use crate::law::mode::{ContactMode, Mode};
 use crate::scalar::{Lane, MAX_LANES};
-use crate::solver::pivoting::{Few, Mode, System, Triple};
+use crate::solver::pivoting::{Few, System, Triple};
 
 /// A 3 x 3 block, row-major.
 pub(super) type Block<T> = [T; 9];

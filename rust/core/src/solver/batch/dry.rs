@@ -15,9 +15,9 @@
 use super::blocks::{Block, Factors, backward, backward_row, factorise, forward, velocities};
 use super::loaded::{Loaded, solve_one};
 use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_DENSE, MAX_DRY, block};
-use crate::law::mode::ContactMode;
+use crate::law::mode::{ContactMode, Mode};
 use crate::scalar::Lane;
-use crate::solver::pivoting::{Few, Mode, System, Triple};
+use crate::solver::pivoting::{Few, System, Triple};
 
 /// Number of places.
 pub(super) const PLACES: usize = MAX_DENSE + MAX_DRY;

@@ -28,9 +28,9 @@ use super::pattern::BASE;
 use super::pattern::Pattern;
 use super::problem::ContactProblem;
 use super::tree_matrix::{Base, Columns, TreeMatrix, product};
-use crate::law::mode::ContactMode;
+use crate::law::mode::{ContactMode, Mode};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
-use crate::solver::pivoting::{Few, Mode, System, Triple};
+use crate::solver::pivoting::{Few, System, Triple};
 
 /// Factored operators of several problems with the same pattern, that of the first; a contact's
 /// place is its slot.

@@ -10,9 +10,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::law::mode::ContactMode;
+use crate::law::mode::{ContactMode, Mode};
 use crate::problem::BlockSparseDelassus;
-use crate::solver::local::modes::{Linearised, n_unknowns};
+use crate::solver::local::modes::n_unknowns;
 
 /// Pattern and numbers of a factorisation, kept between solves for their memory.
 #[derive(Clone, Debug, Default)]
@@ -132,17 +132,17 @@ fn inverse<const D: usize>(mut a: Block<D>) -> Option<Block<D>> {
 #[inline]
 fn reduce<const D: usize>(
     W: &[f64],
-    i: &Linearised,
-    j: &Linearised,
+    i: &Mode<f64>,
+    j: &Mode<f64>,
     mu_i: f64,
     mu_j: f64,
 ) -> Block<D> {
     let mut rows: Block<D> = std::array::from_fn(|r| std::array::from_fn(|c| W[D * r + c]));
-    match i.mode {
+    match i.kind() {
         ContactMode::Open => return [[0.0; D]; D],
         ContactMode::Stick => {}
         ContactMode::Slip => {
-            let [e0, e1] = i.e;
+            let [e0, e1] = i.direction();
             if D == 3 && mu_i > 0.0 {
                 rows[1] = std::array::from_fn(|c| e0 * rows[D - 1][c] - e1 * rows[1][c]);
                 rows[D - 1] = [0.0; D];
@@ -153,17 +153,13 @@ fn reduce<const D: usize>(
             }
         }
     }
-    match j.mode {
+    match j.kind() {
         ContactMode::Open => return [[0.0; D]; D],
         ContactMode::Stick => {}
         ContactMode::Slip => {
-            let [e0, e1] = j.e;
+            let [e0, e1] = j.direction();
             for row in &mut rows {
-                let along = if D == 2 {
-                    row[1] * e0
-                } else {
-                    row[1] * e0 + row[D - 1] * e1
-                };
+                let along = row[1] * e0 + row[D - 1] * e1;
                 let turning = e0 * row[D - 1] - e1 * row[1];
                 row[0] += mu_j * along;
                 for x in &mut row[1..] {
@@ -265,9 +261,10 @@ impl BlockLu {
         mu: &[f64],
         alpha: f64,
         blocks: Option<&[f64]>,
-        contacts: &[Linearised],
+        modes: &[Mode<f64>],
     ) -> bool {
-        for (i, contact) in contacts.iter().enumerate() {
+        for (i, mode) in modes.iter().enumerate() {
+            let kind = mode.kind();
             let first = W.row_start(i);
             for (k, (&j, block)) in W
                 .neighbours(i)
@@ -275,9 +272,9 @@ impl BlockLu {
                 .zip(W.row(i).chunks_exact(D * D))
                 .enumerate()
             {
-                let mut reduced = reduce::<D>(block, contact, &contacts[j], mu[i], mu[j]);
+                let mut reduced = reduce::<D>(block, mode, &modes[j], mu[i], mu[j]);
                 if i == j {
-                    let size = n_unknowns::<D>(contact.mode, mu[i]);
+                    let size = n_unknowns::<D>(kind, mu[i]);
                     for r in 0..D {
                         reduced[r][r] = if r < size { reduced[r][r] + alpha } else { 1.0 };
                     }
@@ -289,13 +286,13 @@ impl BlockLu {
                             }
                         }
                     }
-                    if size == 2 && contact.mode == ContactMode::Slip {
-                        reduced[1][1] += contact.gamma;
+                    if size == 2 && kind == ContactMode::Slip {
+                        reduced[1][1] += mode.gamma;
                     }
                 }
                 write(&mut self.matrix, first + k, &reduced);
             }
-            self.active[self.position[i]] = contact.mode != ContactMode::Open;
+            self.active[self.position[i]] = kind != ContactMode::Open;
         }
         (0..self.order.len()).all(|k| self.eliminate_row::<D>(W, k))
     }

@@ -10,9 +10,10 @@
 
 use super::block_lu::BlockLu;
 use super::dense::{self, Chunk, LANES};
-use crate::law::mode::ContactMode;
+use crate::cone::tangential_norm;
+use crate::law::mode::{ContactMode, Mode};
 use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal};
-use crate::solver::local::modes::{Linearised, Prediction, n_unknowns};
+use crate::solver::local::modes::n_unknowns;
 use crate::solver::work::{self, Work};
 
 /// Stored factors of the reduced system.
@@ -33,8 +34,6 @@ pub(in crate::solver) enum Factors {
 pub(in crate::solver) struct NewtonStep {
     /// Regularisation used in the factors, 1/kg.
     pub alpha: f64,
-    /// Number of unknowns.
-    pub m: usize,
     /// Kind of the factors.
     pub factors: Factors,
     /// Whether sliding impulses return radially to the cone after the step.
@@ -44,8 +43,14 @@ pub(in crate::solver) struct NewtonStep {
 /// The system with its linearisation and its factors, kept from step to step.
 #[derive(Clone, Debug, Default)]
 pub(in crate::solver) struct ReducedSystem {
-    /// Mode and frame of each contact in the current linearisation.
-    pub contacts: Vec<Linearised>,
+    /// Mode of each contact in the current linearisation.
+    pub modes: Vec<Mode<f64>>,
+    /// First unknown of each contact in the modes that were last factored.
+    starts: Vec<usize>,
+    /// Number of unknowns of the modes that were last factored.
+    pub m: usize,
+    /// Whether any contact slides with friction in the modes that were last factored.
+    pub slides: bool,
     /// Proximal centre (n), N s.
     pub centre: Vec<f64>,
     /// The Newton point (n), N s, and a velocity (n), m/s.
@@ -65,36 +70,32 @@ pub(in crate::solver) struct ReducedSystem {
     is_analysed: bool,
 }
 
-/// Moves `p` onto the linearised constraints (`p = 0` if open, `p_e = μ p_N` if sliding); true if
-/// that changed it.
+/// Sets all of `p` to zero; true if that changed it.
 #[inline]
-fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
+fn clear(p: &mut [f64]) -> bool {
+    let moved = p.iter().any(|x| x.abs() > 0.0);
+    p.fill(0.0);
+    moved
+}
+
+/// Moves `p` onto the linearised constraints (`p = 0` if open, `p_e = μ p_N` if sliding, `p_T = 0`
+/// if sliding without friction); true if that changed it.
+#[inline]
+fn snap<const D: usize>(mu: &[f64], modes: &[Mode<f64>], p: &mut [f64]) -> bool {
     let mut moved = false;
-    for ((contact, &mu), p) in contacts.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
-        match contact.mode {
+    for ((mode, &mu), p) in modes.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
+        match mode.kind() {
             ContactMode::Stick => {}
-            ContactMode::Open => {
-                for x in p {
-                    moved |= x.abs() > 0.0;
-                    *x = 0.0;
-                }
-            }
+            ContactMode::Open => moved |= clear(p),
+            ContactMode::Slip if mu <= 0.0 => moved |= clear(&mut p[1..]),
             ContactMode::Slip => {
+                let e = mode.direction();
                 let wanted = mu * p[0];
-                let along = if D == 2 {
-                    p[1] * contact.e[0]
-                } else {
-                    p[1] * contact.e[0] + p[2] * contact.e[1]
-                };
-                let gap = wanted - along;
+                let gap = wanted - (p[1] * e[0] + p[D - 1] * e[1]);
                 if gap.abs() > 1e-14 * wanted.abs() {
                     moved = true;
-                    if mu > 0.0 {
-                        for k in 1..D {
-                            p[k] += gap * contact.e[k - 1];
-                        }
-                    } else {
-                        p[1..].fill(0.0);
+                    for k in 1..D {
+                        p[k] += gap * e[k - 1];
                     }
                 }
             }
@@ -139,38 +140,39 @@ fn assemble<const D: usize>(
     mu: &[f64],
     W: &[f64],
     alpha: f64,
-    contacts: &[Linearised],
+    modes: &[Mode<f64>],
     m: usize,
     A: &mut [Chunk],
 ) {
     pad(A, m);
-    let n = D * contacts.len();
+    let n = D * modes.len();
     let height = LANES * dense::chunks(m);
     let A = A.as_flattened_mut();
-    for ((contact, &mu_i), rows) in contacts.iter().zip(mu).zip(W.chunks_exact(D * n)) {
+    let mut start = 0;
+    for ((mode, &mu_i), rows) in modes.iter().zip(mu).zip(W.chunks_exact(D * n)) {
         let rows: [&[[f64; D]]; D] =
             std::array::from_fn(|r| rows[r * n..(r + 1) * n].as_chunks::<D>().0);
-        let own = &mut A[contact.start..];
-        let [e0, e1] = contact.e;
-        let size = n_unknowns::<D>(contact.mode, mu_i);
-        match (contact.mode, size) {
+        let own = &mut A[start..];
+        let [e0, e1] = mode.direction();
+        let kind = mode.kind();
+        let size = n_unknowns::<D>(kind, mu_i);
+        match (kind, size) {
             (ContactMode::Open, _) => continue,
-            (ContactMode::Stick, _) => assemble_rows(rows, mu, contacts, height, own, |w| w),
+            (ContactMode::Stick, _) => assemble_rows(rows, mu, modes, height, own, |w| w),
             (ContactMode::Slip, 2) => {
                 let across = |w: [[f64; D]; D]| {
                     let turned = std::array::from_fn(|c| e0 * w[D - 1][c] - e1 * w[1][c]);
                     [w[0], turned]
                 };
-                assemble_rows(rows, mu, contacts, height, own, across);
-                own[(contact.start + 1) * height + 1] += contact.gamma;
+                assemble_rows(rows, mu, modes, height, own, across);
+                own[(start + 1) * height + 1] += mode.gamma;
             }
-            (ContactMode::Slip, _) => {
-                assemble_rows(rows, mu, contacts, height, own, |w| [w[0]]);
-            }
+            (ContactMode::Slip, _) => assemble_rows(rows, mu, modes, height, own, |w| [w[0]]),
         }
         for k in 0..size {
-            own[(contact.start + k) * height + k] += alpha;
+            own[(start + k) * height + k] += alpha;
         }
+        start += size;
     }
 }
 
@@ -181,21 +183,20 @@ fn assemble<const D: usize>(
 fn assemble_rows<const D: usize, const R: usize>(
     rows: [&[[f64; D]]; D],
     mu: &[f64],
-    contacts: &[Linearised],
+    modes: &[Mode<f64>],
     height: usize,
     target: &mut [f64],
     reduce: impl Fn([[f64; D]; D]) -> [[f64; D]; R],
 ) {
-    let n = contacts.len();
+    let n = modes.len();
     let (rows, mu) = (rows.map(|row| &row[..n]), &mu[..n]);
     let mut at = 0;
     let mut push = |entries: [f64; R]| {
         target[at..at + R].copy_from_slice(&entries);
         at += height;
     };
-    for (j, contact) in contacts.iter().enumerate() {
-        let [e0, e1] = contact.e;
-        match contact.mode {
+    for (j, mode) in modes.iter().enumerate() {
+        match mode.kind() {
             ContactMode::Open => {}
             ContactMode::Stick => {
                 let w = reduce(rows.map(|row| row[j]));
@@ -204,15 +205,9 @@ fn assemble_rows<const D: usize, const R: usize>(
                 }
             }
             ContactMode::Slip => {
+                let [e0, e1] = mode.direction();
                 let w = reduce(rows.map(|row| row[j]));
-                let along = |row: [f64; D]| {
-                    if D == 2 {
-                        row[1] * e0
-                    } else {
-                        row[1] * e0 + row[D - 1] * e1
-                    }
-                };
-                push(w.map(|row| row[0] + mu[j] * along(row)));
+                push(w.map(|row| row[0] + mu[j] * (row[1] * e0 + row[D - 1] * e1)));
                 if D == 3 && mu[j] > 0.0 {
                     push(w.map(|row| e0 * row[D - 1] - e1 * row[1]));
                 }
@@ -226,30 +221,30 @@ fn assemble_rows<const D: usize, const R: usize>(
 fn right_hand_side<const D: usize>(
     data: &Prepared<'_>,
     prox: Proximal<'_>,
-    contacts: &[Linearised],
+    modes: &[Mode<f64>],
+    starts: &[usize],
     p: &[f64],
     u: &[f64],
     rhs: &mut [f64],
 ) {
-    for (i, contact) in contacts.iter().enumerate() {
+    for (i, (mode, &start)) in modes.iter().zip(starts).enumerate() {
         let mut u_hat = [0.0; D];
         for k in 0..D {
             u_hat[k] = u[D * i + k] + prox.alpha * (p[D * i + k] - prox.centre[D * i + k]);
         }
-        match contact.mode {
+        match mode.kind() {
             ContactMode::Open => {}
             ContactMode::Stick => {
                 for k in 0..D {
-                    rhs[contact.start + k] = -u_hat[k];
+                    rhs[start + k] = -u_hat[k];
                 }
             }
             ContactMode::Slip => {
-                rhs[contact.start] = -u_hat[0];
+                rhs[start] = -u_hat[0];
                 if D == 3 && data.mu[i] > 0.0 {
-                    let [e0, e1] = contact.e;
+                    let [e0, e1] = mode.direction();
                     let p_t = e0 * p[D * i + 2] - e1 * p[D * i + 1];
-                    rhs[contact.start + 1] =
-                        -(e0 * u_hat[D - 1] - e1 * u_hat[1] + contact.gamma * p_t);
+                    rhs[start + 1] = -(e0 * u_hat[D - 1] - e1 * u_hat[1] + mode.gamma * p_t);
                 }
             }
         }
@@ -261,34 +256,36 @@ fn right_hand_side<const D: usize>(
 #[inline]
 fn apply<const D: usize>(
     mu: &[f64],
-    contacts: &[Linearised],
+    modes: &[Mode<f64>],
+    starts: &[usize],
     y: &[f64],
     on_cone: bool,
     p: &mut [f64],
 ) {
-    for ((contact, &mu), p) in contacts.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
-        match contact.mode {
+    let contacts = modes.iter().zip(starts).zip(mu);
+    for (((mode, &start), &mu), p) in contacts.zip(p.chunks_exact_mut(D)) {
+        match mode.kind() {
             ContactMode::Open => {}
             ContactMode::Stick => {
-                for (x, y) in p.iter_mut().zip(&y[contact.start..]) {
+                for (x, y) in p.iter_mut().zip(&y[start..]) {
                     *x += y;
                 }
             }
             ContactMode::Slip => {
-                let y_N = y[contact.start];
+                let y_N = y[start];
                 p[0] += y_N;
                 if mu <= 0.0 {
                     continue;
                 }
-                let [e0, e1] = contact.e;
+                let [e0, e1] = mode.direction();
                 p[1] += mu * y_N * e0;
                 if D == 3 {
-                    let y_t = y[contact.start + 1];
+                    let y_t = y[start + 1];
                     p[1] -= y_t * e1;
                     p[2] += mu * y_N * e1 + y_t * e0;
                 }
                 if on_cone && p[0] > 0.0 {
-                    let norm = crate::cone::tangential_norm::<D>(&std::array::from_fn(|k| p[k]));
+                    let norm = tangential_norm::<D>(&std::array::from_fn(|k| p[k]));
                     if norm > 0.0 {
                         let scale = mu * p[0] / norm;
                         for x in &mut p[1..] {
@@ -323,7 +320,8 @@ impl ReducedSystem {
 
     /// Makes room for all but the factors.
     pub fn resize(&mut self, n_contacts: usize, n: usize) {
-        self.contacts.resize(n_contacts, Linearised::default());
+        self.modes.resize(n_contacts, Mode::new(ContactMode::Open));
+        self.starts.resize(n_contacts, 0);
         self.rhs.resize(dense::chunks(n), [0.0; LANES]);
         self.blocks.resize(n * n / n_contacts.max(1), 0.0);
         for buffer in [&mut self.centre, &mut self.trial, &mut self.trial_velocity] {
@@ -340,6 +338,22 @@ impl ReducedSystem {
         }
     }
 
+    /// Numbers the unknowns of the modes. In a block-sparse system every contact keeps its place,
+    /// and unknowns that its mode eliminates are zero.
+    #[inline]
+    fn number<const D: usize>(&mut self, data: &Prepared<'_>) {
+        (self.m, self.slides) = (0, false);
+        let contacts = self.modes.iter().zip(data.mu).zip(&mut self.starts);
+        for (i, ((mode, &mu), start)) in contacts.enumerate() {
+            *start = match data.W {
+                Operator::Dense(_) => self.m,
+                Operator::BlockSparse(_) => D * i,
+            };
+            self.m += n_unknowns::<D>(mode.kind(), mu);
+            self.slides |= mode.kind() == ContactMode::Slip && mu > 0.0;
+        }
+    }
+
     /// Whether the budget allows another sparse factorisation; the first call analyses the pattern.
     fn affords_sparse(&mut self, W: &BlockSparseDelassus, work: &mut Work) -> bool {
         if !self.is_analysed {
@@ -349,19 +363,18 @@ impl ReducedSystem {
         work.affords(self.block_lu.work())
     }
 
-    /// Factors the system of the predicted modes; none if it is singular or the budget does not
-    /// allow it.
+    /// Factors the system of the modes; none if it is singular or the budget does not allow it.
     #[inline]
     pub fn factorise<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
         alpha: f64,
-        prediction: Prediction,
         allow_symmetric: bool,
         work: &mut Work,
     ) -> Factors {
         work.factorisations += 1;
-        let m = prediction.m;
+        self.number::<D>(data);
+        let m = self.m;
         let W = match data.W {
             Operator::Dense(W) => W,
             Operator::BlockSparse(W) => {
@@ -369,8 +382,7 @@ impl ReducedSystem {
                     return Factors::None;
                 }
                 let is_regular =
-                    self.block_lu
-                        .factorise::<D>(W, data.mu, alpha, None, &self.contacts);
+                    (self.block_lu).factorise::<D>(W, data.mu, alpha, None, &self.modes);
                 return if is_regular {
                     Factors::Sparse
                 } else {
@@ -378,7 +390,7 @@ impl ReducedSystem {
                 };
             }
         };
-        let may_be_symmetric = !prediction.slides && allow_symmetric;
+        let may_be_symmetric = !self.slides && allow_symmetric;
         // A step costs two products and two substitutions in addition to its factors.
         let cost = work::dense(m, may_be_symmetric) + 2 * data.product;
         if !work.affords(cost) {
@@ -390,13 +402,13 @@ impl ReducedSystem {
             if m == data.n {
                 assemble_symmetric(W, alpha, m, A);
             } else {
-                assemble::<D>(data.mu, W, alpha, &self.contacts, m, A);
+                assemble::<D>(data.mu, W, alpha, &self.modes, m, A);
             }
             if dense::cholesky(A, size) {
                 return Factors::Symmetric;
             }
         }
-        assemble::<D>(data.mu, W, alpha, &self.contacts, m, A);
+        assemble::<D>(data.mu, W, alpha, &self.modes, m, A);
         if dense::lu(A, size, &mut self.pivots) {
             Factors::General
         } else {
@@ -411,13 +423,7 @@ impl ReducedSystem {
         data: &Prepared<'_>,
         work: &mut Work,
     ) -> bool {
-        for (i, contact) in self.contacts.iter_mut().enumerate() {
-            *contact = Linearised {
-                mode: ContactMode::Stick,
-                start: D * i,
-                ..Linearised::default()
-            };
-        }
+        self.modes.fill(Mode::new(ContactMode::Stick));
         work.factorisations += 1;
         match data.W {
             Operator::Dense(W) => {
@@ -425,7 +431,7 @@ impl ReducedSystem {
                 if !work.affords(work::dense(n, false)) {
                     return false;
                 }
-                assemble::<D>(data.mu, W, 0.0, &self.contacts, n, &mut self.matrix);
+                assemble::<D>(data.mu, W, 0.0, &self.modes, n, &mut self.matrix);
                 for (i, block) in self.blocks.chunks_exact(D * D).enumerate() {
                     for (k, entry) in block.iter().enumerate() {
                         let (row, column) = (D * i + k / D, D * i + k % D);
@@ -441,7 +447,7 @@ impl ReducedSystem {
                         data.mu,
                         0.0,
                         Some(&self.blocks),
-                        &self.contacts,
+                        &self.modes,
                     )
             }
         }
@@ -469,16 +475,16 @@ impl ReducedSystem {
 
     /// Solves the factored system for the stored right-hand side, in place.
     #[inline]
-    fn back_substitute<const D: usize>(&mut self, data: &Prepared<'_>, factors: Factors, m: usize) {
+    fn back_substitute<const D: usize>(&mut self, data: &Prepared<'_>, factors: Factors) {
         if let (Factors::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
             self.block_lu
                 .solve::<D>(W, &mut self.rhs.as_flattened_mut()[..data.n]);
             return;
         }
-        let size = dense::chunks(m);
+        let size = dense::chunks(self.m);
         let rhs = &mut self.rhs[..size];
         let A = &self.matrix[..LANES * size * size];
-        rhs.as_flattened_mut()[m..].fill(0.0);
+        rhs.as_flattened_mut()[self.m..].fill(0.0);
         match factors {
             Factors::None | Factors::Sparse => rhs.fill([0.0; LANES]),
             Factors::Symmetric => dense::cholesky_solve(A, size, rhs),
@@ -486,8 +492,8 @@ impl ReducedSystem {
         }
     }
 
-    /// The Newton point of the regularised problem for the predicted modes,
-    /// from `(p, u)`, into `trial`.
+    /// The Newton point of the regularised problem from `(p, u)`, into `trial`. The slides may have
+    /// turned since they were factored.
     pub fn newton_point<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
@@ -498,21 +504,18 @@ impl ReducedSystem {
         let Self {
             trial,
             trial_velocity,
-            contacts,
+            modes,
+            starts,
             centre,
             rhs,
             ..
         } = self;
         trial.copy_from_slice(p);
         if step.factors == Factors::Sparse {
-            // Every contact keeps its place; unknowns that its mode eliminates are zero.
-            for (i, contact) in contacts.iter_mut().enumerate() {
-                contact.start = D * i;
-            }
             rhs.fill([0.0; LANES]);
         }
         let mut u = u;
-        if snap::<D>(data.mu, contacts, trial) {
+        if snap::<D>(data.mu, modes, trial) {
             data.W.multiply_add(trial, data.q, trial_velocity);
             u = trial_velocity;
         }
@@ -520,11 +523,13 @@ impl ReducedSystem {
             alpha: step.alpha,
             centre,
         };
-        right_hand_side::<D>(data, prox, contacts, trial, u, rhs.as_flattened_mut());
-        self.back_substitute::<D>(data, step.factors, step.m);
+        let rhs = rhs.as_flattened_mut();
+        right_hand_side::<D>(data, prox, modes, starts, trial, u, rhs);
+        self.back_substitute::<D>(data, step.factors);
         apply::<D>(
             data.mu,
-            &self.contacts,
+            &self.modes,
+            &self.starts,
             self.rhs.as_flattened(),
             step.on_cone,
             &mut self.trial,

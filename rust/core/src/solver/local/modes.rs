@@ -6,35 +6,12 @@
 //! the projection cycles (measured: all recorded rover impacts in at most five steps). Neither
 //! depends on the order of the contacts.
 
+use crate::cone::tangential_norm;
 use crate::law::coulomb::Coulomb;
 use crate::law::friction_law::FrictionLaw;
-use crate::law::mode::{ContactMode, Tangent};
+use crate::law::mode::{self, ContactMode, Mode};
 use crate::law::one_contact::solve_one_contact;
 use crate::problem::{Prepared, Proximal};
-
-/// Mode and sliding frame of one contact in the current linearisation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(in crate::solver) struct Linearised {
-    /// Predicted mode.
-    pub mode: ContactMode,
-    /// Direction of the tangential impulse when sliding.
-    pub e: [f64; 2],
-    /// Turning stiffness `γ` of the sliding direction, 1/kg; `|u_T|/(μ p_N)` at a solution.
-    pub gamma: f64,
-    /// First unknown of this contact in the reduced system.
-    pub start: usize,
-}
-
-/// Result of a prediction of the modes.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::solver) struct Prediction {
-    /// Whether any mode differs from the previous prediction.
-    pub changed: bool,
-    /// Unknowns of the reduced system.
-    pub m: usize,
-    /// Whether any contact slides with friction.
-    pub slides: bool,
-}
 
 /// Number of unknowns of a contact.
 #[inline]
@@ -47,26 +24,20 @@ pub(in crate::solver) fn n_unknowns<const D: usize>(mode: ContactMode, mu: f64) 
     }
 }
 
-impl Linearised {
-    /// The law linearised so, with its first unknown.
-    #[inline]
-    fn of(tangent: Tangent, start: usize) -> Self {
-        let Tangent { mode, e, gamma } = tangent;
-        Self {
-            mode,
-            e,
-            gamma,
-            start,
+/// Turns the sliding contacts along their impulse `p`, at the velocity `u`.
+#[inline]
+pub(in crate::solver) fn turn<const D: usize>(
+    mu: &[f64],
+    p: &[f64],
+    u: &[f64],
+    modes: &mut [Mode<f64>],
+) {
+    let (p, u) = (p.as_chunks::<D>().0, u.as_chunks::<D>().0);
+    for ((mode, &mu), (p, u)) in modes.iter_mut().zip(mu).zip(p.iter().zip(u)) {
+        if mode.kind() == ContactMode::Slip {
+            *mode = Mode::sliding(mu, p, u);
         }
     }
-}
-
-/// Direction and turning stiffness of a slide at impulse `p` and velocity `u` of one contact.
-#[inline]
-pub(in crate::solver) fn set_slide<const D: usize>(contact: &mut Linearised, p: &[f64], u: &[f64]) {
-    let p: [f64; D] = std::array::from_fn(|k| p[k]);
-    let Tangent { e, gamma, .. } = Tangent::sliding(&p, u);
-    (contact.e, contact.gamma) = (e, gamma);
 }
 
 /// Reads the modes from the impulse itself, the answer of the last step.
@@ -74,30 +45,26 @@ pub(in crate::solver) fn set_slide<const D: usize>(contact: &mut Linearised, p: 
 /// In steady motion these are the modes of the answer, and far better than a prediction from `u`.
 /// Wheels that work against each other in a turn slip at 1e-6 m/s, a hundredth of the change of the
 /// free velocity from step to step, so `u` does not show the sign of their slip until the modes are
-/// right. A contact without impulse counts as sticking if it approaches, else as open.
+/// right.
 #[inline]
 pub(in crate::solver) fn recall<const D: usize>(
     mu: &[f64],
     p: &[f64],
     u: &[f64],
-    contacts: &mut [Linearised],
-) -> Prediction {
-    let mut prediction = Prediction::default();
-    for ((contact, &mu), (p, u)) in contacts
-        .iter_mut()
-        .zip(mu)
-        .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
-    {
-        let p: [f64; D] = std::array::from_fn(|k| p[k]);
-        *contact = Linearised::of(Coulomb(mu).recall(&p, u), prediction.m);
-        prediction.slides |= contact.mode == ContactMode::Slip && mu > 0.0;
-        prediction.m += n_unknowns::<D>(contact.mode, mu);
+    modes: &mut [Mode<f64>],
+) {
+    let (p, u) = (p.as_chunks::<D>().0, u.as_chunks::<D>().0);
+    for ((mode, &mu), (p, u)) in modes.iter_mut().zip(mu).zip(p.iter().zip(u)) {
+        *mode = match mode::recall(mu, p[0], tangential_norm(p), u[0]) {
+            [false, _] => Mode::new(ContactMode::Open),
+            [true, true] => Mode::new(ContactMode::Stick),
+            [true, false] => Mode::sliding(mu, p, u),
+        };
     }
-    prediction
 }
 
-/// Predicts the modes at `(p, u)`, `u = W p + q`; `contacts` receives them.
-/// `exact` chooses the predictor.
+/// Predicts the modes at `(p, u)`, `u = W p + q`; `modes` receives them. Returns whether one is
+/// another than before. `exact` chooses the predictor.
 #[inline]
 pub(in crate::solver) fn predict<const D: usize>(
     data: &Prepared<'_>,
@@ -105,31 +72,28 @@ pub(in crate::solver) fn predict<const D: usize>(
     exact: bool,
     p: &[f64],
     u: &[f64],
-    contacts: &mut [Linearised],
-) -> Prediction {
-    let mut prediction = Prediction::default();
+    modes: &mut [Mode<f64>],
+) -> bool {
+    let mut changed = false;
     let alpha = prox.alpha;
-    for (i, ((((contact, &mu), &rho), (p, u)), c)) in contacts
+    for (i, ((((mode, &mu), &rho), (p, u)), c)) in modes
         .iter_mut()
         .zip(data.mu)
         .zip(data.modes)
-        .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
+        .zip(p.as_chunks::<D>().0.iter().zip(u.chunks_exact(D)))
         .zip(prox.centre.chunks_exact(D))
         .enumerate()
     {
-        let p: [f64; D] = std::array::from_fn(|k| p[k]);
         let u_hat: [f64; D] = std::array::from_fn(|k| u[k] + alpha * (p[k] - c[k]));
         let next = if exact {
-            by_solving(data, alpha, i, &p, &u_hat, mu)
+            by_solving(data, alpha, i, p, &u_hat, mu)
         } else {
-            Coulomb(mu).linearise(&p, &u_hat, rho)
+            Coulomb(mu).linearise(p, &u_hat, rho)
         };
-        prediction.changed |= next.mode != contact.mode;
-        prediction.slides |= next.mode == ContactMode::Slip && mu > 0.0;
-        *contact = Linearised::of(next, prediction.m);
-        prediction.m += n_unknowns::<D>(next.mode, mu);
+        changed |= next.kind() != mode.kind();
+        *mode = next;
     }
-    prediction
+    changed
 }
 
 fn by_solving<const D: usize>(
@@ -139,7 +103,7 @@ fn by_solving<const D: usize>(
     p: &[f64; D],
     u_hat: &[f64; D],
     mu: f64,
-) -> Tangent {
+) -> Mode<f64> {
     let mut block = data.block::<D>(i);
     let mut q = *u_hat;
     for r in 0..D {
@@ -148,5 +112,11 @@ fn by_solving<const D: usize>(
             q[r] -= block[r][c] * p[c];
         }
     }
-    solve_one_contact(&block, &q, mu).tangent()
+    let own = solve_one_contact(&block, &q, mu);
+    match own.mode {
+        ContactMode::Slip => {
+            Mode::along(mu, &own.impulse, tangential_norm(&own.impulse), own.kappa)
+        }
+        mode => Mode::new(mode),
+    }
 }

@@ -1,6 +1,6 @@
 //! The steps of pivoting on the contact modes of several problems side by side.
 //!
-//! From a warm start a step goes to the answer of the present [modes](super::modes) as far as all
+//! From a warm start a step goes to the answer of the present [modes](Mode) as far as all
 //! cones allow. The contact that blocks then slides or opens. After a full step the contact whose
 //! velocity contradicts its mode most is corrected, with those that do so as much, unless the
 //! residual falls fast: then the modes are right, and the next step removes the curvature of the
@@ -10,12 +10,12 @@
 //! it sticks, it leaves the cone at once. Such a contact is barred, so that another one changes its
 //! mode. If none is left, its slip has changed its sign, and its friction is reversed.
 
+use super::limit::{limit, return_to_cone};
 use super::mode_memory::ModeMemory;
-use super::modes::{
-    Law, Mode, Triple, Violations, is_pressed_to_slide, judge, limit, return_to_cone,
-};
-use super::store::{Many, Store};
+use super::store::{Many, Store, Triple};
 use super::system::System;
+use super::violation::{Law, Violations, judge};
+use crate::law::mode::{self, Mode};
 use crate::problem::Residual;
 use crate::scalar::{Lane, LaneMask, Single};
 
@@ -319,12 +319,10 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         let mut slides = !lanes & lanes;
         for i in system.places() {
             let (p, mu) = (&self.p[i], self.laws[i].mu);
-            let pressed = zero.lt(p[0]);
-            let approaches = self.u[i][0].lt(zero);
-            let limit = is_pressed_to_slide(mu, p);
-            let sticks = (pressed & !limit) | (!pressed & approaches);
-            slides = slides | (limit & zero.lt(mu));
-            self.closed[i] = replaced::<T>(lanes, pressed | approaches, self.closed[i]);
+            let size = (p[1] * p[1] + p[2] * p[2]).sqrt();
+            let [closed, sticks] = mode::recall(mu, p[0], size, self.u[i][0]);
+            slides = slides | (closed & !sticks & zero.lt(mu));
+            self.closed[i] = replaced::<T>(lanes, closed, self.closed[i]);
             self.sticks[i] = replaced::<T>(lanes, sticks, self.sticks[i]);
             self.barred[i] = self.barred[i] & !lanes;
             self.freed[i] = self.freed[i] & !lanes;

@@ -12,24 +12,25 @@
 //! nonassociated law; then the caller continues.
 //!
 //! - `iteration`: the steps; `mode_changes`: how contacts change their modes after a full one;
-//! - `modes`: the equations of a mode, the violation of the law, and the way to a cone's limit;
+//! - `violation`: how much the impulses violate the law; `limit`: their way to the limit of
+//!   friction;
 //! - `mode_memory`: which modes a solve has tried;
 //! - `system`: what pivoting needs of its problems; `store`: where it keeps the contacts' numbers.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod iteration;
+mod limit;
 mod mode_changes;
 mod mode_memory;
-mod modes;
 mod store;
 mod system;
+mod violation;
 
 pub(crate) use iteration::Pivoting;
 #[cfg(test)]
 pub(crate) use iteration::tests::rests;
 pub(crate) use mode_changes::NO_GAIN;
-pub(crate) use modes::{Mode, Triple};
-pub(crate) use store::{Few, Many};
+pub(crate) use store::{Few, Many, Triple};
 pub(crate) use system::System;
 
 /// Initial `α` of further attempts from the same start. With a large one each system is a short

@@ -1,8 +1,8 @@
 //! How contacts change their modes after a full step.
 
 use super::iteration::{ALIKE, Pivoting};
+use super::limit::return_to_cone;
 use super::mode_memory::weight;
-use super::modes::return_to_cone;
 use super::store::Store;
 use super::system::System;
 use crate::law::mode::ContactMode;

@@ -3,6 +3,9 @@
 use std::fmt::Debug;
 use std::ops::IndexMut;
 
+/// Entries of a contact along n, t, b.
+pub(crate) type Triple<T> = [T; 3];
+
 /// Storage of something by contact.
 pub(crate) trait Store: Clone + Debug + 'static {
     /// One `X` a contact.

@@ -1,8 +1,7 @@
 //! What pivoting needs of its problems.
 
-use super::modes::{Mode, Triple};
-use super::store::Store;
-use crate::law::mode::ContactMode;
+use super::store::{Store, Triple};
+use crate::law::mode::{ContactMode, Mode};
 use crate::scalar::Lane;
 
 /// Problems `u = W p + q`, one a lane, and the linear systems of their modes.

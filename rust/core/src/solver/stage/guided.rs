@@ -6,11 +6,11 @@
 //! answer and the caller continues.
 
 use crate::cone::tangential_norm;
-use crate::law::mode::ContactMode;
+use crate::law::mode::{ContactMode, Mode};
 use crate::law::one_contact::estimate_one_contact;
 use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep};
-use crate::solver::local::modes::{self, Linearised};
+use crate::solver::local::modes;
 use crate::solver::options::SolverOptions;
 use crate::solver::scratch::Scratch;
 
@@ -36,12 +36,12 @@ const DECIDED: f64 = 1e-8;
 /// Whether every sliding contact slips and every open one separates. Otherwise a mode is ambiguous.
 /// A sweep would choose it by the order of the contacts, on which the loads of a statically
 /// indeterminate mechanism would then depend.
-fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &[f64]) -> bool {
+fn is_decided<const D: usize>(data: &Prepared<'_>, modes: &[Mode<f64>], u: &[f64]) -> bool {
     let largest = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    contacts
+    modes
         .iter()
         .zip(u.chunks_exact(D))
-        .all(|(contact, u)| match contact.mode {
+        .all(|(mode, u)| match mode.kind() {
             ContactMode::Stick => true,
             ContactMode::Open => u[0] > DECIDED * largest,
             ContactMode::Slip => {
@@ -51,16 +51,12 @@ fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &
         })
 }
 
-/// One sweep of estimates, contact after contact.
-fn sweep<const D: usize>(
-    data: &Prepared<'_>,
-    W: &[f64],
-    contacts: &mut [Linearised],
-    p: &mut [f64],
-) {
+/// One sweep of estimates, contact after contact. `kappas`: stiffness of each contact's slide by
+/// the last estimate, 1/kg, or zero.
+fn sweep<const D: usize>(data: &Prepared<'_>, W: &[f64], kappas: &mut [f64], p: &mut [f64]) {
     let n = data.n;
     let blocks = W.chunks_exact(D * n).zip(data.q.chunks_exact(D));
-    for (i, (((rows, q), &mu), contact)) in blocks.zip(data.mu).zip(contacts).enumerate() {
+    for (i, (((rows, q), &mu), kappa)) in blocks.zip(data.mu).zip(kappas).enumerate() {
         let at = D * i;
         let rows: [&[f64]; D] = std::array::from_fn(|r| &rows[r * n..(r + 1) * n]);
         let mut sums = [[0.0; 2]; D];
@@ -83,10 +79,10 @@ fn sweep<const D: usize>(
                 u[r] -= block[r][c] * p[at + c];
             }
         }
-        let estimate = estimate_one_contact(&block, &u, mu, contact.gamma);
+        let estimate = estimate_one_contact(&block, &u, mu, *kappa);
         if estimate.impulse.iter().all(|x| x.is_finite()) {
             p[at..at + D].copy_from_slice(&estimate.impulse);
-            contact.gamma = estimate.kappa;
+            *kappa = estimate.kappa;
         }
     }
 }
@@ -104,13 +100,15 @@ pub(in crate::solver) fn solve<const D: usize>(
     let Operator::Dense(W) = data.W else {
         return None;
     };
-    scratch.system.contacts.fill(Linearised::default());
+    // The place of the Newton point is free until the first step.
+    let kappas = &mut scratch.system.trial[..data.mu.len()];
+    kappas.fill(0.0);
     for _ in 0..SWEEPS {
-        sweep::<D>(data, W, &mut scratch.system.contacts, p);
+        sweep::<D>(data, W, kappas, p);
     }
     *iterations += SWEEPS;
     data.W.multiply_add(p, data.q, u);
-    let prediction = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
+    modes::recall::<D>(data.mu, p, u, &mut scratch.system.modes);
     p.fill(0.0);
     u.copy_from_slice(data.q);
     let alpha = options.regularisation * data.mean_diagonal;
@@ -119,12 +117,9 @@ pub(in crate::solver) fn solve<const D: usize>(
     scratch.system.centre.fill(0.0);
     for step in 0..STEPS.min(options.max_newton_steps) {
         if factors == Factors::None {
-            factors =
-                scratch
-                    .system
-                    .factorise::<D>(data, alpha, prediction, true, &mut scratch.work);
+            factors = (scratch.system).factorise::<D>(data, alpha, true, &mut scratch.work);
         }
-        if factors == Factors::None && prediction.m > 0 {
+        if factors == Factors::None && scratch.system.m > 0 {
             return None;
         }
         // The centre stays at zero until the slip directions are known. Otherwise the guess would
@@ -134,7 +129,6 @@ pub(in crate::solver) fn solve<const D: usize>(
         }
         let newton_step = NewtonStep {
             alpha,
-            m: prediction.m,
             factors,
             on_cone: true,
         };
@@ -150,7 +144,7 @@ pub(in crate::solver) fn solve<const D: usize>(
                 && residual.relative < ROUNDING_ASKED
                 && data.is_within_rounding::<D>(p, u));
         if is_solved {
-            return is_decided::<D>(data, &scratch.system.contacts, u).then_some(residual);
+            return is_decided::<D>(data, &scratch.system.modes, u).then_some(residual);
         }
         if step >= SETTLED && (progress > LEAST_GAIN || progress.is_nan()) {
             return None;
@@ -159,16 +153,7 @@ pub(in crate::solver) fn solve<const D: usize>(
             factors = Factors::None;
         }
         last = residual.relative;
-        for (contact, (p, u)) in scratch
-            .system
-            .contacts
-            .iter_mut()
-            .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
-        {
-            if contact.mode == ContactMode::Slip {
-                modes::set_slide::<D>(contact, p, u);
-            }
-        }
+        modes::turn::<D>(data.mu, p, u, &mut scratch.system.modes);
     }
     None
 }

@@ -8,7 +8,7 @@
 
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
-use crate::solver::local::modes::{self, Prediction};
+use crate::solver::local::modes;
 use crate::solver::local::sweep;
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
@@ -61,10 +61,11 @@ struct Course {
 }
 
 impl Course {
-    /// Decides from the last step's `progress` (ratio of residuals) whether to keep the factors and
-    /// `α`.
+    /// Decides whether to keep the factors and `α`: from the last step's `progress` (ratio of
+    /// residuals), from whether the modes `changed`, and from whether any contact slides with
+    /// friction.
     #[inline]
-    fn revise(&mut self, progress: f64, prediction: Prediction, smallest: f64) {
+    fn revise(&mut self, progress: f64, [changed, slides]: [bool; 2], smallest: f64) {
         if self.settled > 1 && progress > SLOW && self.factors != Factors::None {
             if self.factors == Factors::Symmetric && self.allow_symmetric {
                 // W may be unsymmetric, so that one triangle of it is not enough.
@@ -74,13 +75,14 @@ impl Course {
             }
             self.factors = Factors::None;
         }
-        if prediction.changed || (prediction.slides && progress > REUSE_CONTRACTION) {
+        if changed || (slides && progress > REUSE_CONTRACTION) {
             self.factors = Factors::None;
         }
     }
 }
 
-/// Predicts the modes; after the first change with the exact predictor.
+/// Predicts the modes; after the first change with the exact predictor. Returns whether they
+/// changed.
 #[inline]
 fn predict<const D: usize>(
     data: &Prepared<'_>,
@@ -88,23 +90,20 @@ fn predict<const D: usize>(
     p: &[f64],
     u: &[f64],
     scratch: &mut Scratch,
-) -> Prediction {
-    let ReducedSystem {
-        centre, contacts, ..
-    } = &mut scratch.system;
+) -> bool {
+    let ReducedSystem { centre, modes, .. } = &mut scratch.system;
     let prox = Proximal {
         alpha: course.alpha,
         centre,
     };
-    let mut prediction = modes::predict::<D>(data, prox, course.exact, p, u, contacts);
-    if prediction.changed && !course.exact {
+    let changed = modes::predict::<D>(data, prox, course.exact, p, u, modes);
+    if changed && !course.exact {
         course.exact = true;
-        prediction = modes::predict::<D>(data, prox, true, p, u, contacts);
-        prediction.changed = true;
+        modes::predict::<D>(data, prox, true, p, u, modes);
     }
-    if prediction.changed {
+    if changed {
         course.settled = 0;
-        return prediction;
+        return true;
     }
     course.settled += 1;
     // After a change of modes the centre stays until its own proximal step is solved. Otherwise the
@@ -115,7 +114,7 @@ fn predict<const D: usize>(
     {
         centre.copy_from_slice(p);
     }
-    prediction
+    false
 }
 
 /// A few sweeps out of a cycle of modes; false if the budget does not allow them.
@@ -146,7 +145,6 @@ fn break_cycle<const D: usize>(
 fn take_step<const D: usize>(
     data: &Prepared<'_>,
     course: &mut Course,
-    prediction: Prediction,
     p: &mut [f64],
     u: &[f64],
     scratch: &mut Scratch,
@@ -155,17 +153,15 @@ fn take_step<const D: usize>(
         course.factors = scratch.system.factorise::<D>(
             data,
             course.alpha,
-            prediction,
             course.allow_symmetric,
             &mut scratch.work,
         );
-        if course.factors == Factors::None && prediction.m > 0 {
+        if course.factors == Factors::None && scratch.system.m > 0 {
             return false;
         }
     }
     let newton_step = NewtonStep {
         alpha: course.alpha,
-        m: prediction.m,
         factors: course.factors,
         on_cone: true,
     };
@@ -210,7 +206,7 @@ pub(in crate::solver) fn full_steps<const D: usize>(
         last: f64::INFINITY,
     };
     data.W.multiply_add(p, data.q, u);
-    let recalled = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
+    modes::recall::<D>(data.mu, p, u, &mut scratch.system.modes);
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
     scratch.system.centre.copy_from_slice(p);
     let mut step = 0;
@@ -242,19 +238,17 @@ pub(in crate::solver) fn full_steps<const D: usize>(
             return give_best(data, best, p, u, scratch);
         }
         course.last = residual.relative;
-        let prediction = if step == 0 && is_warm {
-            recalled
-        } else {
-            predict::<D>(data, &mut course, p, u, scratch)
-        };
+        let is_recalled = step == 0 && is_warm;
+        let changed = !is_recalled && predict::<D>(data, &mut course, p, u, scratch);
         *iterations += 1;
-        if prediction.changed && step > 0 && step % CYCLE == 0 {
+        if changed && step > 0 && step % CYCLE == 0 {
             if !break_cycle::<D>(data, &mut course, p, scratch) {
                 return give_best(data, best, p, u, scratch);
             }
         } else {
-            course.revise(progress, prediction, SMALLEST * data.mean_diagonal);
-            if !take_step::<D>(data, &mut course, prediction, p, u, scratch) {
+            let smallest = SMALLEST * data.mean_diagonal;
+            course.revise(progress, [changed, scratch.system.slides], smallest);
+            if !take_step::<D>(data, &mut course, p, u, scratch) {
                 return give_best(data, best, p, u, scratch);
             }
         }

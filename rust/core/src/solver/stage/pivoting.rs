@@ -8,13 +8,12 @@
 
 use std::ops::Range;
 
-use crate::law::mode::ContactMode;
+use crate::law::mode::{ContactMode, Mode};
 use crate::law::one_contact::solve_one_contact;
 use crate::problem::{ContactScales, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
-use crate::solver::local::modes::{Linearised, Prediction, n_unknowns};
 use crate::solver::options::SolverOptions;
-use crate::solver::pivoting::{FURTHER_ALPHAS, Many, Mode, NO_GAIN, Pivoting, System, Triple};
+use crate::solver::pivoting::{FURTHER_ALPHAS, Many, NO_GAIN, Pivoting, System, Triple};
 use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
 use crate::solver::work::Work;
@@ -36,7 +35,6 @@ struct PreparedSystem<'a, const D: usize> {
     /// Impulses and velocities, `D` a contact.
     p: &'a mut [f64],
     u: &'a mut [f64],
-    prediction: Prediction,
     factors: Factors,
     /// Whether the factors have not solved yet: their first solution is paid with them.
     is_fresh: bool,
@@ -58,27 +56,6 @@ fn scatter<const D: usize>(x: &[f64], out: &mut [Triple<f64>]) {
 }
 
 impl<const D: usize> PreparedSystem<'_, D> {
-    /// Enters the modes and numbers their unknowns.
-    fn linearise(&mut self, modes: &[Mode<f64>]) {
-        let mut prediction = Prediction::default();
-        let contacts = self.reduced.contacts.iter_mut().zip(self.data.mu);
-        for ((contact, &mu), mode) in contacts.zip(modes) {
-            *contact = Linearised {
-                mode: match (mode.closed, mode.stick) {
-                    (false, _) => ContactMode::Open,
-                    (true, true) => ContactMode::Stick,
-                    (true, false) => ContactMode::Slip,
-                },
-                e: [mode.b[1], -mode.b[0]],
-                gamma: mode.gamma,
-                start: prediction.m,
-            };
-            prediction.slides |= contact.mode == ContactMode::Slip && mu > 0.0;
-            prediction.m += n_unknowns::<D>(contact.mode, mu);
-        }
-        self.prediction = prediction;
-    }
-
     /// Writes impulses and velocities to the slices.
     fn show(&mut self, pivoting: &Pivoting<f64, Many>) {
         gather::<D>(&pivoting.p, self.p);
@@ -116,12 +93,10 @@ impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
     }
 
     fn factorise(&mut self, alpha: f64, modes: &Vec<Mode<f64>>) -> bool {
-        self.linearise(modes);
-        self.factors =
-            self.reduced
-                .factorise::<D>(self.data, alpha, self.prediction, true, self.work);
+        self.reduced.modes.copy_from_slice(modes);
+        self.factors = (self.reduced).factorise::<D>(self.data, alpha, true, self.work);
         self.is_fresh = true;
-        self.factors != Factors::None || self.prediction.m == 0
+        self.factors != Factors::None || self.reduced.m == 0
     }
 
     fn solve(&mut self, modes: &Vec<Mode<f64>>, r: &mut Vec<Triple<f64>>) {
@@ -130,9 +105,7 @@ impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
             r.fill([0.0; 3]);
             return;
         }
-        if !is_paid {
-            self.linearise(modes);
-        }
+        self.reduced.modes.copy_from_slice(modes);
         // Newton's step from impulses and about a centre of zero, where the velocities are −r.
         gather::<D>(r, self.u);
         for u in &mut *self.u {
@@ -142,7 +115,6 @@ impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
         self.reduced.centre.fill(0.0);
         let step = NewtonStep {
             alpha: 0.0,
-            m: self.prediction.m,
             factors: self.factors,
             on_cone: false,
         };
@@ -202,7 +174,6 @@ pub(in crate::solver) fn pivots<const D: usize>(
         work: &mut scratch.work,
         p,
         u,
-        prediction: Prediction::default(),
         factors: Factors::None,
         is_fresh: false,
     };

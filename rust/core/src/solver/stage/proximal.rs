@@ -262,21 +262,15 @@ fn descend<const D: usize>(
         if current <= threshold {
             break;
         }
-        let ReducedSystem {
-            centre, contacts, ..
-        } = &mut scratch.system;
+        let ReducedSystem { centre, modes, .. } = &mut scratch.system;
         let prox = Proximal { alpha, centre };
-        let prediction = modes::predict::<D>(data, prox, exact, p, u, contacts);
-        let factors =
-            scratch
-                .system
-                .factorise::<D>(data, alpha, prediction, false, &mut scratch.work);
+        modes::predict::<D>(data, prox, exact, p, u, modes);
+        let factors = (scratch.system).factorise::<D>(data, alpha, false, &mut scratch.work);
         *iterations += 1;
         let mut accepted = false;
-        if factors != Factors::None || prediction.m == 0 {
+        if factors != Factors::None || scratch.system.m == 0 {
             let newton_step = NewtonStep {
                 alpha,
-                m: prediction.m,
                 factors,
                 on_cone: false,
             };
