@@ -83,13 +83,14 @@ stub: $(STAMPS)/test $(STAMPS)/core ## write the compiled module's docstrings in
 
 # Properties are tried on the same cases in every fast run, and on new ones in a run of all tests.
 SAME_CASES = $(if $(filter all,$(TIER)),,PROPTEST_RNG_SEED=1)
+OF_DOCS    = tests/browser/test_manual.py# builds the manual, which make docs does
 SAME_DRAWS = $(if $(filter all,$(TIER)),,--hypothesis-seed=1)
 
 test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of arithmetic)
 	$(if $(filter all,$(TIER)),CARGO_PROFILE_DEV_DEBUG_ASSERTIONS=true CARGO_PROFILE_DEV_OVERFLOW_CHECKS=true) $(SAME_CASES) $(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
 
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test $(if $(filter all,$(TIER)),ray) ## the Python tests only, and the longest ten
-	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10 $(SAME_DRAWS)
+	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10 $(SAME_DRAWS) $(if $(filter test,$(TIER)),--ignore $(OF_DOCS))
 
 same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
 	$(MAKE) --no-print-directory $(STAMPS)/core
@@ -117,9 +118,10 @@ extras: $(STAMPS)/test wheel ## install the wheel, without Rust, in an empty env
 sizes: $(STAMPS)/test wheel ## measure what an installation takes on disk, and write it into README and manual (SIZES="demo train" for these extras, too)
 	ROVER_GYM_WHEEL=$$(ls $(abspath dist)/*.whl) PYTHONPATH=tests $(BIN)/python -m installing.sizes $(SIZES)
 
-docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
+docs: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/debian-test ## build the documentation, Rust and Python, warnings denied, and test the manual's pages in a browser
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked --quiet
 	$(BIN)/sphinx-build --jobs auto --quiet --fail-on-warning --keep-going docs docs/_build/html
+	$(BIN)/pytest --quiet --numprocesses auto $(OF_DOCS)
 	@echo "docs/_build/html/index.html"
 	@echo "target/doc/rover_core/index.html"
 

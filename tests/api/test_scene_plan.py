@@ -135,7 +135,6 @@ def test_a_plan_says_which_steps_are_fast() -> None:
         assert lanes == 1 or f"{lanes} rovers to a register" in built
     for scene, why in (
         (Scene(tumbles=True), 'variant is "newton"'),
-        (Scene(options={"solver": "newton"}), 'solver is not "auto"'),
         (straight(), "planar"),
     ):
         built, reason = decided(scene, "steps")

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::{StepError, StepOptions, StepReport, moreau_jean::MoreauJean};
-use rover_core::multibody::description::{LoopDescription, LoopKind};
+use rover_core::multibody::description::{JointKind, LoopDescription, LoopKind};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
@@ -13,7 +13,7 @@ use rover_core::simulation::lane_batch::{BatchRover, LaneBatch};
 use rover_core::solver::Method;
 
 use super::Random;
-use super::machines::equipped;
+use super::machines::{equipped, on_a_stand};
 use crate::rover_kinds::{dry, mecanum, tracked, with_a_bar};
 
 pub fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
@@ -33,11 +33,11 @@ pub fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
 
 /// A rover on its ground: a plane, rocks, a flat map, hills, or hills with rocks.
 fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation {
-    solved_by(Method::Auto, i, model, numbers)
+    with_options(StepOptions::default(), i, model, numbers)
 }
 
-fn solved_by(
-    method: Method,
+fn with_options(
+    options: StepOptions,
     i: usize,
     model: &Arc<Model>,
     numbers: &mut Random,
@@ -50,11 +50,10 @@ fn solved_by(
         2 | 5 => rocks(numbers),
         _ => Arc::new(Plane::ground()),
     };
-    let mut options = StepOptions {
+    let options = StepOptions {
         friction_coefficient: 0.6 + 0.2 * numbers.next(),
-        ..StepOptions::default()
+        ..options
     };
-    options.solver.method = method;
     let mut rover = RoverSimulation::new(Arc::clone(model), terrain, options).unwrap();
     let mut start = Configuration::zero(model);
     start.position.y = 0.45 + 0.1 * numbers.next();
@@ -240,7 +239,9 @@ fn a_rover_restored_on_a_height_map_goes_on_to_the_bit() {
         for ground in [3, 4, 6] {
             for method in [Method::Auto, Method::Newton] {
                 let mut numbers = Random((10 * k + ground) as u64);
-                let mut own = solved_by(method, ground, own, &mut numbers);
+                let mut options = StepOptions::default();
+                options.solver.method = method;
+                let mut own = with_options(options, ground, own, &mut numbers);
                 let fresh = own.clone();
                 for _ in 0..4 {
                     command(&mut own, 60.0, &mut numbers);
@@ -303,6 +304,53 @@ proptest! {
         which: prop::sample::Index, n in 1usize..20, torque in 0.0..200.0, seed: u64,
     ) {
         drive(Instructions::of_this_machine(), which.get(&models()), n, torque, seed);
+    }
+}
+
+/// Rovers that bounce, of which some are pushed, some turn too fast for explicit gyroscopic terms,
+/// and some for one step; on free roots, on stands, and a free one beside one on a stand.
+#[test]
+fn rovers_that_bounce_turn_and_are_pushed_move_as_they_would_alone() {
+    let slide = on_a_stand(equipped(), JointKind::Prismatic, Some([0.0, 1.0, 0.0]));
+    let parts = vec![
+        ("a".to_owned(), slide.clone()),
+        ("b".to_owned(), equipped()),
+    ];
+    let both = ModelDescription::joined("both", parts, Vec::new());
+    let on_stands = [
+        slide,
+        on_a_stand(equipped(), JointKind::Spherical, None),
+        on_a_stand(linked(), JointKind::Revolute, Some([0.0, 0.0, 1.0])),
+        both,
+    ];
+    let on_stands = on_stands.map(|own| Arc::new(Model::from_description(own).unwrap()));
+    for (model, seed) in models().iter().chain(&on_stands).zip(300..) {
+        let mut numbers = Random(seed);
+        let options = StepOptions {
+            restitution: 0.5,
+            warm_start: seed % 3 > 0,
+            ..StepOptions::default()
+        };
+        let mut rovers: Vec<RoverSimulation> = (0..9)
+            .map(|i| with_options(options.clone(), i, model, &mut numbers))
+            .collect();
+        for (i, rover) in rovers.iter_mut().enumerate() {
+            assert_eq!(rover.fallback_reason(), None);
+            let (q, mut v) = (rover.q().clone(), rover.v().to_vec());
+            for v in &mut v {
+                *v *= [1.0, 100.0, 1.0, 400.0][i % 4];
+            }
+            rover.set_state(q, v);
+            for k in 0..i % 3 {
+                let frame = (i + 5 * k) % model.frames().len();
+                let name = model.frames()[frame].name.clone();
+                let force = [0.0; 3].map(|_: f64| 200.0 * numbers.next());
+                rover
+                    .apply_wrench(&name, force, force.map(|x| 0.1 * x), [0.1, 0.0, 0.2])
+                    .unwrap();
+            }
+        }
+        drive_all(Instructions::of_this_machine(), rovers, 30.0, &mut numbers);
     }
 }
 

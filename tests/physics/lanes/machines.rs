@@ -13,6 +13,7 @@ use rover_core::multibody::description::{
 };
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription, Motor};
 use rover_core::simulation::RoverSimulation;
+use rover_core::solver::Method;
 
 use super::Random;
 
@@ -255,10 +256,10 @@ fn every_joint_and_force_obeys_the_law_of_the_general_step() {
 }
 
 /// Rovers that bounce, by one number or by pairs of materials, on rigid and on yielding wheels;
-/// that forces push about; whose solves start from nothing; and that turn too fast for explicit
-/// gyroscopic terms.
+/// that forces push about; whose solves start from nothing, or have another method; and that turn
+/// too fast for explicit gyroscopic terms.
 #[test]
-fn rebounds_wrenches_cold_starts_and_fast_turns_obey_the_law_of_the_general_step() {
+fn rebounds_wrenches_methods_and_fast_turns_obey_the_law_of_the_general_step() {
     let pair = MaterialPair {
         materials: ["wheel".into(), "ground".into()],
         friction_coefficient: 0.5,
@@ -277,7 +278,14 @@ fn rebounds_wrenches_cold_starts_and_fast_turns_obey_the_law_of_the_general_step
         warm_start: false,
         ..usual()
     };
+    let by = |method| {
+        let mut options = usual();
+        options.solver.method = method;
+        options
+    };
     let cases = [
+        (by(Method::Newton), [0.03, 0.0, 0.0]),
+        (by(Method::ProximalPoint), [0.03, 0.0, 0.0]),
         (bouncing(0.3), [0.5, 0.0, 0.0]),
         (bouncing(0.9), [0.5, 0.0, 0.0]),
         (materials, [0.3, 0.0, 0.0]),
@@ -296,14 +304,33 @@ fn rebounds_wrenches_cold_starts_and_fast_turns_obey_the_law_of_the_general_step
             let met = drive(&model, options.clone(), *start);
             let Met { steps, general, .. } = met;
             corrected += met.corrected;
-            // A ball joint that turns by half a radian in a step takes several.
-            let most = if start[2] > 0.0 { steps / 2 } else { steps / 6 };
+            // A ball joint that turns by half a radian in a step takes several, and one method alone
+            // does not solve every problem.
+            let is_hard = start[2] > 0.0 || options.solver.method != Method::Auto;
+            let most = if is_hard { steps / 2 } else { steps / 6 };
             assert!(general < most, "{name} {options:?}: {general}");
             let typical = met.differences[steps * 9 / 10];
             assert!(typical < 1e-9, "{name} {options:?}: {typical:e}");
         }
     }
     assert!(corrected > 0);
+}
+
+/// A machine whose trunk hangs on a joint of the world, its wheels just above the plane.
+pub fn on_a_stand(
+    mut own: ModelDescription,
+    kind: JointKind,
+    axis: Option<[f64; 3]>,
+) -> ModelDescription {
+    let root = &mut own.solids[0];
+    (root.joint, root.axis, root.position) = (Some(kind), axis, Some([0.0; 3]));
+    let model = Model::from_description(own.clone()).unwrap();
+    let kinematics = Kinematics::of(&model, &Configuration::zero(&model));
+    let wheels = model.wheels().iter();
+    let lowest = wheels.map(|wheel| kinematics.point(wheel.body, &wheel.centre).y - wheel.radius);
+    let lowest = lowest.fold(f64::INFINITY, f64::min);
+    own.solids[0].position = Some([0.0, 1e-3 - lowest, 0.0]);
+    own
 }
 
 /// Machines whose trunk hangs on a joint of the world, on a slide, or does not move at all, with
@@ -317,19 +344,7 @@ fn machines_on_stands_obey_the_law_of_the_general_step() {
         (JointKind::Fixed, None),
     ];
     for (kind, axis) in kinds {
-        let mut description = equipped();
-        let root = &mut description.solids[0];
-        (root.joint, root.axis, root.position) = (Some(kind), axis, Some([0.0; 3]));
-        let lowest = {
-            let model = Model::from_description(description.clone()).unwrap();
-            let q = Configuration::zero(&model);
-            let kinematics = Kinematics::of(&model, &q);
-            let wheels = model.wheels().iter();
-            let lowest =
-                wheels.map(|wheel| kinematics.point(wheel.body, &wheel.centre).y - wheel.radius);
-            lowest.fold(f64::INFINITY, f64::min)
-        };
-        description.solids[0].position = Some([0.0, 1e-3 - lowest, 0.0]);
+        let description = on_a_stand(equipped(), kind, axis);
         let model = Arc::new(Model::from_description(description).unwrap());
         let met = drive(&model, StepOptions::default(), [0.0, 0.1, 0.0]);
         let Met { steps, general, .. } = met;

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use rover_core::geometry::{Plane, SoftGround, SphereField, Terrain, Union};
 use rover_core::integrator::moreau_jean::MoreauJean;
 use rover_core::integrator::{StepError, StepOptions};
-use rover_core::lanes::admission::FallbackReason;
 use rover_core::multibody::Model;
 use rover_core::sand::Soil;
 use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
+use rover_core::simulation::fallback::FallbackReason;
 use rover_core::simulation::lane_batch::{BatchRover, LaneBatch};
 
 use super::Random;

@@ -7,8 +7,8 @@
 //! chassis on the ground, is found rover by rover. If a rover needs something else, it leaves the
 //! block before its state changes, and the general step of [`crate::integrator`] takes it.
 //!
-//! - [`admission`]: which options have a fast step; [`machine`]: what the rovers of a block share;
-//!   `parts`: its wheels, boxes and balls; [`lane_rover`]: what a block reads of a rover;
+//! - [`machine`]: what the rovers of a block share; `parts`: its wheels, boxes and balls;
+//!   [`lane_rover`]: what a block reads of a rover;
 //! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `wide_wheel`,
 //!   `joint_slots`, [`forecast`]: contacts of all lanes at once; `lane_detection`, `by_lane`,
 //!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
@@ -48,7 +48,6 @@
 //! [`crate::system`].
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-pub mod admission;
 mod by_lane;
 mod clusters;
 mod contact_plane;

@@ -308,7 +308,7 @@ impl<T: Lane> Lanes<T> {
         let problems = &mut self.problems[b * self.size..][..self.size];
         block.prepare(problems, &mut NoProbe);
         (self.queue).enter(b, &mut self.problems, |problem| {
-            block.is_going(Block::<T>::lane_of(problem))
+            block.needs_queue() && block.is_going(Block::<T>::lane_of(problem))
         });
     }
 
@@ -322,14 +322,15 @@ impl<T: Lane> Lanes<T> {
             match block.conclude(problems, &mut NoProbe) {
                 Next::Retake => {
                     (self.queue).enter(b, &mut self.problems, |problem| {
-                        block.is_retaken(Block::<T>::lane_of(problem))
+                        block.needs_queue() && block.is_retaken(Block::<T>::lane_of(problem))
                     });
                     return true;
                 }
                 Next::Project => {
                     block.set_gaps(problems);
                     course.projects = true;
-                    self.queue.enter(b, &mut self.problems, |_| true);
+                    let is_asked = block.needs_queue();
+                    self.queue.enter(b, &mut self.problems, |_| is_asked);
                     return true;
                 }
                 Next::Finish => {}
@@ -354,7 +355,11 @@ impl<T: Lane> Lanes<T> {
                 continue;
             }
             let BatchRover { rover, error } = &mut rovers[slot.index];
-            rover.store(block, lane);
+            if slot.kept.steps == slot.report.steps {
+                rover.leave(block, lane);
+            } else {
+                rover.store(block, lane);
+            }
             slot.kept = slot.report;
             match rover.step_generally() {
                 Ok(report) => {

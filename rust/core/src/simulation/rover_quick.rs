@@ -7,7 +7,6 @@ use super::quick::solve;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
-use crate::lanes::admission::{FallbackReason, admit};
 use crate::lanes::lane_rover::LaneRover;
 use crate::lanes::machine::Machine;
 use crate::lanes::step::{Block, Next};
@@ -21,19 +20,6 @@ impl RoverScene {
         match self.fallback_reason(options) {
             None => self.machine.as_ref().ok(),
             Some(_) => None,
-        }
-    }
-
-    /// Why with these options it has no fast steps.
-    #[inline]
-    pub(super) fn fallback_reason(&self, options: &StepOptions) -> Option<FallbackReason> {
-        if self.terrain.soft().is_some_and(|layer| !layer.is_alone) {
-            return Some(FallbackReason::FirmBesideSoft);
-        }
-        match (admit(options), &self.machine) {
-            (Err(why), _) => Some(why),
-            (Ok(()), Err(why)) => Some(why.clone().into()),
-            (Ok(()), Ok(_)) => None,
         }
     }
 
@@ -82,7 +68,9 @@ impl RoverScene {
         let solver = &step.options.solver;
         let mut next = Next::Retake;
         while next == Next::Retake {
-            solve(queue, problems, solver);
+            if block.needs_queue() {
+                solve(queue, problems, solver);
+            }
             probe.end(Phase::Solve);
             next = block.conclude(problems, probe);
         }
@@ -90,9 +78,11 @@ impl RoverScene {
         if is_deep {
             gap_problems.clone_from_slice(problems);
             block.set_gaps(gap_problems);
-            solve(queue, gap_problems, solver);
+            if block.needs_queue() {
+                solve(queue, gap_problems, solver);
+            }
         }
-        block.finish(is_deep.then_some(&gap_problems[..]), probe);
+        block.finish(is_deep.then_some(&mut gap_problems[..]), probe);
         if block.fallback(0).is_some() {
             block.return_ruts(0, &mut lane_rover);
             return None;

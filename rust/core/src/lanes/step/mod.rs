@@ -13,16 +13,18 @@
 //! A lane whose step cannot be taken falls back to the general one: its state stays as it was.
 //!
 //! `loading`: rovers come and go; `phases`: the three parts, and what they are made of:
-//! `contact_list`, `forces`, `turning`, `implicit`, `pushing`, `sinking`, `rebound`, `impacts`,
-//! `balance`, `projection`, `closing`.
+//! `contact_list`, `forces`, `turning`, `implicit`, `pushing`, `sinking`, `rebound`, `methods`,
+//! `by_method`, `impacts`, `balance`, `projection`, `closing`.
 
 mod balance;
+mod by_method;
 mod closing;
 mod contact_list;
 mod forces;
 mod impacts;
 mod implicit;
 mod loading;
+mod methods;
 mod phases;
 mod projection;
 mod pushing;
@@ -33,6 +35,7 @@ mod turning;
 use std::sync::Arc;
 
 use self::balance::{Balance, Energies};
+use self::by_method::ByMethod;
 use self::implicit::Implicit;
 use super::contacts::Contacts;
 use super::ground::Ground;
@@ -156,6 +159,7 @@ pub struct Block<T: Lane> {
     /// By cluster: lanes in which the gyroscopic terms of its group are implicit, and how.
     is_gyroscopic: Vec<T::Mask>,
     implicit: Option<Box<Implicit<T>>>,
+    by_method: Option<Box<ByMethod>>,
     energy_scratch: EnergyScratch<T>,
     contacts: Contacts<T>,
     rows: Rows<T>,
@@ -246,6 +250,7 @@ impl<T: Lane> Block<T> {
             bias_scratch: BiasScratch::new(token, machine),
             is_gyroscopic: masks(),
             implicit: None,
+            by_method: None,
             energy_scratch: EnergyScratch::new(token, machine),
             rows: Rows::new(token, machine, contacts.n_slots()),
             yields: Yields::new(token, machine, contacts.n_slots()),

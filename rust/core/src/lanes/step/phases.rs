@@ -95,6 +95,7 @@ impl<T: Lane> Block<T> {
         for (index, problem) in problems_in_use.iter_mut().enumerate() {
             problem.begins_least = self.is_same[index / T::LANES].get(Self::lane_of(index));
         }
+        self.await_answers(problems, self.asked(is_first));
         probe.end(Phase::Bias);
         if self.contacts.factored() != 0 {
             T::vectorize(
@@ -222,6 +223,7 @@ impl<T: Lane> Block<T> {
     /// If there are fewer than [`Self::n_problems`].
     pub fn conclude(&mut self, problems: &mut [ContactProblem], probe: &mut dyn Probe) -> Next {
         let token = self.token;
+        self.solve_by_method(problems);
         let mut solved = 0;
         for lane in 0..T::LANES {
             let mut report = StepReport {
@@ -237,7 +239,8 @@ impl<T: Lane> Block<T> {
                     is_solved &= problem.is_solved;
                     report.n_contacts += problem.n_contacts;
                     report.iterations += problem.iterations;
-                    report.factorisations += problem.iterations;
+                    report.factorisations += problem.factorisations;
+                    report.pivots += problem.pivots;
                     report.residual = report.residual.max(problem.residual.relative);
                 }
             }
@@ -529,7 +532,7 @@ impl<T: Lane> Block<T> {
     ///
     /// # Panics
     /// If there are fewer than [`Self::n_problems`].
-    pub fn finish(&mut self, problems: Option<&[ContactProblem]>, probe: &mut dyn Probe) {
+    pub fn finish(&mut self, problems: Option<&mut [ContactProblem]>, probe: &mut dyn Probe) {
         let token = self.token;
         if let Some(problems) = problems.filter(|_| self.any(&self.is_deep).any()) {
             self.project(problems);

@@ -84,6 +84,7 @@ impl<T: Lane> Block<T> {
                     }
                     let n = problem.n_unknowns();
                     problem.asks_least = false;
+                    problem.is_solved = false;
                     problem.q[..n].fill(0.0);
                     problem.p[..n].fill(0.0);
                 }
@@ -111,8 +112,9 @@ impl<T: Lane> Block<T> {
     }
 
     /// Moves the penetrating lanes by the displacement that the problems found.
-    pub(super) fn project(&mut self, problems: &[ContactProblem]) {
+    pub(super) fn project(&mut self, problems: &mut [ContactProblem]) {
         let token = self.token;
+        self.solve_by_method(problems);
         let mut unsolved = 0;
         for (index, problem) in problems[..self.n_problems()].iter().enumerate() {
             let lane = Self::lane_of(index);
@@ -120,7 +122,8 @@ impl<T: Lane> Block<T> {
                 unsolved |= u32::from(!problem.is_solved) << lane;
                 let report = &mut self.reports[lane];
                 report.iterations += problem.iterations;
-                report.factorisations += problem.iterations;
+                report.factorisations += problem.factorisations;
+                report.pivots += problem.pivots;
                 report.residual = report.residual.max(problem.residual.relative);
             }
         }

@@ -189,6 +189,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
     #[inline(always)]
     fn store(&self, lane: usize, problem: &mut ContactProblem, is_solved: bool) {
         problem.iterations = self.before[lane] + self.steps[lane];
+        problem.factorisations = problem.iterations;
         problem.is_solved = is_solved;
         if !is_solved {
             return;

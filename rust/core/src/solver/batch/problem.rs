@@ -72,8 +72,12 @@ pub struct ContactProblem {
     pub u: [f64; MAX_UNKNOWNS],
     /// Residual of the answer.
     pub residual: Residual,
-    /// Linear systems solved.
+    /// Iterations of the solver; in lanes each solves a linear system.
     pub iterations: usize,
+    /// Matrices that it factored.
+    pub factorisations: usize,
+    /// Iterations that pivoted, of a solver that counts them apart.
+    pub pivots: usize,
     /// Whether the answer is within the tolerances. If not, `p` and `u` are unspecified.
     pub is_solved: bool,
 }
@@ -214,6 +218,7 @@ impl Clone for ContactProblem {
         (self.asks_least, self.begins_least) = (other.asks_least, other.begins_least);
         self.residual = other.residual;
         self.iterations = other.iterations;
+        (self.factorisations, self.pivots) = (other.factorisations, other.pivots);
         self.is_solved = other.is_solved;
     }
 }
@@ -235,6 +240,8 @@ impl Default for ContactProblem {
             u: [0.0; MAX_UNKNOWNS],
             residual: Residual::UNSOLVED,
             iterations: 0,
+            factorisations: 0,
+            pivots: 0,
             is_solved: false,
         }
     }

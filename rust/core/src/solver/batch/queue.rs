@@ -47,7 +47,7 @@ impl ContactProblem {
         assert!(self.n_dry <= most_dry, "at most {most_dry} dry joints");
         let n = self.n_unknowns();
         let at_rest = self.q[..n].iter().all(|x| *x == 0.0);
-        self.iterations = 0;
+        (self.iterations, self.factorisations, self.pivots) = (0, 0, 0);
         self.is_solved = at_rest;
         self.residual = Residual::UNSOLVED;
         if at_rest {

@@ -1,0 +1,36 @@
+//! A contact problem of a block, solved by any method.
+
+use crate::problem::{Dimension, FrictionContactProblem, Redundancy, Residual};
+use crate::solver::batch::problem::ContactProblem;
+use crate::solver::{SolverOptions, SolverWorkspace, solve};
+
+/// Scratch of these solves.
+#[derive(Default)]
+pub(super) struct ByMethod {
+    workspace: SolverWorkspace,
+    redundancy: Redundancy,
+}
+
+impl ByMethod {
+    /// Solves a problem with the method of the options.
+    pub fn solve(&mut self, problem: &mut ContactProblem, options: &SolverOptions) {
+        let (W, n) = (problem.operator(), problem.n_unknowns());
+        let (q, mu) = (problem.q, problem.mu);
+        let (q, mu) = (&q[..n], &mu[..problem.n_contacts]);
+        let stated = FrictionContactProblem::from_assembled(Dimension::Three, &W, q, mu);
+        let (p, u) = (&mut problem.p[..n], &mut problem.u[..n]);
+        let report = solve(&stated, options, p, u, &mut self.workspace);
+        problem.is_solved = report.is_converged();
+        problem.residual = Residual {
+            relative: report.residual,
+            velocity: report.velocity_error,
+        };
+        (problem.iterations, problem.factorisations) = (report.iterations, report.factorisations());
+        problem.pivots = report.pivots();
+        if problem.is_solved && problem.asks_least {
+            let residuals = (options.tolerance, report.residual);
+            let settled = (self.redundancy).settle_problem(&stated, residuals, p, u);
+            problem.residual = settled.unwrap_or(problem.residual);
+        }
+    }
+}
