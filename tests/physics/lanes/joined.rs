@@ -6,7 +6,7 @@ use rover_core::draw::resting_pose;
 use rover_core::geometry::{Plane, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::integrator::moreau_jean::MoreauJean;
-use rover_core::multibody::description::{LoopDescription, LoopKind, Shape};
+use rover_core::multibody::description::{JointKind, LoopDescription, LoopKind, Shape};
 use rover_core::multibody::{Model, ModelDescription, coordinates};
 use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
@@ -343,6 +343,48 @@ fn compare(scene: &Scene, steps: usize) -> Met {
     }
     met.differences.sort_by(f64::total_cmp);
     met
+}
+
+/// A block strikes an arm on a hinge of the world, far above the ground, and they go on together.
+#[test]
+fn a_block_that_strikes_a_hinged_arm_obeys_the_law_of_the_general_step() {
+    let cuboid = |size| Shape::Box { size };
+    let mut arm = block(5.0, &cuboid([2.0, 0.2, 0.4]));
+    let root = &mut arm.solids[0];
+    (root.joint, root.axis) = (Some(JointKind::Revolute), Some([0.0, 0.0, 1.0]));
+    root.position = Some([0.0, 50.0, 0.0]);
+    let parts = vec![
+        ("arm".to_owned(), arm),
+        ("block".to_owned(), block(2.0, &cuboid([0.3; 3]))),
+    ];
+    let joined = ModelDescription::joined("hinge", parts, Vec::new());
+    let model = Arc::new(Model::from_description(joined).unwrap());
+    let q = [0.1, 0.5, 50.45, 0.05, 0.2, 0.1, 0.3];
+    let q = coordinates::from_public(&model, &q).unwrap();
+    for restitution in [0.0, 0.5] {
+        let options = StepOptions {
+            restitution,
+            ..StepOptions::default()
+        };
+        let ground = Arc::new(Plane::ground());
+        let mut own = RoverSimulation::new(Arc::clone(&model), ground, options).unwrap();
+        own.set_state(q.clone(), vec![0.3, 1.0, -1.0, 0.2, 1.0, -2.0, 0.5]);
+        let (mut touches, mut general_steps, mut differences) = (0, 0, Vec::new());
+        for _ in 0..200 {
+            let mut general = own.clone();
+            general.step_with(&MoreauJean, 1).unwrap();
+            general_steps += own.step(1).unwrap().fallbacks;
+            touches += usize::from(!own.contacts().is_empty());
+            let both = own.v().iter().zip(general.v());
+            differences.push(both.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())));
+        }
+        differences.sort_by(f64::total_cmp);
+        assert!(
+            touches > 5 && general_steps < 40,
+            "{touches} {general_steps}"
+        );
+        assert!(differences[190] < 1e-9, "{:e}", differences[190]);
+    }
 }
 
 #[test]

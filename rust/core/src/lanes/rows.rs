@@ -270,7 +270,7 @@ impl<T: Lane> Rows<T> {
                 let place = place_of(contacts.slot(slot));
                 *u = path.write(|m| end.motions[m], &place, v, rows);
             } else {
-                let zero = [v[0].like(0.0); 3];
+                let zero = [T::splat(self.token, 0.0); 3];
                 rows.fill(zero);
                 *u = zero;
             }
@@ -763,6 +763,7 @@ impl<T: Lane> Rows<T> {
         let [n, t, b] = self.softness[slot];
         let softness = store_all(&[n, t, b, self.normal[slot]]);
         let diagonal = store_all(&self.diagonal[slot]);
+        let still = BASE - path.lead();
         // Lanes whose problem has all velocities.
         let mut whole = 0;
         each::<T>(
@@ -784,6 +785,7 @@ impl<T: Lane> Rows<T> {
                     out.Z[contact * stride..][..stride].fill([0.0; 3]);
                 } else {
                     out.slots |= 1 << self.numbers[slot];
+                    out.Z[contact * stride..][..still].fill([0.0; 3]);
                 }
             },
         );
@@ -791,7 +793,6 @@ impl<T: Lane> Rows<T> {
             self.write_along_path(contacts, slot, problems);
             return;
         }
-        let still = BASE - path.lead();
         for (k, (velocity, z)) in path.velocities().zip(rows).enumerate() {
             let values = store_all(z);
             let [cluster, place] = self.velocities[velocity];
@@ -821,8 +822,8 @@ impl<T: Lane> Rows<T> {
         }
     }
 
-    /// Writes the rows of a slot to problems with the pattern of its cluster. Those of a free root
-    /// are zero where there is none.
+    /// Writes the rows of a slot to problems with the pattern of its cluster, after those of a free
+    /// root that it does not have.
     #[inline(always)]
     fn write_along_path(
         &self,
@@ -831,15 +832,14 @@ impl<T: Lane> Rows<T> {
         problems: &mut [ContactProblem],
     ) {
         let (path, rows) = self.of(contacts, slot);
-        let none = [[T::splat(self.token, 0.0); 3]; BASE];
-        let still = &none[..BASE - path.lead()];
+        let still = BASE - path.lead();
         let (homes, places) = (contacts.homes(slot), contacts.places(slot));
         let near = T::mask(self.token, contacts.near(slot));
         let Some(cluster) = contacts.cluster_of(slot) else {
             return;
         };
         let stride = self.patterns[cluster].stride();
-        for (k, z) in still.iter().chain(rows).enumerate() {
+        for (k, z) in (still..).zip(rows) {
             let values = store_all(z);
             each::<T>(
                 near,

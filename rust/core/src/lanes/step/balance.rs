@@ -135,7 +135,7 @@ impl<T: Lane> Correction<T> {
     pub fn apply(&self, tree: &TreeSpan, v: &mut [T]) {
         let zero = self.share.like(0.0);
         for (k, v) in v[tree.velocities.clone()].iter_mut().enumerate() {
-            let common = if k < 3 {
+            let common = if tree.is_free && k < 3 {
                 T::select(self.is_relative, self.translation[k], zero)
             } else {
                 zero

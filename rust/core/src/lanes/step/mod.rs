@@ -386,6 +386,17 @@ impl<T: Lane> Block<T> {
         masks.iter().fold(nobody, |all, own| all | *own)
     }
 
+    /// Calls `each(leader, lane)` for the groups of touching clusters of which one passes its
+    /// momentum on to the world.
+    fn each_held(&self, mut each: impl FnMut(usize, usize)) {
+        let held = (0..self.contacts.n_clusters()).filter(|own| self.machine.is_held(*own));
+        for cluster in held {
+            for lane in (0..T::LANES).filter(|lane| self.contacts.joined() >> lane & 1 == 1) {
+                each(self.contacts.leader(cluster, lane), lane);
+            }
+        }
+    }
+
     /// `masks`: by cluster, lanes in which its group has a contact.
     #[inline(always)]
     fn find_touch(&self, masks: &mut [T::Mask]) {

@@ -368,6 +368,7 @@ impl<T: Lane> Block<T> {
             self.gather(&mut balances, number, |own| &mut own.momentum.x);
             self.gather(&mut balances, number, |own| &mut own.momentum.y);
             self.gather(&mut balances, number, |own| &mut own.momentum.z);
+            self.each_held(|leader, lane| balances[leader].momentum.set(lane, [0.0; 3]));
         }
         (self.balances, self.energies) = (balances, own);
     }

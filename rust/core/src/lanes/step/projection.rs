@@ -118,7 +118,7 @@ impl<T: Lane> Block<T> {
         let mut unsolved = 0;
         for (index, problem) in problems[..self.n_problems()].iter().enumerate() {
             let lane = Self::lane_of(index);
-            if self.is_deep[index / T::LANES].get(lane) {
+            if problem.n_contacts > 0 && self.is_deep[index / T::LANES].get(lane) {
                 unsolved |= u32::from(!problem.is_solved) << lane;
                 let report = &mut self.reports[lane];
                 report.iterations += problem.iterations;
@@ -212,6 +212,7 @@ impl<T: Lane> Block<T> {
         self.contacts.gather(&mut own.kinetic);
         for momentum in &mut own.momentum {
             self.contacts.gather(momentum);
+            self.each_held(|leader, lane| momentum[leader].set(lane, 0.0));
         }
         self.energies = own;
     }

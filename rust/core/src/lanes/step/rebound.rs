@@ -47,12 +47,15 @@ impl<T: Lane> Block<T> {
         for &slot in self.contacts.used() {
             let bounced = self.bounces[slot] & self.contacts.slot(slot).active;
             for lane in (0..T::LANES).filter(|&lane| bounced.get(lane)) {
-                let list = self.contacts.list(self.contacts.homes(slot)[lane].into());
-                let key = list.keys[usize::from(self.contacts.places(slot)[lane])];
-                let mut known = self.next_memories[lane].impulses.iter_mut();
-                if let Some((_, p)) = known.find(|(own, _)| *own == key) {
-                    *p = [0.0; 3];
-                }
+                // Pieces of a surface share a key, so the contact is found by its place.
+                let home = usize::from(self.contacts.homes(slot)[lane]);
+                let lists = self
+                    .contacts
+                    .problems_of(lane)
+                    .take_while(|own| *own < home);
+                let before: usize = lists.map(|own| self.contacts.list(own).n).sum();
+                let place = before + usize::from(self.contacts.places(slot)[lane]);
+                self.next_memories[lane].impulses[place].1 = [0.0; 3];
             }
         }
     }
