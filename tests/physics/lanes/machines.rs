@@ -304,8 +304,8 @@ fn rebounds_wrenches_methods_and_fast_turns_obey_the_law_of_the_general_step() {
             let met = drive(&model, options.clone(), *start);
             let Met { steps, general, .. } = met;
             corrected += met.corrected;
-            // A ball joint that turns by half a radian in a step takes several, and one method alone
-            // does not solve every problem.
+            // A ball joint that turns by half a radian in a step takes several, and one method
+            // alone does not solve every problem.
             let is_hard = start[2] > 0.0 || options.solver.method != Method::Auto;
             let most = if is_hard { steps / 2 } else { steps / 6 };
             assert!(general < most, "{name} {options:?}: {general}");
