@@ -13,6 +13,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
+unexport PYTHONDONTWRITEBYTECODE# hundreds of commands that tests start import the same packages
 
 # With the interpreter's description that maturin leaves, cargo's own calls compile nothing twice.
 CARGO   = $(addprefix PYO3_CONFIG_FILE=,$(firstword $(shell ls $(CURDIR)/target/maturin/pyo3-config-*.txt 2> /dev/null))) cargo

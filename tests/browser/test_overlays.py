@@ -31,6 +31,11 @@ KEYS = {
 }
 
 
+OTHER_KEY = pytest.mark.nightly("tests/browser/test_overlays.py::test_a_key_shows_an_overlay_and_takes_it_away")
+FEW = {"trails", "forces", "depth", "slope"}
+EVERY_KEY = [name if name in FEW else pytest.param(name, marks=OTHER_KEY) for name in KEYS]
+
+
 def drive(folder: Path, *arguments: str) -> RoverRun:
     given = ["drive", "--time-limit", "1.5", "--seed", "11", "--output", str(folder), *arguments]
     result = CliRunner().invoke(app, given)
@@ -68,7 +73,7 @@ def after(browser: webdriver.Chrome, key: str) -> np.ndarray:
     return picture(browser)
 
 
-@pytest.mark.parametrize("name", KEYS)
+@pytest.mark.parametrize("name", EVERY_KEY)
 def test_a_key_shows_an_overlay_and_takes_it_away(name: str, shown: Shown[RoverRun]) -> None:
     bare = picture(shown.browser)
     with_it = after(shown.browser, KEYS[name])

@@ -43,7 +43,11 @@ def told(command: str, folder: Path) -> dict[str, Any]:
     return report
 
 
-@pytest.mark.parametrize("command", TABLES)
+OTHER_LAB = pytest.mark.nightly("tests/cli/test_json.py::test_a_table_is_one_object_as_json")
+EVERY_TABLE = [pytest.param(one, marks=OTHER_LAB) if LAB in one else one for one in TABLES]
+
+
+@pytest.mark.parametrize("command", EVERY_TABLE)
 def test_a_table_is_one_object_as_json(command: str, tmp_path: Path) -> None:
     report = told(command, tmp_path)
     assert set(TABLES[command]) <= report.keys()

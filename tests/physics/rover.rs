@@ -4,6 +4,7 @@
 pub mod scenes;
 
 mod batch;
+mod derivatives;
 mod driving;
 mod episodes;
 mod exploring;

@@ -136,7 +136,7 @@ def messages(random: Random, ledger: Ledger) -> None:
         loop.start()
         try:
             address = server.address.replace("http", "ws")
-            with connect(f"{address}/live", origin=server.address) as page:
+            with connect(f"{address}/live", origin=server.address, close_timeout=0.5) as page:
                 for _ in range(20):
                     page.send(_message(random))
                     ledger.steps += 1

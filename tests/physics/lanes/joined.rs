@@ -423,7 +423,7 @@ fn several_machines_in_lanes_move_as_they_would_alone() {
                 own
             });
             let rovers = rovers.collect();
-            drive_all(instructions, rovers, scene.noise, &mut Random(4));
+            drive_all(instructions, rovers, (8, scene.noise), &mut Random(4));
         }
     }
 }

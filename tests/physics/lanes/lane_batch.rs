@@ -149,24 +149,24 @@ fn linked() -> ModelDescription {
     own
 }
 
-/// Drives rovers of a model in a batch and alone.
+/// Drives rovers of a model in a batch and alone, with 8 commands.
 fn drive(instructions: Instructions, model: &Arc<Model>, n: usize, torque: f64, seed: u64) {
     let mut numbers = Random(seed);
     let rovers = (0..n).map(|i| rover(i, model, &mut numbers)).collect();
-    drive_all(instructions, rovers, torque, &mut numbers);
+    drive_all(instructions, rovers, (8, torque), &mut numbers);
 }
 
-/// Drives rovers of one model in a batch and alone.
+/// Drives rovers of one model in a batch and alone, with so many commands of at most that torque.
 pub fn drive_all(
     instructions: Instructions,
     mut together: Vec<RoverSimulation>,
-    torque: f64,
+    (n_commands, torque): (usize, f64),
     numbers: &mut Random,
 ) {
     let n = together.len();
     let mut alone = together.clone();
     let mut batch = LaneBatch::new(instructions);
-    for _ in 0..8 {
+    for _ in 0..n_commands {
         for (a, b) in together.iter_mut().zip(&mut alone) {
             let mut same = Random(numbers.0);
             command(a, torque, numbers);
@@ -350,7 +350,12 @@ fn rovers_that_bounce_turn_and_are_pushed_move_as_they_would_alone() {
                     .unwrap();
             }
         }
-        drive_all(Instructions::of_this_machine(), rovers, 30.0, &mut numbers);
+        drive_all(
+            Instructions::of_this_machine(),
+            rovers,
+            (4, 30.0),
+            &mut numbers,
+        );
     }
 }
 
@@ -359,7 +364,9 @@ fn narrower_lanes_give_the_same_bits() {
     let models = models();
     for instructions in Instructions::all_of_this_machine() {
         for (model, seed) in models.iter().zip(0..) {
-            drive(instructions, model, 8, 60.0, seed);
+            let mut numbers = Random(seed);
+            let rovers = (0..8).map(|i| rover(i, model, &mut numbers)).collect();
+            drive_all(instructions, rovers, (3, 60.0), &mut numbers);
         }
         drive(instructions, &models[7], 9, 60.0, 7);
         // A lane ends its problem while another one begins to use a place that it has vacated.
