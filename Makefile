@@ -21,7 +21,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
+.PHONY: help demo quick test test-all rust-tests check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -43,9 +43,12 @@ pytest-quick:
 	$(BIN)/pytest --quiet --numprocesses 1 --tier quick
 
 test: ## set up, and run the tests that a change must pass, Rust and Python side by side
-	@$(SIDE_BY_SIDE) $(STAMPS)/core $(STAMPS)/test $(STAMPS)/debian-demo $(STAMPS)/debian-test
-	@$(MAKE) --no-print-directory $(STAMPS)/fmu
-	@$(SIDE_BY_SIDE) test-python test-rust
+	@$(SIDE_BY_SIDE) rust-tests $(STAMPS)/test $(STAMPS)/debian-demo $(STAMPS)/debian-test
+	@$(SIDE_BY_SIDE) test-rust test-python
+
+# The library and its tests need nothing of Python, and compile side by side.
+rust-tests:
+	$(CARGO) test --workspace --tests --locked --quiet --no-run
 
 # One part goes on after another has failed; the last lines tell how each ended.
 PARTS = lint types deny docs test-rust test-python torture same-bits train-rllib
@@ -87,7 +90,7 @@ SAME_CASES = $(if $(filter all,$(TIER)),,PROPTEST_RNG_SEED=1)
 OF_DOCS    = tests/browser/test_manual.py# builds the manual, which make docs does
 SAME_DRAWS = $(if $(filter all,$(TIER)),,--hypothesis-seed=1)
 
-test-rust: $(STAMPS)/core ## the Rust tests only (of tier all with checks of arithmetic)
+test-rust: ## the Rust tests only (of tier all with checks of arithmetic)
 	$(if $(filter all,$(TIER)),CARGO_PROFILE_DEV_DEBUG_ASSERTIONS=true CARGO_PROFILE_DEV_OVERFLOW_CHECKS=true) $(SAME_CASES) $(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
 
 test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test $(if $(filter all,$(TIER)),ray) ## the Python tests only, and the longest ten

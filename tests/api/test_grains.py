@@ -176,7 +176,7 @@ def test_a_snapshot_continues_bit_for_bit_and_balls_can_be_taken(bed: BallBed) -
         sim.restore(taken)
 
 
-@pytest.mark.takes_long("a mass ratio that costs the solver sweeps")
+@pytest.mark.nightly("tests/physics/grains.rs::sweeps_and_a_factorisation_give_balls_the_same_velocities")
 def test_a_ball_a_hundred_thousand_times_heavier_hardly_goes_into_its_bed(bed: BallBed) -> None:
     big = 0.06
     place = [0.5 * bed.width, bed.surface + 2.0 * big, 0.5 * bed.depth]

@@ -25,9 +25,10 @@ def complaints(tasks: list[tuple[str, int]]) -> list[str]:
     return [line for row in rows.values() for line in row.complaints()]
 
 
-@pytest.mark.takes_long("the campaign, cut to twenty seconds")
-def test_a_short_round_of_every_regime_holds() -> None:
-    broken = complaints([(regime.name, 0) for regime in REGIMES])
+@pytest.mark.takes_long("the campaign, cut to ten seconds")
+def test_a_short_round_of_every_regime_holds(whole: bool) -> None:
+    """Of every other one in `make test`."""
+    broken = complaints([(regime.name, 0) for regime in REGIMES[:: 1 if whole else 2]])
     assert not broken, "\n".join(broken)
 
 

@@ -324,11 +324,11 @@ fn overlaps_grow_from_zero(bodies: &[(Model, Part)], least: usize) {
 /// pierced it, or a tip was beyond its middle.
 #[test]
 fn a_part_that_is_lowered_into_a_spiky_map_overlaps_it_by_no_more_than_it_was_lowered() {
-    overlaps_are_as_deep_as_lowered([0, 1, 5, 7, 33]);
+    overlaps_are_as_deep_as_lowered([1, 5, 33]);
 }
 
 /// Ignored because it takes a minute: `make test-all` runs it, and the test above, which runs
-/// always, has five of its seeds, four of which failed before the search was mended.
+/// always, has three of its seeds, two of which or more failed before the search was mended.
 #[test]
 #[ignore = "tests/physics/surfaces/first_touch.rs::a_part_that_is_lowered_into_a_spiky_map_overlaps_it_by_no_more_than_it_was_lowered"]
 fn parts_that_are_lowered_into_many_spiky_maps_overlap_them_by_no_more_than_they_were_lowered() {
