@@ -21,7 +21,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all rust-tests check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -43,12 +43,9 @@ pytest-quick:
 	$(BIN)/pytest --quiet --numprocesses 1 --tier quick
 
 test: ## set up, and run the tests that a change must pass, Rust and Python side by side
-	@$(SIDE_BY_SIDE) rust-tests $(STAMPS)/test $(STAMPS)/debian-demo $(STAMPS)/debian-test
-	@$(SIDE_BY_SIDE) test-rust test-python
-
-# The library and its tests need nothing of Python, and compile side by side.
-rust-tests:
-	$(CARGO) test --workspace --tests --locked --quiet --no-run
+	@$(SIDE_BY_SIDE) $(STAMPS)/library $(STAMPS)/test $(STAMPS)/debian-demo $(STAMPS)/debian-test
+	@$(MAKE) --no-print-directory $(STAMPS)/fmu
+	@$(SIDE_BY_SIDE) test-python test-rust
 
 # One part goes on after another has failed; the last lines tell how each ended.
 PARTS = lint types deny docs test-rust test-python torture same-bits train-rllib
@@ -255,10 +252,15 @@ $(STAMPS)/peers: requirements/peers.txt $(STAMPS)/demo
 	$(UV) --requirement $< || for one in $$(grep -o '^[a-z-]*==[^ ;]*' $<); do $(UV) $$one || true; done
 	@touch $@
 
-# The compiled core and the package itself, editable: built for development, or as it is shipped. One takes the place of
-# the other; what cargo has compiled for either stays.
 SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f)
 
+# The library and its own tests need nothing of Python, and compile side by side.
+$(STAMPS)/library: $(SOURCES)
+	@$(CARGO) test --workspace --lib --test schemes --locked --quiet --no-run
+	@mkdir -p $(@D) && touch $@
+
+# The compiled core and the package itself, editable: built for development, or as it is shipped. One takes the place of
+# the other; what cargo has compiled for either stays.
 $(STAMPS)/core: PROFILE := dev
 $(STAMPS)/release: PROFILE := release
 $(STAMPS)/core $(STAMPS)/release: $(SOURCES) | $(STAMPS)/demo

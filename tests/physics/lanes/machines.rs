@@ -299,7 +299,7 @@ fn rebounds_wrenches_methods_and_fast_turns_obey_the_law_of_the_general_step() {
         (usual(), [0.5, 0.0, 70.0]),
     ];
     let mut corrected = 0;
-    for name in ["mars-rover", "open-rover", "equipped"] {
+    for name in ["mars-rover", "equipped"] {
         let description = match name {
             "equipped" => equipped(),
             _ => ModelDescription::named(name).unwrap(),
