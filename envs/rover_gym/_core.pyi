@@ -1719,8 +1719,8 @@ class Simulation(AnySimulation):
     ) -> None:
         """Applies a force and a moment to a solid in all further steps.
 
-        Replaces the last wrench on this solid; one without force and moment removes it. Steps under
-        a wrench are general ones. A reset removes all wrenches, `set_state` keeps them.
+        Replaces the last wrench on this solid; one without force and moment removes it. A reset
+        removes all wrenches, `set_state` keeps them.
 
         Args:
             solid: Name of the solid.

@@ -876,6 +876,7 @@ fn free_bodies_list_their_sweeps_and_what_came_after_them() {
             frame: [[0.0, 1.0], [1.0, 0.0]],
             linear: [c, c_b],
             angular: [s, s_b],
+            is_turned: false,
         });
         contacts.push(PairContact::<2, 3> {
             bodies: [Some(i), below],

@@ -35,9 +35,6 @@ impl From<TogetherError> for BorderError {
                 field: Some("position".to_owned()),
                 value: Value::Number(depth),
             },
-            TogetherError::Unsupported { .. } => {
-                Kind::Option.error("rover", message, Value::Nothing)
-            }
             TogetherError::Friction(e) => grain_error(&e),
         }
     }

@@ -32,12 +32,13 @@ pub struct ContactSystem {
     spans: Vec<Range<usize>>,
     /// Velocities along the union of two paths, ascending, with Z.
     unions: Vec<(usize, Triple<f64>)>,
+    /// What W has on its diagonal beyond the squares of Z, 1/kg (n_c): for rows that are zero, and
+    /// what a contact yields.
+    beyond: Vec<Triple<f64>>,
     /// Directions in which closed loops let nothing move each contact; empty if there are none.
     held: Vec<[bool; 3]>,
-    /// Z over all velocities (n_c, nv), of a machine with loops, and entries of W's diagonal whose
-    /// rows are zero.
+    /// Z over all velocities (n_c, nv), of a machine with loops; empty of any other.
     spread: Vec<Triple<f64>>,
-    closings: Vec<(usize, f64)>,
     /// One entry a velocity (nv), while a union is assembled.
     full: Vec<Triple<f64>>,
 }
@@ -54,9 +55,9 @@ impl ContactSystem {
             bodies: Vec::with_capacity(n),
             spans: Vec::new(),
             unions: Vec::new(),
+            beyond: Vec::with_capacity(n),
             held: Vec::new(),
             spread: Vec::new(),
-            closings: Vec::new(),
             full: Vec::new(),
         }
     }
@@ -76,10 +77,16 @@ impl ContactSystem {
         contacts: &[Contact],
         v: &[f64],
     ) {
-        self.assemble_rows(model, kinematics, factor, contacts, v);
-        let size = 3 * contacts.len();
+        self.assemble_rows(model, factor, &[(kinematics, contacts)], v);
+        self.multiply(model);
+    }
+
+    /// W of the assembled rows.
+    pub(crate) fn multiply(&mut self, model: &Model) {
+        let n = self.n_contacts();
+        let size = 3 * n;
         self.W.resize(size * size, 0.0);
-        for (c, contact) in contacts.iter().enumerate() {
+        for c in 0..n {
             for d in 0..c {
                 let block = self.block(model, c, d);
                 for i in 0..3 {
@@ -91,13 +98,8 @@ impl ContactSystem {
                 }
             }
             let mut own = self.own_block(model, c);
-            match contact.part {
-                Part::Limit(..) => close_stop(&mut own),
-                Part::Friction(_) => joint_friction::close(&mut own),
-                Part::Wheel(_) if rollers::has_a_row_of_its_own(model, contact) => {
-                    rollers::close(&mut own);
-                }
-                Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) | Part::Collider(_) => {}
+            for k in 0..3 {
+                own[4 * k] += self.beyond[c][k];
             }
             for (i, row) in own.chunks_exact(3).enumerate() {
                 self.W[(3 * c + i) * size + 3 * c..][..3].copy_from_slice(row);
@@ -105,11 +107,10 @@ impl ContactSystem {
         }
     }
 
-    /// The entry of W on the diagonal of a contact's normal.
+    /// What W has on the diagonal of a contact beyond the squares of its rows, 1/kg.
     #[must_use]
-    pub fn normal_entry(&self, c: usize) -> f64 {
-        let size = 3 * self.n_contacts();
-        self.W[3 * c * (size + 1)]
+    pub(crate) fn beyond(&self, c: usize) -> Triple<f64> {
+        self.beyond[c]
     }
 
     /// Adds numbers along n, t, b of each contact (n_c), 1/kg, to W's diagonal.
@@ -117,10 +118,17 @@ impl ContactSystem {
         let size = 3 * self.n_contacts();
         for (c, terms) in diagonal.enumerate() {
             for (k, term) in terms.into_iter().enumerate() {
-                let own = &mut self.W[(3 * c + k) * (size + 1)];
                 // Of a row that is held only this is left.
-                let is_held = term > 0.0 && self.held.get(c).is_some_and(|held| held[k]);
-                *own = if is_held { term } else { *own + term };
+                if term > 0.0 && self.held.get(c).is_some_and(|held| held[k]) {
+                    self.beyond[c][k] = 0.0;
+                    if let Some(own) = self.W.get_mut((3 * c + k) * (size + 1)) {
+                        *own = 0.0;
+                    }
+                }
+                self.beyond[c][k] += term;
+                if let Some(own) = self.W.get_mut((3 * c + k) * (size + 1)) {
+                    *own += term;
+                }
             }
         }
     }
@@ -154,19 +162,8 @@ impl ContactSystem {
     /// squares without loops, 1/kg. On its diagonal W has the largest of these there, so that it is
     /// regular and the impulses are zero.
     pub(crate) fn hold(&mut self, model: &Model, c: usize, free: &Triple<f64>, held: [bool; 3]) {
-        let (nv, size) = (model.nv(), 3 * self.n_contacts());
+        let nv = model.nv();
         self.held.push(held);
-        for k in (0..3).filter(|k| held[*k] || free[*k] <= 0.0) {
-            let own = &mut self.W[(3 * c + k) * (size + 1)];
-            self.closings.push((
-                3 * c + k,
-                if held[k] {
-                    free[0].max(free[1]).max(free[2])
-                } else {
-                    *own
-                },
-            ));
-        }
         if !held.contains(&true) {
             return;
         }
@@ -183,27 +180,7 @@ impl ContactSystem {
         }
         for k in (0..3).filter(|k| held[*k]) {
             self.u[3 * c + k] = 0.0;
-        }
-    }
-
-    /// W of the spread rows, once all have been given to [`Self::hold`].
-    pub(crate) fn multiply_spread(&mut self, model: &Model) {
-        let (nv, n) = (model.nv(), self.n_contacts());
-        let rows = |c: usize| &self.spread[c * nv..][..nv];
-        for c in 0..n {
-            for d in 0..=c {
-                let block = product(0.0, rows(c), rows(d));
-                for (i, row) in block.chunks_exact(3).enumerate() {
-                    for (j, w) in row.iter().enumerate() {
-                        let (i, j) = (3 * c + i, 3 * d + j);
-                        self.W[i * 3 * n + j] = *w;
-                        self.W[j * 3 * n + i] = *w;
-                    }
-                }
-            }
-        }
-        for (i, own) in self.closings.drain(..) {
-            self.W[i * (3 * n + 1)] = own;
+            self.beyond[c][k] = free[0].max(free[1]).max(free[2]);
         }
     }
 
@@ -212,29 +189,35 @@ impl ContactSystem {
         self.held.get(c).is_some_and(|held| held[0])
     }
 
-    /// [`Self::assemble`] without W, which stays what it was.
-    pub fn assemble_rows(
+    /// [`Self::assemble`] without W, which is left empty, of contacts at several poses.
+    pub(crate) fn assemble_rows(
         &mut self,
         model: &Model,
-        kinematics: &Kinematics,
         factor: &Factor<f64>,
-        contacts: &[Contact],
+        placed: &[(&Kinematics, &[Contact])],
         v: &[f64],
     ) {
-        let n = contacts.len();
-        let motion = Still {
-            model,
-            kinematics,
-            v,
-        };
+        let all = placed
+            .iter()
+            .flat_map(|(at, own)| own.iter().map(move |c| (*at, c)));
+        let n = all.clone().count();
+        self.W.clear();
         self.held.clear();
+        self.spread.clear();
         self.bodies.clear();
-        self.bodies.extend(contacts.iter().map(|c| c.body));
+        self.bodies.extend(all.clone().map(|(_, c)| c.body));
         self.spans.clear();
         self.unions.clear();
         self.Z.resize(n * self.stride, [0.0; 3]);
         self.u.resize(3 * n, 0.0);
-        for (c, contact) in contacts.iter().enumerate() {
+        self.beyond.clear();
+        self.beyond.resize(n, [0.0; 3]);
+        for (c, (kinematics, contact)) in all.enumerate() {
+            let motion = Still {
+                model,
+                kinematics,
+                v,
+            };
             let u = if let Some(other) = contact.other {
                 let begin = self.unions.len();
                 let u = self.unite(&motion, factor, contact, other.body);
@@ -252,14 +235,31 @@ impl ContactSystem {
                 u
             };
             self.u[3 * c..][..3].copy_from_slice(&u);
+            self.close(model, c, contact);
         }
+    }
+
+    /// Notes what makes W regular where rows of a contact are zero.
+    fn close(&mut self, model: &Model, c: usize, contact: &Contact) {
+        let close: fn(&mut [f64; 9]) = match contact.part {
+            Part::Limit(..) => close_stop,
+            Part::Friction(_) => joint_friction::close,
+            Part::Wheel(_) if rollers::has_a_row_of_its_own(model, contact) => rollers::close,
+            Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) | Part::Collider(_) => return,
+        };
+        let own = self.own_block(model, c);
+        let mut closed = own;
+        close(&mut closed);
+        self.beyond[c] = [0, 4, 8].map(|k| closed[k] - own[k]);
     }
 
     /// Appends the three rows n, t, b of Zᵀ of a contact, with zeros off its path (3 nv).
     pub fn push_dense_rows(&self, model: &Model, c: usize, out: &mut Vec<f64>) {
         let (nv, begin) = (model.nv(), out.len());
         out.resize(begin + 3 * nv, 0.0);
-        for (k, z) in self.entries(model, c) {
+        let spread = self.spread.get(c * nv..(c + 1) * nv).unwrap_or(&[]);
+        let entries = (self.entries(model, c)).take_while(|_| spread.is_empty());
+        for (k, z) in entries.chain(spread.iter().enumerate()) {
             for (row, z) in z[..3].iter().enumerate() {
                 out[begin + row * nv + k] = *z;
             }
@@ -302,6 +302,10 @@ impl ContactSystem {
 
     /// The block of W for two contacts.
     fn block(&self, model: &Model, c: usize, d: usize) -> [f64; 9] {
+        if !self.spread.is_empty() {
+            let rows = |c: usize| &self.spread[c * model.nv()..][..model.nv()];
+            return product(0.0, rows(c), rows(d));
+        }
         if self.union(c).is_empty() && self.union(d).is_empty() {
             let shared = model.common_path(self.bodies[c], self.bodies[d]);
             let z = |c: usize| &self.Z[c * self.stride..][..shared];
@@ -320,6 +324,9 @@ impl ContactSystem {
 
     /// The block of W on the diagonal.
     fn own_block(&self, model: &Model, c: usize) -> [f64; 9] {
+        if !self.spread.is_empty() {
+            return self.block(model, c, c);
+        }
         let union = self.union(c);
         if union.is_empty() {
             let n = model.path(self.bodies[c]).len();
@@ -375,16 +382,17 @@ impl ContactSystem {
         }
     }
 
-    /// `out += Hᵀ v` for a velocity other than the one passed to [`Self::assemble`].
+    /// `out += Hᵀ v` for a velocity other than the one passed to [`Self::assemble`], of the
+    /// contacts from the given number on.
     pub fn add_local_of_velocity(
         &self,
         model: &Model,
         kinematics: &Kinematics,
-        contacts: &[Contact],
+        (first, contacts): (usize, &[Contact]),
         v: &[f64],
         out: &mut [f64],
     ) {
-        for (c, (contact, values)) in contacts.iter().zip(out.chunks_exact_mut(3)).enumerate() {
+        for (c, (contact, values)) in (first..).zip(contacts.iter().zip(out.chunks_exact_mut(3))) {
             let held = self.held.get(c).copied().unwrap_or_default();
             if let Some((k, sign, row)) = limit::joint_row(model, contact) {
                 values[row] += if held[row] { 0.0 } else { sign * v[k] };

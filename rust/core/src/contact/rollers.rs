@@ -22,7 +22,8 @@ use super::part::Part;
 use crate::multibody::Model;
 use crate::scalar::{Lane, Vec3};
 
-/// Turns the frame of a wheel's contact with the ground to the wheel's rollers, if it has any.
+/// Turns the frame of a wheel's contact with the ground or a grain to the wheel's rollers, if it
+/// has any.
 #[inline]
 pub(crate) fn turn_to_rollers(model: &Model, contact: &mut Contact) {
     if let Some([sine, cosine]) = rollers_of(model, contact) {
@@ -34,11 +35,11 @@ pub(crate) fn turn_to_rollers(model: &Model, contact: &mut Contact) {
     }
 }
 
-/// Friction across over that along of a wheel that stands on the ground, if they differ.
+/// Friction across over that along of a wheel that stands on the ground or a grain, if they differ.
 #[inline]
 pub(crate) fn across_of(model: &Model, contact: &Contact) -> Option<f64> {
     match (contact.part, contact.key.opposite) {
-        (Part::Wheel(i), Opposite::Ground(_)) => {
+        (Part::Wheel(i), Opposite::Ground(_) | Opposite::Grain(_)) => {
             let wheel = &model.wheels()[i];
             wheel.across.filter(|_| wheel.rollers.is_none())
         }
@@ -56,7 +57,7 @@ pub(crate) fn axis_of<T: Lane>(t: Vec3<T>, b: Vec3<T>, [sine, cosine]: [f64; 2])
 #[inline]
 pub(super) fn rollers_of(model: &Model, contact: &Contact) -> Option<[f64; 2]> {
     match (contact.part, contact.key.opposite) {
-        (Part::Wheel(i), Opposite::Ground(_)) => model.wheels()[i].rollers,
+        (Part::Wheel(i), Opposite::Ground(_) | Opposite::Grain(_)) => model.wheels()[i].rollers,
         _ => None,
     }
 }

@@ -179,7 +179,8 @@ fn yield_under_load<S: MechanicalSystem>(
         let mut before = [0.0; 3];
         before[..d].copy_from_slice(&ws.p[d * i..][..d]);
         let is_new = before[0] == 0.0;
-        let bounces = is_new && system.normal_shift(options, contact, 1.0) > 0.0;
+        let [away, at_rest] = [1.0, 0.0].map(|u| system.normal_shift(options, contact, u));
+        let bounces = is_new && away > at_rest;
         let compliance = system.compliance(contact, &ws.v);
         ws.bounces.push(bounces && compliance.is_some());
         let law = compliance.filter(|_| !bounces).map(|compliance| {

@@ -48,12 +48,6 @@ pub enum TogetherError {
         /// m.
         depth: f64,
     },
-    /// The rover has something that is not solved together with grains.
-    #[error("rover: its model has {what}, which is not simulated among grains")]
-    Unsupported {
-        /// In words.
-        what: &'static str,
-    },
     /// μ.
     #[error(transparent)]
     Friction(#[from] GrainError),
@@ -73,8 +67,7 @@ impl RoverInGrains {
     ///
     /// # Errors
     /// Another time step or gravity of the two, a part of the rover deeper in a grain than
-    /// [`OVERLAP`] of the smallest radius, a rover with closed loops, dry friction in joints or
-    /// wheels with rollers, a coefficient that is negative or not finite.
+    /// [`OVERLAP`] of the smallest radius, a coefficient that is negative or not finite.
     pub fn new(
         rover: &RoverSimulation,
         bed: &GrainSimulation<3>,
@@ -100,16 +93,6 @@ impl RoverInGrains {
                 });
             }
         }
-        let model = rover.model();
-        for (is_there, what) in [
-            (!model.loops().is_empty(), "a closed loop"),
-            (!model.rubbing_joints().is_empty(), "dry friction in joints"),
-            (model.has_rollers(), "wheels with rollers"),
-        ] {
-            if is_there {
-                return Err(TogetherError::Unsupported { what });
-            }
-        }
         check_apart(rover, bed)?;
         Ok(Self::with_friction(friction, rover, bed))
     }
@@ -122,7 +105,7 @@ impl RoverInGrains {
             friction,
             warm_start: WarmStart::with_capacity(room, 0),
             scratch: Scratch::new(&q, nv, room, 3),
-            parts: CompositeScratch::new(rover.model()),
+            parts: CompositeScratch::default(),
         }
     }
 

@@ -622,8 +622,8 @@ impl Loops<f64> {
         Self::new(Single::best(), model.mechanism(), model.loops(), 0)
     }
 
-    /// Computes B, and W from the projected rows; those of contacts that the loops hold are zero.
-    pub(super) fn project_operator(&mut self, model: &Model, system: &mut ContactSystem) {
+    /// Computes B, and projects the rows of contacts; those that the loops hold are then zero.
+    pub(super) fn project_contacts(&mut self, model: &Model, system: &mut ContactSystem) {
         let n = system.n_contacts();
         self.set_size(n);
         if n == 0 {
@@ -641,7 +641,6 @@ impl Loops<f64> {
             self.hold(c, held);
             system.hold(model, c, &free, held);
         }
-        system.multiply_spread(model);
     }
 
     /// Projects the configuration onto the loops and the velocity onto their rates, and keeps the

@@ -82,6 +82,21 @@ impl TreeSystem<'_> {
         (self.parts).sand(self.model, self.terrain.soft(), self.ruts)
     }
 
+    /// Rows of contacts at the end pose, and of touches at that of the middle, as
+    /// [`Contacting::assemble`] builds them. W is left empty.
+    pub(super) fn assemble_rows(&mut self, contacts: &[Contact], touches: &[Contact], v: &[f64]) {
+        let parts = &mut *self.parts;
+        let placed = [
+            (&parts.kinematics_end, contacts),
+            (&parts.kinematics, touches),
+        ];
+        (parts.system).assemble_rows(self.model, &parts.factor, &placed, v);
+        parts.note_friction(contacts);
+        if let Some(loops) = &mut parts.loops {
+            loops.project_contacts(self.model, &mut parts.system);
+        }
+    }
+
     /// Adds what is implicit to the mass matrix and factors it; whether it is positive.
     fn factor_implicit(&mut self, options: &StepOptions) -> bool {
         let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
@@ -620,19 +635,9 @@ impl Contacting for TreeSystem<'_> {
 
     #[inline]
     fn assemble(&mut self, contacts: &[Contact], v: &[f64], u: &mut [f64]) {
-        let parts = &mut *self.parts;
-        parts.system.assemble(
-            self.model,
-            &parts.kinematics_end,
-            &parts.factor,
-            contacts,
-            v,
-        );
-        parts.note_friction(contacts);
-        if let Some(loops) = &mut parts.loops {
-            loops.project_operator(self.model, &mut parts.system);
-        }
-        u.copy_from_slice(&parts.system.u);
+        self.assemble_rows(contacts, &[], v);
+        self.parts.system.multiply(self.model);
+        u.copy_from_slice(&self.parts.system.u);
     }
 
     #[inline]
@@ -650,7 +655,7 @@ impl Contacting for TreeSystem<'_> {
         self.parts.system.add_local_of_velocity(
             self.model,
             &self.parts.kinematics_end,
-            contacts,
+            (0, contacts),
             v,
             out,
         );

@@ -231,7 +231,7 @@ impl TreeScratch {
         self.friction.clear();
         for (c, contact) in contacts.iter().enumerate() {
             if let Some(joint) = joint_of(contact) {
-                self.friction.push((joint, self.system.normal_entry(c)));
+                self.friction.push((joint, self.system.beyond(c)[0]));
             }
         }
     }

@@ -33,6 +33,9 @@ pub struct RoundPair<const D: usize> {
     pub linear: [f64; 2],
     /// s: `r/√J` of each body, 0 for a fixed body.
     pub angular: [f64; 2],
+    /// Whether the tangents are no unit vectors at right angles, as those of wheels with rollers;
+    /// in space only.
+    pub is_turned: bool,
 }
 
 /// All contacts of a step: first those among round bodies, then those of
@@ -48,6 +51,9 @@ pub struct BodyPairs<const D: usize> {
     /// Rows n, t, (b) of Zᵀ of the machine's contacts in its own factor
     /// coordinates, contact by contact (D rows of `width`).
     pub rows: Vec<f64>,
+    /// What W has on the diagonal of each of the machine's contacts beyond the squares of its rows,
+    /// 1/kg: of rows that are zero, and of contacts that yield. Empty: nothing.
+    pub beyond: Vec<[f64; D]>,
     /// Number of the machine's coordinates.
     pub width: usize,
     /// Place of the machine's coordinates.
@@ -60,29 +66,52 @@ pub struct BodyPairs<const D: usize> {
     pub slabs: Vec<u32>,
 }
 
-/// Velocity along tangent k (from 1) of a rim that rotates with `rim` = r ω.
-#[inline]
-fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim: &[f64]) -> f64 {
-    if D == 2 {
-        return rim[0];
-    }
-    // The axis that moves the rim along one tangent is the other.
-    let axis = &frame[3 - k];
-    let along = axis[0] * rim[0] + axis[1] * rim[1] + axis[2] * rim[2];
-    if k == 1 { along } else { -along }
-}
-
-/// Component c of the moment of the tangential impulses, divided by r: the transpose of
-/// [`rim_velocity`].
-#[inline]
-fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
-    if D == 2 {
-        return p[1];
-    }
-    frame[2][c] * p[1] - frame[1][c] * p[2]
-}
-
 impl<const D: usize> RoundPair<D> {
+    /// Square of tangent k (from 1).
+    fn square(&self, k: usize) -> f64 {
+        if self.is_turned {
+            dot(&self.frame[k], &self.frame[k])
+        } else {
+            1.0
+        }
+    }
+
+    /// `t × n` of tangent k (from 1), in space: the axis that moves a rim along it.
+    #[inline]
+    fn axis(&self, k: usize) -> [f64; D] {
+        let (t, n) = (&self.frame[k], &self.frame[0]);
+        let mut axis = self.frame[3 - k];
+        if self.is_turned {
+            for c in 0..D {
+                let (e, f) = ((c + 1) % D, (c + 2) % D);
+                axis[c] = t[e] * n[f] - t[f] * n[e];
+            }
+        } else if k == 2 {
+            axis = axis.map(|x| -x);
+        }
+        axis
+    }
+
+    /// Velocity along tangent k (from 1) of a rim that rotates with `rim` = r ω.
+    #[inline]
+    fn rim_velocity(&self, k: usize, rim: &[f64]) -> f64 {
+        if D == 2 {
+            return rim[0];
+        }
+        let axis = self.axis(k);
+        axis[0] * rim[0] + axis[1] * rim[1] + axis[2] * rim[2]
+    }
+
+    /// Component c of the moment of the tangential impulses, divided by r: the transpose of
+    /// [`Self::rim_velocity`].
+    #[inline]
+    fn rim_impulse(&self, p: &[f64; D], c: usize) -> f64 {
+        if D == 2 {
+            return p[1];
+        }
+        self.axis(1)[c] * p[1] + self.axis(2)[c] * p[2]
+    }
+
     /// u without q.
     #[inline]
     #[must_use]
@@ -101,7 +130,7 @@ impl<const D: usize> RoundPair<D> {
         }
         for (y, s) in [ya, yb].into_iter().zip(self.angular) {
             for k in 1..D {
-                u[k] += s * rim_velocity(&self.frame, k, &y[D..]);
+                u[k] += s * self.rim_velocity(k, &y[D..]);
             }
         }
         u
@@ -120,7 +149,7 @@ impl<const D: usize> RoundPair<D> {
                 y[k] += c * force[k];
             }
             for k in D..V {
-                y[k] += s * rim_impulse(&self.frame, &p, k - D);
+                y[k] += s * self.rim_impulse(&p, k - D);
             }
         }
     }
@@ -138,7 +167,8 @@ impl<const D: usize> RoundPair<D> {
         force
     }
 
-    /// `W_NN` and `W_TT`, the same for each tangent, 1/kg; the rest of the block is 0.
+    /// `W_NN` and `W_TT`, the same for each tangent, 1/kg; the rest of the block is 0. Tangents are
+    /// unit vectors.
     #[inline]
     #[must_use]
     pub fn block(&self) -> [f64; 2] {
@@ -165,7 +195,7 @@ impl<const D: usize> RoundPair<D> {
                 let turned = if k == 0 {
                     0.0
                 } else {
-                    rim_velocity(&self.frame, k, &unit)
+                    self.rim_velocity(k, &unit)
                 };
                 out.push(s * turned);
             }
@@ -180,6 +210,7 @@ impl<const D: usize> BodyPairs<D> {
         self.round.clear();
         self.machine.clear();
         self.rows.clear();
+        self.beyond.clear();
         self.slabs.clear();
         (self.width, self.machine_at, self.n_coordinates) = (width, machine_at, n_coordinates);
     }
@@ -212,15 +243,20 @@ impl<const D: usize> BodyPairs<D> {
             for (x, column) in out.iter_mut().zip(self.rows_of(i)) {
                 *x = row.iter().zip(column).map(|(a, b)| a * b).sum();
             }
-            out[r] += if r == 0 { normal } else { tangential };
-        }
-        // A joint's stop has no tangent: any tangential mobility will do.
-        for k in 1..D {
-            if block[k][k] == 0.0 {
-                block[k][k] = block[0][0];
-            }
+            let of_ball = if r == 0 {
+                normal
+            } else {
+                tangential * self.machine[i].square(r)
+            };
+            out[r] += of_ball + self.beyond_of(i)[r];
         }
         block
+    }
+
+    /// See [`Self::beyond`].
+    #[inline]
+    pub(crate) fn beyond_of(&self, i: usize) -> [f64; D] {
+        self.beyond.get(i).copied().unwrap_or([0.0; D])
     }
 
     /// `y += Z p`.
@@ -323,6 +359,11 @@ impl<const D: usize> BodyPairs<D> {
                 for (out, row) in block.iter_mut().zip(of(i, side)) {
                     for (x, column) in out.iter_mut().zip(of(j, at)) {
                         *x += row.iter().zip(column).map(|(a, b)| a * b).sum::<f64>();
+                    }
+                }
+                if let Some(own) = i.checked_sub(n_round).filter(|_| i == j && side + at == 0) {
+                    for (k, beyond) in self.beyond_of(own).into_iter().enumerate() {
+                        block[k][k] += beyond;
                     }
                 }
             },

@@ -242,12 +242,17 @@ impl Anchor {
         };
         for &(_, k) in cluster {
             let k = k as usize;
-            let q = if k < round {
-                &at.rows[k].q
+            let d = &self.drifts[k];
+            if k < round {
+                slope += dot(&at.rows[k].q, d);
             } else {
-                &at.machine[k - round].q
-            };
-            slope += dot(q, &self.drifts[k]);
+                let row = &at.machine[k - round];
+                slope += dot(&row.q, d);
+                for (w, (p, d)) in row.beyond.iter().zip(row.p.iter().zip(d)) {
+                    slope += w * p * d;
+                    curvature += w * d * d;
+                }
+            }
             largest = largest.max(-normal(k).1);
         }
         let wanted = -slope / curvature;

@@ -303,6 +303,8 @@ pub(super) struct MachineRow {
     pub ball: u32,
     frame: [[f64; 3]; 3],
     block: [[f64; 3]; 3],
+    /// See [`BodyPairs::beyond`].
+    pub beyond: [f64; 3],
     pub q: [f64; 3],
     pub mu: f64,
     pub p: [f64; 3],
@@ -324,6 +326,7 @@ impl MachineRow {
             ball,
             frame: pairs.machine[i].frame,
             block: pairs.machine_block(i),
+            beyond: pairs.beyond_of(i),
             q: *q,
             mu,
             p: *p,
@@ -337,11 +340,11 @@ impl MachineRow {
         [w_n, 0.5 * (w_t + w_b)].map(invert)
     }
 
-    /// u of the machine's contact i.
+    /// u of the machine's contact i under the impulse `p`.
     pub(super) fn velocity(
         &self,
         pairs: &BodyPairs<3>,
-        i: usize,
+        (i, p): (usize, &[f64; 3]),
         balls: &[Ball],
         own: &[f64],
     ) -> [f64; 3] {
@@ -353,7 +356,7 @@ impl MachineRow {
         }
         let mut u = to_frame(&self.frame, &world);
         for k in 0..3 {
-            u[k] += self.q[k];
+            u[k] += self.q[k] + self.beyond[k] * p[k];
         }
         pairs.add_local_of_machine(i, own, &mut u);
         u
@@ -391,7 +394,7 @@ impl MachineRow {
             start[k] += share * (self.p[k] - self.before[k]);
         }
         self.before = self.p;
-        let mut free = self.velocity(pairs, i, balls, own);
+        let mut free = self.velocity(pairs, (i, &start), balls, own);
         for (free, row) in free.iter_mut().zip(&self.block) {
             *free -= dot(row, &start);
         }

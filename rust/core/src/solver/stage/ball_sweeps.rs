@@ -494,7 +494,7 @@ impl BallSweeps {
         for (k, row) in self.machine.iter().enumerate() {
             let i = pairs.round.len() + k;
             p[i] = row.p;
-            u[i] = row.velocity(pairs, k, &self.balls, &self.own);
+            u[i] = row.velocity(pairs, (k, &row.p), &self.balls, &self.own);
         }
     }
 }
@@ -584,7 +584,8 @@ impl Relaxation for BallSolve<'_> {
         };
         let mut sums = self.sweeps.each(judge, Sums::plus);
         for (i, row) in self.sweeps.machine.iter().enumerate() {
-            let u = row.velocity(self.pairs, i, &self.sweeps.balls, &self.sweeps.own);
+            let (balls, own) = (&self.sweeps.balls, &self.sweeps.own);
+            let u = row.velocity(self.pairs, (i, &row.p), balls, own);
             let inverse = row.inverse();
             let mass = mass_of(inverse);
             let scales = inverse.map(|i| if i > 0.0 { i } else { mass });

@@ -214,6 +214,7 @@ impl MachineRow {
         own: &[f64],
     ) -> [f64; 2] {
         let mut u = self.round.local(velocity);
+        debug_assert!(pairs.beyond.is_empty(), "planar contacts do not yield");
         pairs.add_local_of_machine(i, own, &mut u);
         u
     }

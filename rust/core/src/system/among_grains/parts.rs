@@ -4,21 +4,19 @@ use std::sync::OnceLock;
 
 use super::contact::{CompositeContact, GrainTouch};
 use super::touches::NearGrain;
-use crate::contact::{Contact, ContactSystem};
-use crate::multibody::Model;
+use crate::contact::Contact;
 use crate::problem::BlockSparseDelassus;
 use crate::system::grains::GrainContact;
 
 /// Scratch of the two together.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct CompositeScratch {
     /// The contacts of a step, sorted by kind.
     pub(super) of_grains: Vec<GrainContact<3>>,
     pub(super) of_tree: Vec<Contact>,
     pub(super) touches: Vec<GrainTouch>,
-    /// The touches as contacts of the tree, and their rows.
+    /// The touches as contacts of the tree.
     pub(super) contacts: Vec<Contact>,
-    pub(super) rows: ContactSystem,
     /// Grains near a part.
     pub(super) near: Vec<NearGrain>,
     /// W of a step without touches, assembled on request.
@@ -26,20 +24,6 @@ pub struct CompositeScratch {
 }
 
 impl CompositeScratch {
-    /// Scratch for a model.
-    #[must_use]
-    pub fn new(model: &Model) -> Self {
-        Self {
-            of_grains: Vec::new(),
-            of_tree: Vec::new(),
-            touches: Vec::new(),
-            contacts: Vec::new(),
-            rows: ContactSystem::with_capacity(model, 0),
-            near: Vec::new(),
-            operator: OnceLock::new(),
-        }
-    }
-
     pub(super) fn sort(&mut self, contacts: &[CompositeContact]) {
         self.of_grains.clear();
         self.of_tree.clear();
@@ -51,6 +35,8 @@ impl CompositeScratch {
                 CompositeContact::Touch(touch) => self.touches.push(touch),
             }
         }
+        self.contacts.clear();
+        (self.contacts).extend(self.touches.iter().map(|touch| touch.contact));
     }
 
     pub(super) fn listed(&self) -> impl Iterator<Item = CompositeContact> + '_ {
@@ -60,22 +46,24 @@ impl CompositeScratch {
         of_grains.chain(of_tree).chain(touches)
     }
 
-    /// Where the local components of each kind end and the next begin.
-    fn ends(&self) -> [usize; 2] {
-        let n = 3 * self.of_grains.len();
-        [n, n + 3 * self.of_tree.len()]
+    /// The local components of the grains' contacts, and those of the tree with the touches.
+    pub(super) fn split<'v>(&self, local: &'v [f64]) -> [&'v [f64]; 2] {
+        local.split_at(3 * self.of_grains.len()).into()
     }
 
-    /// The local components of each kind.
-    pub(super) fn split<'v>(&self, local: &'v [f64]) -> [&'v [f64]; 3] {
-        let [a, b] = self.ends();
-        [&local[..a], &local[a..b], &local[b..]]
+    pub(super) fn split_mut<'v>(&self, local: &'v mut [f64]) -> [&'v mut [f64]; 2] {
+        local.split_at_mut(3 * self.of_grains.len()).into()
     }
 
-    pub(super) fn split_mut<'v>(&self, local: &'v mut [f64]) -> [&'v mut [f64]; 3] {
-        let [a, b] = self.ends();
-        let (local, touches) = local.split_at_mut(b);
-        let (of_grains, of_tree) = local.split_at_mut(a);
-        [of_grains, of_tree, touches]
+    /// Of the tree's local components those of the touches.
+    pub(super) fn touched<'v>(&self, of_tree: &'v [f64]) -> impl Iterator<Item = &'v [f64; 3]> {
+        of_tree.as_chunks().0.iter().skip(self.of_tree.len())
+    }
+
+    pub(super) fn touched_mut<'v>(
+        &self,
+        of_tree: &'v mut [f64],
+    ) -> impl Iterator<Item = &'v mut [f64; 3]> {
+        (of_tree.as_chunks_mut().0.iter_mut()).skip(self.of_tree.len())
     }
 }

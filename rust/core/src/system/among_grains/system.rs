@@ -7,13 +7,15 @@ use crate::contact::{Activation, Contact, generalized_impulse};
 use crate::integrator::{
     Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
 };
+use crate::law::compliance::Compliance;
 use crate::multibody::Configuration;
-use crate::problem::{BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem};
+use crate::problem::{
+    BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
+};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
 use crate::system::grains::GrainSystem;
 use crate::system::grains::system::gap_law;
 use crate::system::tree::TreeSystem;
-use crate::system::tree_scratch::TreeScratch;
 
 /// A tree among balls in a step.
 pub struct TreeAmongGrains<'a> {
@@ -72,35 +74,17 @@ impl TreeAmongGrains<'_> {
         (of_grains, of_tree)
     }
 
+    /// The pairs of the touches, of the side of the grains.
+    fn touching(&self) -> impl Iterator<Item = &RoundPair<3>> {
+        let pairs = self.bed.parts.pairs.machine.iter();
+        pairs.skip(self.parts.of_tree.len())
+    }
+
     /// Subtracts the grains' velocities from those of the touches.
     fn subtract_rims(&self, touches: &[GrainTouch], v: &[f64], u: &mut [f64]) {
         for (touch, u) in touches.iter().zip(u.as_chunks_mut::<3>().0) {
             (self.bed).subtract_rim(touch.grain(), v, &touch.contact.frame.rows(), u);
         }
-    }
-
-    /// Rows of the touches, and all contacts of the tree among the grains' pairs of bodies.
-    fn assemble_touches(&mut self, v: (&[f64], &[f64]), u: &mut [f64]) {
-        let CompositeScratch {
-            touches,
-            contacts,
-            rows,
-            ..
-        } = &mut *self.parts;
-        contacts.clear();
-        contacts.extend(touches.iter().map(|touch| touch.contact));
-        if touches.is_empty() {
-            return;
-        }
-        let TreeScratch {
-            kinematics, factor, ..
-        } = &*self.tree.parts;
-        rows.assemble_rows(self.tree.model, kinematics, factor, contacts, v.1);
-        u.copy_from_slice(&rows.u);
-        self.subtract_rims(&self.parts.touches, v.0, u);
-        let mut pairs = std::mem::take(&mut self.bed.parts.pairs);
-        self.push_tree(&mut pairs);
-        self.bed.parts.pairs = pairs;
     }
 
     /// Adds the tree as the machine of the grains' pairs, with its own contacts and the touches.
@@ -115,12 +99,16 @@ impl TreeAmongGrains<'_> {
         pairs.rows.clear();
         pairs.width = model.nv();
         pairs.n_coordinates = pairs.machine_at + pairs.width;
-        for c in 0..parts.of_tree.len() {
+        for c in 0..pairs.machine.len() {
             (self.tree.parts.system).push_dense_rows(model, c, &mut pairs.rows);
         }
-        for c in 0..parts.touches.len() {
-            parts.rows.push_dense_rows(model, c, &mut pairs.rows);
-        }
+        self.push_diagonal(pairs);
+    }
+
+    fn push_diagonal(&self, pairs: &mut BodyPairs<3>) {
+        let system = &self.tree.parts.system;
+        pairs.beyond.clear();
+        (pairs.beyond).extend((0..system.n_contacts()).map(|c| system.beyond(c)));
     }
 
     fn operator(&self) -> &BlockSparseDelassus {
@@ -209,6 +197,21 @@ impl Dynamics for TreeAmongGrains<'_> {
         let (y_a, y_b) = self.halves_mut(y);
         self.bed.half_solve_back(y_a);
         self.tree.half_solve_back(y_b);
+    }
+
+    fn close_velocity(&mut self, options: &StepOptions, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
+        let n = self.bed.nv();
+        (self.tree).close_velocity(options, &v_begin[n..], &v[n..], &mut y[n..]);
+    }
+
+    fn add_loop_impulse(&mut self, p: &[f64], out: &mut [f64]) {
+        let [_, p] = self.parts.split(p);
+        (self.tree).add_loop_impulse(p, &mut out[self.bed.nv()..]);
+    }
+
+    fn close_end(&mut self, p: &[f64], q: &mut Both, v: &mut [f64]) -> f64 {
+        let [_, p] = self.parts.split(p);
+        (self.tree).close_end(p, &mut q.1, &mut v[self.bed.nv()..])
     }
 
     fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
@@ -359,21 +362,57 @@ impl Contacting for TreeAmongGrains<'_> {
         let parts = &mut *self.parts;
         parts.sort(contacts);
         parts.operator.take();
-        let [u_a, u_b, u] = parts.split_mut(u);
+        let [u_a, u_b] = parts.split_mut(u);
         self.bed.assemble(&parts.of_grains, v.0, u_a);
-        self.tree.assemble(&parts.of_tree, v.1, u_b);
-        self.assemble_touches(v, u);
+        if parts.touches.is_empty() {
+            self.tree.assemble(&parts.of_tree, v.1, u_b);
+            return;
+        }
+        (self.tree).assemble_rows(&parts.of_tree, &parts.contacts, v.1);
+        u_b.copy_from_slice(&self.tree.parts.system.u);
+        let touched = &mut u_b[3 * parts.of_tree.len()..];
+        self.subtract_rims(&self.parts.touches, v.0, touched);
+        let mut pairs = std::mem::take(&mut self.bed.parts.pairs);
+        self.push_tree(&mut pairs);
+        self.bed.parts.pairs = pairs;
+    }
+
+    fn is_immovable(&self, contact: usize) -> bool {
+        let own = contact.checked_sub(self.parts.of_grains.len());
+        own.is_some_and(|own| self.tree.is_immovable(own))
+    }
+
+    fn compliant_mass(&self, _cluster: usize) -> Option<f64> {
+        let clusters = 0..self.tree.n_clusters();
+        clusters.map(|own| self.tree.compliant_mass(own)).sum()
+    }
+
+    fn compliance(&self, contact: &CompositeContact, v: &[f64]) -> Option<Compliance> {
+        match contact {
+            CompositeContact::Grains(_) => None,
+            CompositeContact::Tree(contact)
+            | CompositeContact::Touch(GrainTouch { contact, .. }) => {
+                self.tree.compliance(contact, self.halves(v).1)
+            }
+        }
+    }
+
+    fn soften(&mut self, diagonal: impl Iterator<Item = [f64; 3]>) {
+        self.tree.soften(diagonal.skip(self.parts.of_grains.len()));
+        if !self.parts.touches.is_empty() {
+            let mut pairs = std::mem::take(&mut self.bed.parts.pairs);
+            self.push_diagonal(&mut pairs);
+            self.bed.parts.pairs = pairs;
+        }
     }
 
     fn local(&self, y: &[f64], out: &mut [f64]) {
         let (y_a, y_b) = self.halves(y);
         let parts = &*self.parts;
-        let [out_a, out_b, touches] = parts.split_mut(out);
+        let [out_a, out_b] = parts.split_mut(out);
         self.bed.local(y_a, out_a);
         self.tree.local(y_b, out_b);
-        parts.rows.local(self.tree.model, y_b, touches);
-        let pairs = (self.bed.parts.pairs.machine.iter()).skip(parts.of_tree.len());
-        for (out, pair) in touches.as_chunks_mut::<3>().0.iter_mut().zip(pairs) {
+        for (out, pair) in parts.touched_mut(out_b).zip(self.touching()) {
             for (out, u) in out.iter_mut().zip(pair.local(y_a)) {
                 *out += u;
             }
@@ -383,23 +422,23 @@ impl Contacting for TreeAmongGrains<'_> {
     fn add_local_of_velocity(&self, _contacts: &[CompositeContact], v: &[f64], out: &mut [f64]) {
         let (v_a, v_b) = self.halves(v);
         let (tree, parts) = (&self.tree, &*self.parts);
-        let [out_a, out_b, touches] = parts.split_mut(out);
+        let [out_a, out_b] = parts.split_mut(out);
         self.bed.add_local_of_velocity(&parts.of_grains, v_a, out_a);
         tree.add_local_of_velocity(&parts.of_tree, v_b, out_b);
-        let (rows, kinematics) = (&parts.rows, &tree.parts.kinematics);
-        rows.add_local_of_velocity(tree.model, kinematics, &parts.contacts, v_b, touches);
-        self.subtract_rims(&parts.touches, v_a, touches);
+        let first = parts.of_tree.len();
+        let (system, kinematics) = (&tree.parts.system, &tree.parts.kinematics);
+        let (touches, touched) = ((first, &parts.contacts[..]), &mut out_b[3 * first..]);
+        system.add_local_of_velocity(tree.model, kinematics, touches, v_b, touched);
+        self.subtract_rims(&parts.touches, v_a, touched);
     }
 
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
         let (y_a, y_b) = self.halves_mut(y);
         let parts = &*self.parts;
-        let [p_a, p_b, touches] = parts.split(p);
+        let [p_a, p_b] = parts.split(p);
         self.bed.add_impulses(p_a, y_a);
         self.tree.add_impulses(p_b, y_b);
-        parts.rows.add_impulses(self.tree.model, touches, y_b);
-        let pairs = (self.bed.parts.pairs.machine.iter()).skip(parts.of_tree.len());
-        for (p, pair) in touches.as_chunks::<3>().0.iter().zip(pairs) {
+        for (p, pair) in parts.touched(p_b).zip(self.touching()) {
             pair.add(*p, y_a);
         }
     }
@@ -407,7 +446,8 @@ impl Contacting for TreeAmongGrains<'_> {
     fn generalized_impulse(&self, _contacts: &[CompositeContact], p: &[f64], out: &mut [f64]) {
         let (out_a, out_b) = self.halves_mut(out);
         let (tree, parts) = (&self.tree, &*self.parts);
-        let [p_a, p_b, touches] = parts.split(p);
+        let [p_a, p_b] = parts.split(p);
+        let touches = &p_b[3 * parts.of_tree.len()..];
         (self.bed).generalized_impulse(&parts.of_grains, p_a, out_a);
         tree.generalized_impulse(&parts.of_tree, p_b, out_b);
         let mut own = vec![0.0; out_b.len()];
@@ -416,7 +456,7 @@ impl Contacting for TreeAmongGrains<'_> {
         for (out, own) in out_b.iter_mut().zip(own) {
             *out += own;
         }
-        for (touch, p) in parts.touches.iter().zip(touches.as_chunks::<3>().0) {
+        for (touch, p) in parts.touches.iter().zip(parts.touched(p_b)) {
             (self.bed).push_grain(touch.grain(), &touch.contact.frame.rows(), p, out_a);
         }
     }
@@ -444,6 +484,13 @@ impl Contacting for TreeAmongGrains<'_> {
         self.bed.solves_to_the_end()
     }
 
+    fn lever(&self, contact: &CompositeContact) -> f64 {
+        match contact {
+            CompositeContact::Tree(contact) => self.tree.lever(contact),
+            CompositeContact::Grains(_) | CompositeContact::Touch(_) => 1.0,
+        }
+    }
+
     fn solve(
         &self,
         q: &[f64],
@@ -458,8 +505,8 @@ impl Contacting for TreeAmongGrains<'_> {
             return self.bed.solve(q, mu, options, p, u, workspace);
         }
         let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
-        let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
-        let [u_a, u_b, _] = parts.split_mut(u);
+        let ([q_a, q_b], [p_a, p_b]) = (parts.split(q), parts.split_mut(p));
+        let [u_a, u_b] = parts.split_mut(u);
         harder(
             &self.bed.solve(q_a, mu_a, options, p_a, u_a, workspace),
             &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
@@ -481,8 +528,8 @@ impl Contacting for TreeAmongGrains<'_> {
             return (self.bed).solve_step(free, (q, mu), options, p, u, workspace);
         }
         let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
-        let ([q_a, q_b, _], [p_a, p_b, _]) = (parts.split(q), parts.split_mut(p));
-        let [u_a, u_b, _] = parts.split_mut(u);
+        let ([q_a, q_b], [p_a, p_b]) = (parts.split(q), parts.split_mut(p));
+        let [u_a, u_b] = parts.split_mut(u);
         harder(
             &(self.bed).solve_step(free, (q_a, mu_a), options, p_a, u_a, workspace),
             &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),

@@ -4,6 +4,7 @@
 use nalgebra::Vector3;
 
 use super::contact::GrainTouch;
+use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{Activation, Contact, ContactFrame, ContactKey, Part};
 use crate::geometry::query::{dispatch, pairs};
 use crate::geometry::{PlacedShape, Sphere, SupportMap};
@@ -47,7 +48,7 @@ pub(super) fn find(
         for grain in &*near {
             let ball = ball(grain.centre - origin, grain.radius);
             pairs::visit_pair(&ball, &shape, search.reach, |point| {
-                let touch = GrainTouch {
+                let mut touch = GrainTouch {
                     key: GrainKey {
                         a: n + u32::from(part.code()),
                         b: grain.index,
@@ -58,12 +59,13 @@ pub(super) fn find(
                         body: part.body(model),
                         other: None,
                         point: point.on_first(),
-                        frame: ContactFrame::of_normal(&point.n),
+                        frame: ContactFrame::of_pair(&shape, point),
                         gap: point.gap,
                         excess: 0.0,
                     },
                     gap_start: point.gap,
                 };
+                turn_to_rollers(model, &mut touch.contact);
                 if search.admits(point.gap, approach_of(bed, tree, &touch, v)) {
                     touches.push(touch);
                 }

@@ -30,6 +30,9 @@ use crate::system::planar_matrices::PlanarMatrices;
 /// The place of fixed bodies, with c = s = 0.
 const NOWHERE: u32 = 0;
 
+/// How much the square of a unit tangent may differ from 1.
+const TURNED: f64 = 1e-9;
+
 /// The motion of a surface at a contact with it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Driven<const D: usize> {
@@ -168,6 +171,7 @@ impl<const D: usize> GrainSystem<'_, D> {
             frame: frame.map(Into::into),
             linear: [0.0, c],
             angular: [0.0, s],
+            is_turned: D == 3 && (frame[2].norm_squared() - 1.0).abs() > TURNED,
         }
     }
 
@@ -505,6 +509,7 @@ where
                 frame: frame.map(Into::into),
                 linear: [c_a, c_b],
                 angular: [s_a, s_b],
+                is_turned: false,
             };
             if (a as usize) < n {
                 pairs.round.push(pair);

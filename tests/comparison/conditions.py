@@ -1,0 +1,123 @@
+"""What a step costs under restitution, wrenches and fast turns: `python -m comparison.conditions`.
+
+Microseconds of processor time of a step of 5 ms of the built-in rover, of 64 in a batch and of one alone, on one
+thread, with torques and set-points that are drawn anew every ten steps. Each row is measured beside the first in every
+round; its figures are medians, and what counts is their ratio to the first row's. The table is that of
+`docs/decisions/0020-lanes.md`.
+"""
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from comparison.scene import Array
+from rover_gym import Plane, RoverModel, Simulation
+from rover_gym.mechanics import SimulationBatch
+
+TIME_STEP = 0.005  # s
+TOGETHER, ALONE, STEPS_A_COMMAND, COMMANDS, ROUNDS = 64, 4, 10, 8, 7
+TORQUE, STEERING, FASTEST = 8.0, 0.3, 25.0  # N m, rad, rad/s
+
+
+def driving(**options: Any) -> Simulation:
+    """The rover at rest on the plane."""
+    simulation = Simulation(RoverModel(), Plane(), time_step=TIME_STEP, **options)
+    simulation.set_state(simulation.model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    return simulation
+
+
+def pushed() -> Simulation:
+    """With a force and a moment on its trunk."""
+    simulation = driving()
+    simulation.apply_wrench("trunk", force=[20.0, 0.0, 10.0], moment=[0.0, 2.0, 0.0])
+    return simulation
+
+
+def bouncing_by_materials() -> Simulation:
+    """Its wheels bounce on the ground, and nothing else."""
+    return driving(materials={("wheel", "ground"): (0.7, 0.4)})
+
+
+def on_a_slide() -> Simulation:
+    """Its trunk slides along a vertical axis of the world."""
+    own = driving()
+    machine = own.model.to_dict()
+    place = {"joint": "prismatic", "axis": [0.0, 1.0, 0.0], "position": [0.0, float(own.q[1]), 0.0]}
+    machine["solids"][0] |= place
+    return Simulation(RoverModel.from_dict(machine), Plane(), time_step=TIME_STEP)
+
+
+def flying(speed: float = 0.0) -> Simulation:
+    """High above the ground, turning at up to a speed about each axis, rad/s."""
+    simulation = driving()
+    q, v = simulation.q.copy(), simulation.v.copy()
+    q[1] += 500.0
+    v[3:6] = speed * np.array([0.9, -0.7, 0.8])
+    simulation.set_state(q, v)
+    return simulation
+
+
+ROWS: dict[str, Callable[[], Simulation]] = {
+    "driving on the plane": driving,
+    "pushed by a wrench": pushed,
+    "without warm start": lambda: driving(warm_start=False),
+    "restitution 0.4": lambda: driving(restitution=0.4),
+    "restitution 0.4 between wheels and ground alone": bouncing_by_materials,
+    "on a vertical slide": on_a_slide,
+    "in free flight": flying,
+    f"in free flight, turning at up to {FASTEST:.0f} rad/s about each axis": lambda: flying(FASTEST),
+}
+
+
+def drive_together(simulations: list[Simulation], commands: Array) -> None:
+    """Plays commands (n_commands, n, 2 n_wheels) in a batch."""
+    batch, n = SimulationBatch(simulations, threads=1), commands.shape[2] // 2
+    for command in commands:
+        batch.step(command[:, :n], command[:, n:], STEPS_A_COMMAND)
+
+
+def drive_alone(simulations: list[Simulation], commands: Array) -> None:
+    """Plays the same commands rover by rover."""
+    n = commands.shape[2] // 2
+    for i, simulation in enumerate(simulations):
+        for command in commands[:, i]:
+            simulation.set_commands(command[:n], command[n:])
+            simulation.step(STEPS_A_COMMAND)
+
+
+def microseconds(make: Callable[[], Simulation], n: int, play: Callable[..., None], seed: int) -> float:
+    """Processor time of a step of one of n rovers, µs."""
+    rng = np.random.default_rng(seed)
+    first = make()
+    wheels = len(first.model.to_dict()["wheels"])
+    simulations = [first, *(make() for _ in range(n - 1))]
+    commands = rng.uniform(-1.0, 1.0, (COMMANDS, n, 2 * wheels))
+    commands *= np.repeat([TORQUE, STEERING], wheels)
+    play(simulations, commands[:1])  # warms up
+    begin = time.process_time()
+    play(simulations, commands)
+    return 1e6 * (time.process_time() - begin) / (n * COMMANDS * STEPS_A_COMMAND)
+
+
+def main() -> None:
+    """Prints the table."""
+    ways = ((TOGETHER, drive_together), (ALONE, drive_alone))
+    console = Console(width=120, highlight=False)
+    console.print("| | in a batch | over the first | alone | over the first |\n|---|---|---|---|---|")
+    for name, make in ROWS.items():
+        cells = []
+        for n, play in ways:
+            pairs = [
+                (microseconds(make, n, play, seed), microseconds(driving, n, play, seed)) for seed in range(ROUNDS)
+            ]
+            cells.append(f"{statistics.median(own for own, _ in pairs):.1f}")
+            cells.append(f"{statistics.median(own / first for own, first in pairs):.2f}")
+        console.print(f"| {name} | {' | '.join(cells)} |")
+
+
+if __name__ == "__main__":
+    main()
