@@ -360,7 +360,7 @@ def test_a_rover_on_a_bed_stands_with_its_weight_on_its_wheels(tmp_path: Path) -
     assert {wheel["width"] for wheel in model.to_dict()["wheels"]} == {0.12}
     scene_bed = settled_balls(250, 1.5, 0.9, radius_min=0.045, radius_max=0.055, sleep=True)
     sim = rover_on_bed(scene_bed, model, 0.0, sleep=True)
-    record_run(sim, 0.6, tmp_path / "run.h5")
+    record_run(sim, 1.0, tmp_path / "run.h5")
     run = open_run(tmp_path / "run.h5")
     loads = run.wheel_forces[-6:, :, 1].sum(axis=1).mean()
     assert loads == pytest.approx(model.mass * 9.81, rel=0.05)

@@ -236,6 +236,7 @@ def describe_disc(
                 "radius": radius,
                 "width": thickness,
                 "rounding": ROUNDING * thickness,
+                "stiffness": 0.0,
                 "torque_limit": 1.0,
                 "drive_sign": 1,
             }

@@ -187,6 +187,7 @@ def describe_wheel(radius: float, width: float, slip_angle: float, mass: float, 
                 "radius": radius,
                 "width": width,
                 "rounding": ROUNDING * width,
+                "stiffness": 0.0,
                 "torque_limit": 1.0,
                 "drive_sign": -1,
             }

@@ -55,7 +55,7 @@ impl CompositeScratch {
         local.split_at_mut(3 * self.of_grains.len()).into()
     }
 
-    /// Of the tree's local components those of the touches.
+    /// The local components of the touches, at the end of the tree's.
     pub(super) fn touched<'v>(&self, of_tree: &'v [f64]) -> impl Iterator<Item = &'v [f64; 3]> {
         of_tree.as_chunks().0.iter().skip(self.of_tree.len())
     }
