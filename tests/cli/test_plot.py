@@ -276,7 +276,10 @@ def test_the_computed_slip_is_near_the_recorded_one(recordings: dict[str, Path])
     assert run.trajectory["slip_ratio"].max() > 0.1
 
 
-@pytest.mark.parametrize("alike", [2, 5])
+ALL_ALIKE = pytest.mark.nightly("tests/cli/test_plot.py::test_a_run_with_equal_times_is_plotted")
+
+
+@pytest.mark.parametrize("alike", [2, pytest.param(5, marks=ALL_ALIKE)])
 def test_a_run_with_equal_times_is_plotted(alike: int, tmp_path: Path) -> None:
     """Where most rows had one time, a division by zero ended the command."""
     sim = Simulation(RoverModel())

@@ -25,6 +25,12 @@ FEW_GRAINS = {
 }
 
 
+#: Torques, arcs and balls: what is driven or drawn in another way.
+FEW = ("Rover-v0", "RoverArcs-v0", "RoverGrains-v0")
+OTHER = pytest.mark.nightly("tests/envs/test_play.py::test_play_drives_by_keys")
+EACH = [name if name in FEW else pytest.param(name, marks=OTHER) for name in ENVIRONMENTS]
+
+
 @pytest.fixture
 def screenless(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
@@ -40,7 +46,7 @@ def made(name: str, **arguments: Any) -> gym.Env[Any, Any]:
 
 
 @pytest.mark.usefixtures("screenless")
-@pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.parametrize("name", EACH)
 def test_play_drives_by_keys(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of Gymnasium, about matplotlib's windows
@@ -71,7 +77,7 @@ def test_play_drives_by_keys(name: str) -> None:
 
 @pytest.mark.filterwarnings("ignore:.*doesn't natively support it")  # Gymnasium's wrapper makes the window
 @pytest.mark.usefixtures("screenless")
-@pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.parametrize("name", EACH)
 def test_the_window_shows_the_rover(name: str) -> None:
     env = made(name, render_mode="human")
     env.reset(seed=6)

@@ -99,6 +99,7 @@ def test_wrong_arguments_are_named(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.nightly("tests/cli/test_drive.py::test_episodes_are_filmed")
 def test_an_episode_is_filmed_to_its_end(tmp_path: Path) -> None:
     pytest.importorskip("vtkmodules", reason="the extra render is not installed")
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra render is not installed")
