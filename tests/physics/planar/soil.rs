@@ -107,7 +107,7 @@ fn energy_never_grows_without_restitution() {
         let mut energy = soil.energy().total();
         let scale = energy;
         let mut converged = 0;
-        for step in 0..300 {
+        for step in 0..200 {
             converged += usize::from(soil.step(1).expect("finite").is_converged());
             let now = soil.energy().total();
             assert!(
@@ -119,7 +119,7 @@ fn energy_never_grows_without_restitution() {
         }
         assert!(energy < 0.95 * scale);
         // Solved well, some steps want more sweeps than are allowed; cut short, most do.
-        let expected = [295..=300, 0..=250, 200..=300, 295..=300][case].clone();
+        let expected = [195..=200, 0..=170, 130..=200, 195..=200][case].clone();
         assert!(expected.contains(&converged), "{converged} in case {case}");
     }
 }
