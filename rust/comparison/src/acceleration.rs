@@ -35,7 +35,6 @@ pub(crate) fn find<S: MechanicalSystem>(
         lead: 0.0,
         hover: reach,
         slow,
-        margin: 0.0,
     };
     system.detect(v, activation, out);
     system.relocate(out);

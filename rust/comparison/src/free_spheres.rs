@@ -383,13 +383,12 @@ impl Forces for SphereSystem<'_> {
 impl Contacting for SphereSystem<'_> {
     type Contact = SphereContact;
 
-    fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<SphereContact>) {
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<SphereContact>) {
         out.clear();
         let bodies = self.bodies;
         let n = bodies.n;
         let fastest = (0..bodies.count()).fold(0.0_f64, |m, i| m.max(bodies.speed(v, i)));
-        activation.margin = 2.0 * activation.lead.abs() * fastest;
-        let reach = activation.reach();
+        let reach = activation.reach(|| 2.0 * fastest);
         let SphereScratch { middle, grid, .. } = &mut *self.parts;
         let name = |i: usize| u32::try_from(i).unwrap_or(PLANE);
         let mut offer = |key: (u32, u32)| {

@@ -73,7 +73,6 @@ pub fn near(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
         lead: 0.0,
         hover: 0.2,
         slow: f64::INFINITY,
-        margin: 0.0,
     };
     touching(model, kinematics, &activation)
 }

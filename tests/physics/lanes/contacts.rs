@@ -12,7 +12,6 @@ use rover_core::contact::{
 use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
 use rover_core::integrator::WarmStart;
 use rover_core::lanes::contacts::{Contacts, Sight};
-use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground;
 use rover_core::lanes::machine::Machine;
 use rover_core::lanes::rows::{Answer, Rows};
@@ -126,7 +125,7 @@ impl<T: Lane> Block<T> {
         }
         let (middle, end) = (&poses[0], &poses[1]);
         let gravity = Vec3::splat(token, [0.0, -G, 0.0]);
-        let forecast = Forecast::new(gravity, step.h, step.gamma, (1.0 - THETA) * step.h);
+        let activation = Activation::of_step(gravity, step.h, step.gamma, (1.0 - THETA) * step.h);
         let sight = Sight {
             machine,
             models: &self.models,
@@ -135,7 +134,7 @@ impl<T: Lane> Block<T> {
             end,
             v: &v,
             needs_pieces: false,
-            forecast: &forecast,
+            activation: &activation,
         };
         let fallbacks = self.contacts.detect(&mut self.ground, &sight);
         let mut M = MassMatrix::new(token, machine);
@@ -243,7 +242,6 @@ fn expected(model: &Model, rover: &Rover, step: Step, found: &Found) -> Option<F
         lead: step.lead(),
         hover: 0.5 * G * step.h * step.h,
         slow: 2.0 * G * step.h,
-        margin: 50.0 * step.lead().abs(),
     };
     let mut contacts = Vec::new();
     let unknown = contact::detect(

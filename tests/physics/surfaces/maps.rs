@@ -189,7 +189,6 @@ fn a_wheel_that_spins_reaches_no_farther_than_one_that_does_not() {
         lead: 0.01,
         hover: 1e-3,
         slow: 0.1,
-        margin: 0.0,
     };
     let reach = |v: [f64; 6]| {
         let mut out = Vec::new();

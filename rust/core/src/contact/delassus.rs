@@ -83,26 +83,45 @@ impl ContactSystem {
 
     /// W of the assembled rows.
     pub(crate) fn multiply(&mut self, model: &Model) {
-        let n = self.n_contacts();
-        let size = 3 * n;
-        self.W.resize(size * size, 0.0);
-        for c in 0..n {
+        let mut W = std::mem::take(&mut self.W);
+        W.resize(9 * self.n_contacts() * self.n_contacts(), 0.0);
+        if self.spread.is_empty() {
+            let own = |c: usize| self.own_block(model, c);
+            self.fill(&mut W, own, |c, d| self.block(model, c, d));
+        } else {
+            let rows = |c: usize| &self.spread[c * model.nv()..][..model.nv()];
+            let block = |c: usize, d: usize| product(0.0, rows(c), rows(d));
+            self.fill(&mut W, |c| block(c, c), block);
+        }
+        self.W = W;
+    }
+
+    /// Fills W with the blocks of contacts with themselves and with those before.
+    #[inline]
+    fn fill(
+        &self,
+        W: &mut [f64],
+        own_block: impl Fn(usize) -> [f64; 9],
+        block: impl Fn(usize, usize) -> [f64; 9],
+    ) {
+        let size = 3 * self.n_contacts();
+        for c in 0..self.n_contacts() {
             for d in 0..c {
-                let block = self.block(model, c, d);
+                let block = block(c, d);
                 for i in 0..3 {
                     for j in 0..3 {
                         let (row, column) = (3 * c + i, 3 * d + j);
-                        self.W[row * size + column] = block[3 * i + j];
-                        self.W[column * size + row] = block[3 * i + j];
+                        W[row * size + column] = block[3 * i + j];
+                        W[column * size + row] = block[3 * i + j];
                     }
                 }
             }
-            let mut own = self.own_block(model, c);
+            let mut own = own_block(c);
             for k in 0..3 {
                 own[4 * k] += self.beyond[c][k];
             }
             for (i, row) in own.chunks_exact(3).enumerate() {
-                self.W[(3 * c + i) * size + 3 * c..][..3].copy_from_slice(row);
+                W[(3 * c + i) * size + 3 * c..][..3].copy_from_slice(row);
             }
         }
     }
@@ -197,45 +216,45 @@ impl ContactSystem {
         placed: &[(&Kinematics, &[Contact])],
         v: &[f64],
     ) {
-        let all = placed
-            .iter()
-            .flat_map(|(at, own)| own.iter().map(move |c| (*at, c)));
-        let n = all.clone().count();
+        let n = placed.iter().map(|(_, contacts)| contacts.len()).sum();
         self.W.clear();
         self.held.clear();
         self.spread.clear();
         self.bodies.clear();
-        self.bodies.extend(all.clone().map(|(_, c)| c.body));
         self.spans.clear();
         self.unions.clear();
         self.Z.resize(n * self.stride, [0.0; 3]);
         self.u.resize(3 * n, 0.0);
         self.beyond.clear();
         self.beyond.resize(n, [0.0; 3]);
-        for (c, (kinematics, contact)) in all.enumerate() {
+        for (kinematics, contacts) in placed {
             let motion = Still {
                 model,
                 kinematics,
                 v,
             };
-            let u = if let Some(other) = contact.other {
-                let begin = self.unions.len();
-                let u = self.unite(&motion, factor, contact, other.body);
-                self.spans.resize(n, 0..0);
-                self.spans[c] = begin..self.unions.len();
-                u
-            } else {
-                let path = Path::of(model.mechanism(), contact.body);
-                let rows = &mut self.Z[c * self.stride..][..path.len()];
-                let u = match limit::joint_row(model, contact) {
-                    Some((_, sign, row)) => path.write_joint(row, sign, v, rows),
-                    None => write_rows(&motion, contact, v, rows),
+            let first = self.bodies.len();
+            self.bodies.extend(contacts.iter().map(|c| c.body));
+            for (c, contact) in (first..).zip(*contacts) {
+                let u = if let Some(other) = contact.other {
+                    let begin = self.unions.len();
+                    let u = self.unite(&motion, factor, contact, other.body);
+                    self.spans.resize(n, 0..0);
+                    self.spans[c] = begin..self.unions.len();
+                    u
+                } else {
+                    let path = Path::of(model.mechanism(), contact.body);
+                    let rows = &mut self.Z[c * self.stride..][..path.len()];
+                    let u = match limit::joint_row(model, contact) {
+                        Some((_, sign, row)) => path.write_joint(row, sign, v, rows),
+                        None => write_rows(&motion, contact, v, rows),
+                    };
+                    factor.half_solve_path(model.mechanism(), contact.body, rows);
+                    u
                 };
-                factor.half_solve_path(model.mechanism(), contact.body, rows);
-                u
-            };
-            self.u[3 * c..][..3].copy_from_slice(&u);
-            self.close(model, c, contact);
+                self.u[3 * c..][..3].copy_from_slice(&u);
+                self.close(model, c, contact);
+            }
         }
     }
 
@@ -302,10 +321,6 @@ impl ContactSystem {
 
     /// The block of W for two contacts.
     fn block(&self, model: &Model, c: usize, d: usize) -> [f64; 9] {
-        if !self.spread.is_empty() {
-            let rows = |c: usize| &self.spread[c * model.nv()..][..model.nv()];
-            return product(0.0, rows(c), rows(d));
-        }
         if self.union(c).is_empty() && self.union(d).is_empty() {
             let shared = model.common_path(self.bodies[c], self.bodies[d]);
             let z = |c: usize| &self.Z[c * self.stride..][..shared];
@@ -324,9 +339,6 @@ impl ContactSystem {
 
     /// The block of W on the diagonal.
     fn own_block(&self, model: &Model, c: usize) -> [f64; 9] {
-        if !self.spread.is_empty() {
-            return self.block(model, c, c);
-        }
         let union = self.union(c);
         if union.is_empty() {
             let n = model.path(self.bodies[c]).len();

@@ -106,22 +106,11 @@ pub fn deepest_overlap(model: &Model, kinematics: &Kinematics, terrain: &dyn Ter
     gaps.fold(0.0, f64::min)
 }
 
-/// Distance from the ground up to which a part at the midpoint of its step can be in contact, m.
-///
-/// The forecast follows material points, but only motion of the shape brings it to the ground: a
-/// wheel that spins about its axle stays where it is, and a ball however it turns.
-#[inline]
-fn reach_of<S: BodyMotion>(placed: &Placed<'_>, motion: &S, activation: &Activation) -> f64 {
-    if activation.lead.abs() > 0.0 {
-        let speed = fastest_way(&placed.shape, placed.body, motion);
-        activation.hover.max(activation.lead.abs() * speed)
-    } else {
-        activation.hover
-    }
-}
-
 /// Upper bound on the speed at which any place of the surface of a body's shape moves along its
 /// normal, m/s.
+///
+/// A forecast follows material points, but only motion of the shape brings it to the ground: a
+/// wheel that spins about its axle stays where it is, and a ball however it turns.
 pub(super) fn fastest_way<S: BodyMotion>(shape: &PlacedShape<'_>, body: usize, motion: &S) -> f64 {
     let centre = shape.centre();
     let velocity = motion.point_velocity(body, &centre);
@@ -256,7 +245,7 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
         shape: part.place_at(model, (&R, &r)),
     };
     let (centre, bound) = (placed.shape.centre(), placed.shape.bound());
-    gate.reach = reach_of(&placed, middle, gate.activation);
+    gate.reach = (gate.activation).reach(|| fastest_way(&placed.shape, placed.body, middle));
     let (half_way, motion) = if gate.can_be_passed {
         let (R_end, r_end) = end.pose(body);
         let half_way = end.origin(body) - base + (r_end + R_end * part.centre(model)) - centre;

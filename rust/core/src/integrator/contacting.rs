@@ -46,7 +46,7 @@ pub trait Contacting: Dynamics {
     /// Finds the contacts of the step: measures them at the middle pose and forecasts with the
     /// velocity `v` (nv).
     ///
-    /// `activation.margin` is 0 on entry; the system fills it. `out` is cleared first.
+    /// `out` is cleared first.
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Self::Contact>);
 
     /// Measures point, frame and gap of the same features again at the end pose.

@@ -43,10 +43,11 @@ use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::{Scratch, ScratchOf};
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, close_end, find_impacts, place, solve_contacts,
+    add_correction, assemble_contacts, close_end, find_impacts, place, solve_contacts,
     take_persistent,
 };
 use super::warm_start::WarmStart;
+use crate::contact::Activation;
 
 /// The linearised variant.
 #[derive(Clone, Copy, Debug, Default)]
@@ -260,7 +261,8 @@ fn attempt<S: MechanicalSystem>(
     system.set_moved(start.configuration, start.v, h, &mut ws.end);
     system.place_end(&ws.end);
     probe.end(Phase::Kinematics);
-    let activation = activation(options, (1.0 - theta) * h);
+    let (gravity, measured) = (options.gravity.into(), (1.0 - theta) * h);
+    let activation = Activation::of_step(gravity, h, options.forecast, measured);
     system.detect(start.v, activation, &mut ws.contacts);
     system.relocate(&mut ws.contacts);
     (ws.groups).find(system, options, &ws.contacts, warm_start, &ws.gyroscopic);

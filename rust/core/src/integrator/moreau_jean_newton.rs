@@ -32,10 +32,10 @@ use super::report::{StepReport, StepStatus};
 use super::scheme::{Integrator, StateMut};
 use super::scratch::ScratchOf;
 use super::step_contacts::{
-    activation, add_correction, assemble_contacts, close_end, excuse_gaps, find_impacts,
-    solve_contacts,
+    add_correction, assemble_contacts, close_end, excuse_gaps, find_impacts, solve_contacts,
 };
 use super::warm_start::WarmStart;
+use crate::contact::Activation;
 
 /// Relative change below which an iteration that no longer contracts has reached rounding.
 const ROUNDING: f64 = 1e-8;
@@ -235,7 +235,8 @@ fn iterate<S: MechanicalSystem>(
     probe.end(Phase::Kinematics);
     if iteration == 0 {
         // The set of contacts of a step is decided once, by the forecast.
-        let activation = activation(options, theta * h);
+        let (gravity, measured) = (options.gravity.into(), theta * h);
+        let activation = Activation::of_step(gravity, h, options.forecast, measured);
         system.detect(start.v, activation, &mut ws.contacts);
         (ws.groups).find(system, options, &ws.contacts, warm_start, &[]);
     }

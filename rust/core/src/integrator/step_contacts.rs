@@ -9,23 +9,8 @@ use super::probe::{Phase, Probe};
 use super::report::StepReport;
 use super::scratch::{Scratch, ScratchOf};
 use super::warm_start::WarmStart;
-use crate::contact::Activation;
-use crate::law::newton_impact::{hovering_height, slow_approach};
+use crate::law::newton_impact::slow_approach;
 use crate::solver::{SolveReport, SolverOptions};
-
-/// The contact forecast, measured from `q_m`, with the margin within which a resting contact stays
-/// closed.
-///
-/// `measured`: seconds after the start of the step at which the gaps are measured.
-pub(super) fn activation(options: &StepOptions, measured: f64) -> Activation {
-    let (g, h) = (options.gravity.norm(), options.time_step);
-    Activation {
-        lead: options.forecast * h - measured,
-        hover: hovering_height(g, h),
-        slow: slow_approach(g, h),
-        margin: 0.0,
-    }
-}
 
 /// Change of the contacts' impulses since the last step, as a fraction of the approach that they
 /// stop, up to which they are forces.
@@ -179,8 +164,8 @@ fn yield_under_load<S: MechanicalSystem>(
         let mut before = [0.0; 3];
         before[..d].copy_from_slice(&ws.p[d * i..][..d]);
         let is_new = before[0] == 0.0;
-        let [away, at_rest] = [1.0, 0.0].map(|u| system.normal_shift(options, contact, u));
-        let bounces = is_new && away > at_rest;
+        let shift = |u_N| system.normal_shift(options, contact, u_N);
+        let bounces = is_new && shift(1.0) > shift(0.0);
         let compliance = system.compliance(contact, &ws.v);
         ws.bounces.push(bounces && compliance.is_some());
         let law = compliance.filter(|_| !bounces).map(|compliance| {

@@ -23,13 +23,14 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::by_lane::ByLane;
-use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
 use crate::contact::detection::{touch_of_disc, touch_of_roller};
-use crate::contact::{Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers};
+use crate::contact::{
+    Activation, Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers,
+};
 use crate::geometry::query::disc_plane::{FLAT, rolling, to_lowest};
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
@@ -193,7 +194,7 @@ pub struct Sight<'a, T: Lane> {
     /// Whether the piece of a surface that a wheel touches matters, since materials may differ.
     pub needs_pieces: bool,
     /// Which candidates are contacts.
-    pub forecast: &'a Forecast<T>,
+    pub activation: &'a Activation<T>,
 }
 
 impl<T: Lane> Contacts<T> {
@@ -734,7 +735,7 @@ impl<T: Lane> Contacts<T> {
     #[inline(always)]
     fn find_meeting(&self, sight: &Sight<'_, T>) -> u32 {
         let n = self.heights.len();
-        if sight.machine.touches_itself || sight.forecast.lead.abs() > 0.0 {
+        if sight.machine.touches_itself || sight.activation.lead.abs() > 0.0 {
             return sight.going;
         }
         let zero = T::splat(self.token, 0.0);
@@ -752,7 +753,7 @@ impl<T: Lane> Contacts<T> {
         };
         let mut meeting = 0;
         for a in 1..n {
-            let reach = size(a) + sight.forecast.hover;
+            let reach = size(a) + sight.activation.hover;
             for b in 0..a {
                 let way = sight.middle.origin_of(a) - sight.middle.origin_of(b);
                 meeting |= way.norm().le(reach + size(b)).bits();
@@ -783,7 +784,7 @@ impl<T: Lane> Contacts<T> {
         let pose = &sight.middle.bodies[solid.body];
         let n = ground.normal;
         let (centre, R) = (solid.centre(pose), solid.axes(pose));
-        let reach = (sight.forecast).reach(
+        let reach = (sight.activation).reach(
             #[inline(always)]
             || solid.speed(&self.twists[solid.carrier], centre),
         );
@@ -821,7 +822,7 @@ impl<T: Lane> Contacts<T> {
         let pose = &sight.middle.bodies[wheel.body];
         let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
         // The second and third point of the rim, and all that may come near.
-        let reach = (sight.forecast).reach(
+        let reach = (sight.activation).reach(
             #[inline(always)]
             || wheel.speed(&self.twists[wheel.carrier], (s, centre)),
         );
@@ -885,20 +886,22 @@ impl<T: Lane> Contacts<T> {
         let rounding = radius.like(wheel.rounding);
         let gap = height - radius * length - rounding;
         let twist = &self.twists[wheel.carrier];
-        let u_N = if sight.forecast.needs_velocity(gap) {
-            let mut share = radius * along / length;
-            if wheel.is_wide() {
-                share += radius.like(wheel.along(circle));
-            }
-            let lever = centre.cross(n) - across * share;
-            n.dot(twist.linear) + twist.angular.dot(lever)
-        } else {
-            radius
-        };
+        let admitted = sight.activation.admits(
+            gap,
+            #[inline(always)]
+            || {
+                let mut share = radius * along / length;
+                if wheel.is_wide() {
+                    share += radius.like(wheel.along(circle));
+                }
+                let lever = centre.cross(n) - across * share;
+                n.dot(twist.linear) + twist.angular.dot(lever)
+            },
+        );
         let half = radius.like(0.5);
         Stand {
             gap,
-            admitted: sight.forecast.admits(gap, u_N),
+            admitted,
             lies: (height + half * radius * length - rounding).le(reach),
         }
     }
@@ -941,14 +944,15 @@ impl<T: Lane> Contacts<T> {
                 let passes = self.passing(w, is_deep, sphere, sight, half_way);
                 fallbacks = fallbacks | passes;
             }
-            let u_N = if sight.forecast.needs_velocity(gap) {
-                let to_point = in_plane * (in_plane_length.min(radius) / in_plane_length);
-                let n = (to_point - offset) * (radius.like(1.0) / distance);
-                n.dot(twist.linear + twist.angular.cross(centre + to_point))
-            } else {
-                radius
-            };
-            let admitted = sight.forecast.admits(gap, u_N);
+            let admitted = sight.activation.admits(
+                gap,
+                #[inline(always)]
+                || {
+                    let to_point = in_plane * (in_plane_length.min(radius) / in_plane_length);
+                    let n = (to_point - offset) * (radius.like(1.0) / distance);
+                    n.dot(twist.linear + twist.angular.cross(centre + to_point))
+                },
+            );
             if admitted.any() {
                 // Normal or rolling direction are not defined by differences.
                 let least = radius.like(NO_DIRECTION);
@@ -987,12 +991,11 @@ impl<T: Lane> Contacts<T> {
             if is_deep.any() {
                 fallbacks = fallbacks | self.passing(w, is_deep, sphere, sight, half_way);
             }
-            let u_N = if sight.forecast.needs_velocity(gap) {
-                near.n.dot(twist.velocity(centre + near.point))
-            } else {
-                motion
-            };
-            let admitted = sight.forecast.admits(gap, u_N);
+            let admitted = sight.activation.admits(
+                gap,
+                #[inline(always)]
+                || near.n.dot(twist.velocity(centre + near.point)),
+            );
             if admitted.any() {
                 fallbacks = fallbacks | (admitted & near.undefined);
                 fallbacks = fallbacks | self.enter(slots.clone(), admitted, sphere);

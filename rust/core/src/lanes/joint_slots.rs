@@ -5,10 +5,9 @@
 use std::ops::Range;
 
 use super::contacts::Contacts;
-use super::forecast::Forecast;
 use super::machine::{Machine, Stop};
 use crate::contact::rows::close_stop;
-use crate::contact::{ContactKey, Part, Side, joint_friction};
+use crate::contact::{Activation, ContactKey, Part, Side, joint_friction};
 use crate::multibody::{JointModel, LaneConfiguration, Poses};
 use crate::scalar::{Lane, LaneMask};
 
@@ -89,7 +88,7 @@ impl<T: Lane> Contacts<T> {
         (middle, end): (&LaneConfiguration<T>, &LaneConfiguration<T>),
         poses: &Poses<T>,
         v: &[T],
-        forecast: &Forecast<T>,
+        activation: &Activation<T>,
     ) -> T::Mask {
         T::vectorize(
             self.token,
@@ -106,8 +105,8 @@ impl<T: Lane> Contacts<T> {
                     let [lower, upper] = gaps(middle.joints[joint]);
                     let rate = v[own.velocity];
                     let arm = rate.like(own.arm);
-                    let is_low = forecast.admits(arm * lower, arm * rate);
-                    let is_high = forecast.admits(arm * upper, -(arm * rate));
+                    let is_low = activation.admits(arm * lower, || arm * rate);
+                    let is_high = activation.admits(arm * upper, || -(arm * rate));
                     let active = is_low | is_high;
                     let both = is_low & is_high;
                     too_many = too_many | both;

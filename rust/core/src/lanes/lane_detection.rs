@@ -9,7 +9,7 @@ use super::machine::Machine;
 use crate::contact::detection::{Moving, detect_parts};
 use crate::contact::pair_detection::detect_pairs_of;
 use crate::contact::relocation::relocate_to;
-use crate::contact::{Activation, Contact, PairSearch, Part};
+use crate::contact::{Contact, PairSearch, Part};
 use crate::scalar::{Lane, LaneMask};
 
 impl<T: Lane> Contacts<T> {
@@ -41,12 +41,7 @@ impl<T: Lane> Contacts<T> {
             };
             let mut contacts = std::mem::take(&mut self.by_lane.scratch);
             contacts.clear();
-            let activation = Activation {
-                lead: sight.forecast.lead,
-                hover: sight.forecast.hover.get(lane),
-                slow: sight.forecast.slow.get(lane),
-                margin: 0.0,
-            };
+            let activation = sight.activation.of_lane(lane);
             let own = |asked: &&Asked| asked.lanes >> lane & 1 == 1;
             for asked in self.by_lane.asked.iter().filter(own) {
                 let parts = std::iter::once(asked.part);

@@ -10,8 +10,8 @@
 //! - [`machine`]: what the rovers of a block share; `parts`: its wheels, boxes and balls;
 //!   [`lane_rover`]: what a block reads of a rover;
 //! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `wide_wheel`,
-//!   `joint_slots`, [`forecast`]: contacts of all lanes at once; `lane_detection`, `by_lane`,
-//!   `free_slots`: of one lane; [`contacts`]: all of them, in slots;
+//!   `joint_slots`: contacts of all lanes at once; `lane_detection`, `by_lane`, `free_slots`: of
+//!   one lane; [`contacts`]: all of them, in slots;
 //! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - `clusters`: which trees have a problem of their own; `sweeps`: where a contact that touches is
 //!   solved with all others fixed. The problems are solved by [`crate::solver::batch`];
@@ -52,7 +52,6 @@ mod by_lane;
 mod clusters;
 mod contact_plane;
 pub mod contacts;
-pub mod forecast;
 mod free_slots;
 pub mod ground;
 mod groups;

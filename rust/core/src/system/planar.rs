@@ -344,7 +344,7 @@ impl Forces for PlanarSystem<'_> {
 impl Contacting for PlanarSystem<'_> {
     type Contact = PlanarContact;
 
-    fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<PlanarContact>) {
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<PlanarContact>) {
         out.clear();
         let PlanarScratch {
             middle,
@@ -354,8 +354,8 @@ impl Contacting for PlanarSystem<'_> {
         for i in 0..self.machine.n_wheels() {
             let disc = self.machine.disc(i, middle);
             let velocity = self.machine.point_velocity(i, middle, &disc.centre, v);
-            activation.margin = activation.lead.abs() * velocity.norm();
-            facing(self.ground, self.rule, &disc, activation.reach(), found);
+            let reach = activation.reach(|| velocity.norm());
+            facing(self.ground, self.rule, &disc, reach, found);
             for (feature, facing) in (0..).zip(&*found) {
                 let mut contact = PlanarContact {
                     key: PlanarKey {

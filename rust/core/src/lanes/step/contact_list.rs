@@ -3,9 +3,8 @@
 use nalgebra::Vector3;
 
 use super::{Block, Fallback};
-use crate::contact::Contact;
+use crate::contact::{Activation, Contact};
 use crate::lanes::contacts::Sight;
-use crate::lanes::forecast::Forecast;
 use crate::lanes::joint_slots::JointRow;
 use crate::scalar::{Lane, LaneMask};
 use crate::solver::batch::problem::{ContactProblem, Triple};
@@ -13,7 +12,8 @@ use crate::solver::batch::problem::{ContactProblem, Triple};
 impl<T: Lane> Block<T> {
     pub(super) fn detect(&mut self, problems: &mut [ContactProblem]) {
         let (h, theta) = (self.options.time_step, self.options.theta);
-        let forecast = Forecast::new(self.gravity, h, self.options.forecast, (1.0 - theta) * h);
+        let (gravity, measured) = (self.gravity, (1.0 - theta) * h);
+        let activation = Activation::of_step(gravity, h, self.options.forecast, measured);
         let sight = Sight {
             machine: &self.machine,
             models: &self.models,
@@ -22,7 +22,7 @@ impl<T: Lane> Block<T> {
             end: &self.poses_end,
             v: &self.v,
             needs_pieces: !self.options.materials.is_empty(),
-            forecast: &forecast,
+            activation: &activation,
         };
         let fallbacks = self.contacts.detect(&mut self.ground, &sight);
         self.fall_back(Fallback::Contact, fallbacks);
@@ -31,7 +31,7 @@ impl<T: Lane> Block<T> {
             let end = &self.poses_end;
             let too_many = self
                 .contacts
-                .detect_joints(machine, places, end, &self.v, &forecast);
+                .detect_joints(machine, places, end, &self.v, &activation);
             self.fall_back(Fallback::Contact, too_many);
         }
         let elastic = self.number(self.options.restitution);
