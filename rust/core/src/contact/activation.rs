@@ -40,7 +40,7 @@ impl<T: Lane> Activation<T> {
         )
     }
 
-    /// That of one lane.
+    /// The activation in one lane.
     #[must_use]
     pub(crate) fn of_lane(&self, lane: usize) -> Activation {
         Activation {
