@@ -15,10 +15,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use exploring_scenes::{Ground, STEPS_A_COMMAND, drives};
+use rover_core::contact::Activation;
 use rover_core::geometry::Terrain;
 use rover_core::integrator::StepOptions;
 use rover_core::lanes::contacts::{Contacts, Sight};
-use rover_core::lanes::forecast::Forecast;
 use rover_core::lanes::ground::Ground as LaneGround;
 use rover_core::lanes::machine::Machine;
 use rover_core::lanes::rows::Rows;
@@ -139,7 +139,7 @@ impl<T: Lane> Block<T> {
         let (middle, end, v) = black_box(&self.states[k % STEPS]);
         if last >= 1 {
             let gravity = Vec3::splat(self.token, [0.0, -9.81, 0.0]);
-            let forecast = Forecast::new(gravity, H, 0.5, 0.5 * H);
+            let activation = Activation::of_step(gravity, H, 0.5, 0.5 * H);
             let sight = Sight {
                 machine: &self.machine,
                 models: &self.models,
@@ -148,7 +148,7 @@ impl<T: Lane> Block<T> {
                 end,
                 v,
                 needs_pieces: false,
-                forecast: &forecast,
+                activation: &activation,
             };
             let fallbacks = self.contacts.detect(&mut self.ground, &sight);
             self.fallbacks += fallbacks.bits().count_ones();
