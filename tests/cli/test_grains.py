@@ -39,7 +39,8 @@ def test_a_run_is_recorded_and_its_result_told(command: str, options: list[str],
     run = open_run(tmp_path / f"{command}.h5")
     assert run.trajectory.attributes["complete"]
     assert run.time[-1] == pytest.approx(0.1, abs=0.02)
-    assert run.trajectory["penetration"].max() < 0.02 * run.radius.min()  # wheels yield
+    most = 0.02 if command == "rover" else 0.01  # its wheels yield
+    assert run.trajectory["penetration"].max() < most * run.radius.min()
     assert (run.model is not None) == (command in {"rover", "track", "pit"})
 
 

@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from comparison.scene import Array
+from comparison.rollout import STEPS_A_COMMAND, TIME_STEP, Player, one_by_one, together
 from rover_gym import Plane, RoverModel, Simulation
 from rover_gym.mechanics import SimulationBatch
 
-TIME_STEP = 0.005  # s
-TOGETHER, ALONE, STEPS_A_COMMAND, COMMANDS, ROUNDS = 64, 4, 10, 8, 7
+TOGETHER, ALONE, COMMANDS, ROUNDS = 64, 4, 8, 7
 TORQUE, STEERING, FASTEST = 8.0, 0.3, 25.0  # N m, rad, rad/s
 
 
@@ -73,47 +72,31 @@ ROWS: dict[str, Callable[[], Simulation]] = {
 }
 
 
-def drive_together(simulations: list[Simulation], commands: Array) -> None:
-    """Plays commands (n_commands, n, 2 n_wheels) in a batch."""
-    batch, n = SimulationBatch(simulations, threads=1), commands.shape[2] // 2
-    for command in commands:
-        batch.step(command[:, :n], command[:, n:], STEPS_A_COMMAND)
-
-
-def drive_alone(simulations: list[Simulation], commands: Array) -> None:
-    """Plays the same commands rover by rover."""
-    n = commands.shape[2] // 2
-    for i, simulation in enumerate(simulations):
-        for command in commands[:, i]:
-            simulation.set_commands(command[:n], command[n:])
-            simulation.step(STEPS_A_COMMAND)
-
-
-def microseconds(make: Callable[[], Simulation], n: int, play: Callable[..., None], seed: int) -> float:
-    """Processor time of a step of one of n rovers, µs."""
+def microseconds(make: Callable[[], Simulation], n: int, seed: int) -> float:
+    """Processor time of a step of one of n rovers, in a batch or, of few, one by one, µs."""
     rng = np.random.default_rng(seed)
-    first = make()
-    wheels = len(first.model.to_dict()["wheels"])
-    simulations = [first, *(make() for _ in range(n - 1))]
+    simulations = [make() for _ in range(n)]
+    wheels = len(simulations[0].model.to_dict()["wheels"])
     commands = rng.uniform(-1.0, 1.0, (COMMANDS, n, 2 * wheels))
     commands *= np.repeat([TORQUE, STEERING], wheels)
-    play(simulations, commands[:1])  # warms up
+    is_batch = n == TOGETHER
+    play: Player = (
+        together(SimulationBatch(simulations, threads=1), wheels) if is_batch else one_by_one(simulations, [])
+    )
+    play(commands[:1])  # warms up
     begin = time.process_time()
-    play(simulations, commands)
+    play(commands)
     return 1e6 * (time.process_time() - begin) / (n * COMMANDS * STEPS_A_COMMAND)
 
 
 def main() -> None:
     """Prints the table."""
-    ways = ((TOGETHER, drive_together), (ALONE, drive_alone))
     console = Console(width=120, highlight=False)
     console.print("| | in a batch | over the first | alone | over the first |\n|---|---|---|---|---|")
     for name, make in ROWS.items():
         cells = []
-        for n, play in ways:
-            pairs = [
-                (microseconds(make, n, play, seed), microseconds(driving, n, play, seed)) for seed in range(ROUNDS)
-            ]
+        for n in (TOGETHER, ALONE):
+            pairs = [(microseconds(make, n, seed), microseconds(driving, n, seed)) for seed in range(ROUNDS)]
             cells.append(f"{statistics.median(own for own, _ in pairs):.1f}")
             cells.append(f"{statistics.median(own / first for own, first in pairs):.2f}")
         console.print(f"| {name} | {' | '.join(cells)} |")

@@ -27,8 +27,12 @@ FEW_GRAINS = {
 
 #: Torques, arcs and balls: what is driven or drawn in another way.
 FEW = ("Rover-v0", "RoverArcs-v0", "RoverGrains-v0")
-OTHER = pytest.mark.nightly("tests/envs/test_play.py::test_play_drives_by_keys")
-EACH = [name if name in FEW else pytest.param(name, marks=OTHER) for name in ENVIRONMENTS]
+OTHER_PLAYED = pytest.mark.nightly("tests/envs/test_play.py::test_play_drives_by_keys")
+OTHER_SHOWN = pytest.mark.nightly("tests/envs/test_play.py::test_the_window_shows_the_rover")
+PLAYED, SHOWN = (
+    [name if name in FEW else pytest.param(name, marks=mark) for name in ENVIRONMENTS]
+    for mark in (OTHER_PLAYED, OTHER_SHOWN)
+)
 
 
 @pytest.fixture
@@ -46,7 +50,7 @@ def made(name: str, **arguments: Any) -> gym.Env[Any, Any]:
 
 
 @pytest.mark.usefixtures("screenless")
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", PLAYED)
 def test_play_drives_by_keys(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of Gymnasium, about matplotlib's windows
@@ -77,7 +81,7 @@ def test_play_drives_by_keys(name: str) -> None:
 
 @pytest.mark.filterwarnings("ignore:.*doesn't natively support it")  # Gymnasium's wrapper makes the window
 @pytest.mark.usefixtures("screenless")
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", SHOWN)
 def test_the_window_shows_the_rover(name: str) -> None:
     env = made(name, render_mode="human")
     env.reset(seed=6)

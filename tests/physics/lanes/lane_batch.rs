@@ -311,6 +311,18 @@ proptest! {
 /// and some for one step; on free roots, on stands, and a free one beside one on a stand.
 #[test]
 fn rovers_that_bounce_turn_and_are_pushed_move_as_they_would_alone() {
+    bounce_turn_and_are_pushed(4);
+}
+
+/// Ignored because it takes half a minute: `make test-all` runs it, and the test above, which runs
+/// always, is its first half.
+#[test]
+#[ignore = "tests/physics/lanes/lane_batch.rs::rovers_that_bounce_turn_and_are_pushed_move_as_they_would_alone"]
+fn rovers_that_bounce_turn_and_are_pushed_for_long_move_as_they_would_alone() {
+    bounce_turn_and_are_pushed(8);
+}
+
+fn bounce_turn_and_are_pushed(n_commands: usize) {
     let slide = on_a_stand(equipped(), JointKind::Prismatic, Some([0.0, 1.0, 0.0]));
     let parts = vec![
         ("a".to_owned(), slide.clone()),
@@ -353,7 +365,7 @@ fn rovers_that_bounce_turn_and_are_pushed_move_as_they_would_alone() {
         drive_all(
             Instructions::of_this_machine(),
             rovers,
-            (4, 30.0),
+            (n_commands, 30.0),
             &mut numbers,
         );
     }
@@ -361,12 +373,24 @@ fn rovers_that_bounce_turn_and_are_pushed_move_as_they_would_alone() {
 
 #[test]
 fn narrower_lanes_give_the_same_bits() {
+    give_the_same_bits(3);
+}
+
+/// Ignored because it takes 20 s: `make test-all` runs it, and the test above, which runs always,
+/// is its beginning.
+#[test]
+#[ignore = "tests/physics/lanes/lane_batch.rs::narrower_lanes_give_the_same_bits"]
+fn narrower_lanes_give_the_same_bits_for_long() {
+    give_the_same_bits(8);
+}
+
+fn give_the_same_bits(n_commands: usize) {
     let models = models();
     for instructions in Instructions::all_of_this_machine() {
         for (model, seed) in models.iter().zip(0..) {
             let mut numbers = Random(seed);
             let rovers = (0..8).map(|i| rover(i, model, &mut numbers)).collect();
-            drive_all(instructions, rovers, (3, 60.0), &mut numbers);
+            drive_all(instructions, rovers, (n_commands, 60.0), &mut numbers);
         }
         drive(instructions, &models[7], 9, 60.0, 7);
         // A lane ends its problem while another one begins to use a place that it has vacated.

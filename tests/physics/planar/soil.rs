@@ -1,5 +1,6 @@
 //! Granular soil: conservation, energy, penetration, sleep, the sweeps against a dense solver.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use rover_core::integrator::{Stabilisation, StepOptions};
@@ -82,6 +83,19 @@ fn collisions_in_free_space_keep_momentum_to_rounding() {
 
 #[test]
 fn energy_never_grows_without_restitution() {
+    energy_never_grows(200, [195..=200, 0..=166, 133..=200, 195..=200]);
+}
+
+/// Ignored because the last hundred steps take six times as long as the others: `make test-all`
+/// runs it, and the test above, which runs always, has the same bed.
+#[test]
+#[ignore = "tests/physics/planar/soil.rs::energy_never_grows_without_restitution"]
+fn energy_never_grows_without_restitution_until_the_bed_lies() {
+    energy_never_grows(300, [295..=300, 0..=250, 200..=300, 295..=300]);
+}
+
+/// `expected`: how many of the steps converge, case by case.
+fn energy_never_grows(n_steps: usize, expected: [RangeInclusive<usize>; 4]) {
     // The default options; sweeps cut short; solved well and without
     // projection; solved coarsely, mostly by the proximal point.
     for case in 0..4 {
@@ -107,7 +121,7 @@ fn energy_never_grows_without_restitution() {
         let mut energy = soil.energy().total();
         let scale = energy;
         let mut converged = 0;
-        for step in 0..200 {
+        for step in 0..n_steps {
             converged += usize::from(soil.step(1).expect("finite").is_converged());
             let now = soil.energy().total();
             assert!(
@@ -119,8 +133,10 @@ fn energy_never_grows_without_restitution() {
         }
         assert!(energy < 0.95 * scale);
         // Solved well, some steps want more sweeps than are allowed; cut short, most do.
-        let expected = [195..=200, 0..=170, 130..=200, 195..=200][case].clone();
-        assert!(expected.contains(&converged), "{converged} in case {case}");
+        assert!(
+            expected[case].contains(&converged),
+            "{converged} in case {case}"
+        );
     }
 }
 

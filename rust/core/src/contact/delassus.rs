@@ -138,15 +138,11 @@ impl ContactSystem {
         for (c, terms) in diagonal.enumerate() {
             for (k, term) in terms.into_iter().enumerate() {
                 // Of a row that is held only this is left.
-                if term > 0.0 && self.held.get(c).is_some_and(|held| held[k]) {
-                    self.beyond[c][k] = 0.0;
-                    if let Some(own) = self.W.get_mut((3 * c + k) * (size + 1)) {
-                        *own = 0.0;
-                    }
-                }
-                self.beyond[c][k] += term;
-                if let Some(own) = self.W.get_mut((3 * c + k) * (size + 1)) {
-                    *own += term;
+                let is_held = term > 0.0 && self.held.get(c).is_some_and(|held| held[k]);
+                let beyond = &mut self.beyond[c][k];
+                let own = self.W.get_mut((3 * c + k) * (size + 1));
+                for entry in own.into_iter().chain([beyond]) {
+                    *entry = if is_held { term } else { *entry + term };
                 }
             }
         }
