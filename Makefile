@@ -124,7 +124,7 @@ docs: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/debian-test ## build the documenta
 	$(BIN)/sphinx-build --jobs auto --quiet --fail-on-warning --keep-going docs docs/_build/html
 	$(BIN)/pytest --quiet --numprocesses auto $(OF_DOCS)
 	@echo "docs/_build/html/index.html"
-	@echo "target/doc/rover_core/index.html"
+	@echo "target/doc/rover_core/index.html and target/doc/friction_contact/index.html"
 
 bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).rollout

@@ -10,6 +10,8 @@ A page marks a number with the key that says where it is from, and a table with 
 | `cost SCENE ERROR CURVE` | CPU ms per simulated second at which a curve of `chart.json` reaches an error |
 | `least SCENE CURVE` | smallest error of the curve, cm |
 | `rollout ENGINE ROW` | us a step of `rollout.json` |
+| `solved METHOD` | problems of `solver_profiles.json` that a method of contacts solves |
+| `faster auto` | geometric mean of the time of Siconos' best method over ours, where both solve |
 | `policy SCENE; POLICY` | success in percent of `policies.json` |
 | `cell PAGE; ROW; COLUMN` | first number of a cell of a table that a command writes; ROW: its first cells, by slashes |
 
@@ -19,6 +21,7 @@ differs.
 
 import argparse
 import json
+import math
 import re
 import sys
 from functools import cache
@@ -41,7 +44,9 @@ PAGES = (
     "docs/tutorials/train-a-policy.md",
     "docs/validation.md",
     "docs/vector.md",
+    "docs/solvers.md",
     "paper/paper.md",
+    "rust/solver/README.md",
 )
 #: Pages of tables, by their names in keys.
 TABLES = {
@@ -51,7 +56,7 @@ TABLES = {
     "sand": "docs/validation/sand.md",
 }
 VALUE = re.compile(
-    r"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:cost|least|rollout|cell|policy) [^>]*?) -->)"
+    r"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:cost|least|rollout|cell|policy|solved|faster) [^>]*?) -->)"
 )
 TABLE = re.compile(r"(?P<begin><!-- table (?P<key>\w+) -->\n\n).*?(?P<end>\n\n<!-- end of table -->)", flags=re.DOTALL)
 
@@ -95,6 +100,10 @@ def value(key: str) -> str:
     if kind == "cell":
         page, row, column = (part.strip() for part in rest.split(";"))
         return cell(page, row, column)
+    if kind == "solved":
+        return str(len(times_of(rest)))
+    if kind == "faster":
+        return number(faster_than_siconos())
     if kind == "policy":
         scene, _, policy = rest.partition("; ")
         return policies.success(data(policies.FILE), scene, policy)
@@ -110,6 +119,22 @@ def value(key: str) -> str:
     if cost is None:
         raise LookupError(f"{key}: the curve does not reach the error")
     return number(cost)
+
+
+def times_of(method: str) -> dict[str, float]:
+    """CPU seconds of a method of contacts on every problem that it solves."""
+    profiles = data("solver_profiles.json")
+    bounds = [profiles["meta"][name] for name in ("residual", "velocity")]
+    runs = profiles["runs"][method].items()
+    return {name: run[0] for name, run in runs if all(x <= most for x, most in zip(run[2:], bounds, strict=True))}
+
+
+def faster_than_siconos() -> float:
+    """Geometric mean of the time of Siconos' best method of each problem over that of `auto`, where both solve."""
+    ours, *peers = [times_of(m) for m in data("solver_profiles.json")["runs"] if m == "auto" or m.startswith("Siconos")]
+    best = {name: min(peer[name] for peer in peers if name in peer) for name in set().union(*peers)}
+    ratios = [best[name] / ours[name] for name in sorted(best.keys() & ours.keys())]
+    return math.exp(math.fsum(map(math.log, ratios)) / len(ratios))
 
 
 def table(key: str) -> str:

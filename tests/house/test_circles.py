@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 RUST = Path(__file__).parents[2] / "rust"
-CRATES = ["core", "python", "comparison", "fmu"]
+CRATES = ["solver", "ground", "core", "task", "python", "comparison", "fmu"]
 
 COMMENTS_AND_STRINGS = re.compile(
     r"""//[^\n]* | /\*.*?\*/ | b?r(?P<fence>\#*)".*?"(?P=fence) | "(?:\\.|[^"\\])*" | '(?:\\[^'\n]+|[^'\\\n])'""",

@@ -1,4 +1,4 @@
-"""Each chapter of the core has one page at its door: what stands here, one call, and what it may use."""
+"""Each chapter of the mechanics has one page at its door: what stands here, one call, and what it may use."""
 
 import re
 from collections import defaultdict
@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from .test_circles import crate_of
+from .test_circles import PATHS, Crate, Module, crate_of
 
-SOURCE = Path(__file__).parents[2] / "rust" / "core" / "src"
-CHAPTERS = sorted(door.parent.name for door in SOURCE.glob("*/mod.rs"))
+RUST = Path(__file__).parents[2] / "rust"
+SOURCES = [RUST / crate / "src" for crate in ("solver", "ground", "core", "task")]  # each uses only those before it
+DOORS = {door.parent.name: door for source in SOURCES for door in source.glob("*/mod.rs")}
+OF_CRATE = r"(?:crate|friction_contact|rover_ground|rover_core)"
 PARTS = re.compile(r"(?P<here>.+?)\n# One call\n(?P<walk>.+?)\n# May use\n(?P<uses>.+?)(?:\n# |\Z)", re.DOTALL)
 
 
@@ -24,34 +26,42 @@ def front_of(text: str) -> str:
 
 
 def order() -> list[str]:
-    """The chapters as lib.rs lists them, each using only those before it."""
-    listed = re.findall(r"^- .*?(?=^- |\Z)", front_of((SOURCE / "lib.rs").read_text(encoding="utf-8")), re.M | re.S)
+    """The chapters as the files lib.rs list them, each using only those before it."""
+    heads = [front_of((source / "lib.rs").read_text(encoding="utf-8")) for source in SOURCES]
+    listed = [item for head in heads for item in re.findall(r"^- .*?(?=^- |\Z)", head, re.M | re.S)]
     return [name for item in listed for name in re.findall(r"\[?`(\w+)`\]?(?=[:,;]| and )", item)]
 
 
-@pytest.mark.parametrize("chapter", CHAPTERS)
+def heads_of(crate: Crate, module: Module) -> set[str]:
+    """Chapters that a file names, of its own crate and of those below."""
+    paths = [names.split("::") for names in PATHS.findall(crate.code[module])]
+    own = [*crate.imports[module].values(), *filter(None, (crate.absolute(module, path) for path in paths))]
+    below = re.findall(r"\b(?:friction_contact|rover_ground|rover_core)::(\w+)", crate.code[module])
+    return {target[0] for target in own if target} | set(below)
+
+
+@pytest.mark.parametrize("chapter", DOORS)
 def test_a_door_has_its_three_parts(chapter: str) -> None:
-    parts = PARTS.match(front_of((SOURCE / chapter / "mod.rs").read_text(encoding="utf-8")))
+    parts = PARTS.match(front_of(DOORS[chapter].read_text(encoding="utf-8")))
     assert parts, "first what stands here, then '# One call' and '# May use'"
     assert re.search(r"```text\n.+?\n```", parts["walk"], re.DOTALL), "the call is drawn"
 
 
 def test_a_chapter_uses_what_its_door_says_and_only_chapters_before_it() -> None:
-    uses: dict[str, set[str]] = defaultdict(set)
-    crate = crate_of(SOURCE)
-    for module in filter(None, crate.code):
-        uses[module[0]] |= {target[0] for target in crate.used(module) if target} - {module[0]}
     listed = order()
+    uses: dict[str, set[str]] = defaultdict(set)
+    for crate in map(crate_of, SOURCES):
+        for module in filter(None, crate.code):
+            uses[module[0]] |= heads_of(crate, module) & set(listed) - {module[0]}
     assert uses.keys() == set(listed)
     wrong = []
     for chapter, used in uses.items():
         later = used - set(listed[: listed.index(chapter)])
         wrong += [f"{chapter} may not use {name}, which stands after it in lib.rs" for name in sorted(later)]
-    for chapter in CHAPTERS:
-        parts = PARTS.match(front_of((SOURCE / chapter / "mod.rs").read_text(encoding="utf-8")))
-        said = re.sub(r"From \[`crate::", "[`crate::", parts["uses"]) if parts else ""
-        allowed = set(re.findall(r"\[`crate::(\w+)`\]|`(pool)`", said.partition("\n\n")[0].replace("\n", " ")))
-        allowed = {name or pool for name, pool in allowed}
+    for chapter, door in DOORS.items():
+        parts = PARTS.match(front_of(door.read_text(encoding="utf-8")))
+        said = re.sub(rf"From \[`{OF_CRATE}::", "[`crate::", parts["uses"]) if parts else ""
+        allowed = set(re.findall(rf"\[`{OF_CRATE}::(\w+)`\]", said.partition("\n\n")[0].replace("\n", " ")))
         wrong += [f"{chapter} uses {name}, which its door does not name" for name in sorted(uses[chapter] - allowed)]
         late = allowed - set(listed[: listed.index(chapter)])
         wrong += [f"the door of {chapter} names {name}, which stands after it in lib.rs" for name in sorted(late)]

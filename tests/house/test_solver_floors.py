@@ -6,7 +6,7 @@ from pathlib import Path
 from .test_circles import crate_of
 
 ROOT = Path(__file__).parents[2]
-SOLVER = ROOT / "rust" / "core" / "src" / "solver"
+SOLVER = ROOT / "rust" / "solver" / "src" / "solver"
 
 # From the bottom up: a file may import lower floors and its own.
 FLOORS = [

@@ -6,7 +6,6 @@ pub mod scenes;
 mod batch;
 mod derivatives;
 mod driving;
-mod episodes;
 mod exploring;
 mod free_flight;
 mod inclined_plane;

@@ -3,7 +3,7 @@
     u = Hᵀ v,   v = v_free + M̂⁻¹ H p,   so that   u = W p + q   with   W = Hᵀ M̂⁻¹ H,   q = Hᵀ v_free - u_wall.
 
 A body's velocity is (speed of its mass centre, spin), both in the world's axes. The implicit part of the gyroscopic
-couple makes M̂, and with it W, unsymmetric. `tests/physics/solver_npz.rs` reads the same files.
+couple makes M̂, and with it W, unsymmetric. `tests/solver/npz.rs` reads the same files.
 """
 
 from dataclasses import dataclass

@@ -15,7 +15,7 @@ mod rover_kinds;
 use std::sync::Arc;
 use std::time::Instant;
 
-use rover_core::draw::resting_pose;
+use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::{HeightField, Plane, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::integrator::moreau_jean::MoreauJean;

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Support, TerrainSupport};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 use rover_core::system::grains::{
     COORDINATES, Cohesion, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Named, refused};
 use crate::arrays::{Array, fresh, fresh_rows, triple};

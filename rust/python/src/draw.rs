@@ -2,12 +2,12 @@
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
-use rover_core::draw::{
+use rover_core::simulation::RoverSimulation;
+use rover_task::draw::{
     DomainDistribution, DrawnGround, Fixed, FixedStart, GroundDistribution, HillDistribution,
     Order, Pcg64, Range, RockDistribution, SandDistribution, SceneDistribution, StartDistribution,
 };
-use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
-use rover_core::simulation::RoverSimulation;
+use rover_task::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 
 use crate::arguments::{Named, below, number, refused, whole};
 use crate::arrays::{Array, fresh_rows, two, vector};

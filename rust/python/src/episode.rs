@@ -5,8 +5,8 @@ use std::sync::Arc;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyRange, PyTuple};
-use rover_core::draw::Domain;
-use rover_core::episode::{Ending, Episode as CoreEpisode, EpisodeState, Rules, Setting};
+use rover_task::draw::Domain;
+use rover_task::episode::{Ending, Episode as CoreEpisode, EpisodeState, Rules, Setting};
 
 use crate::arguments::{Named, number, refused};
 use crate::arrays::{Array, array, fresh, vector};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::{DrawnGround, Pcg64, RockDraw, Start};
-use rover_core::episode::{EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped};
+use rover_task::draw::{DrawnGround, Pcg64, RockDraw, Start};
+use rover_task::episode::{EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped};
 
 use crate::arguments::{Named, at_least_one, below, refused, text, whole};
 use crate::arrays::{Array, fresh, fresh_rows};

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyTuple};
-use rover_core::episode::channels::{Field, Sizes, fields};
-use rover_core::episode::{Rules, Settings, TERMS, Weights};
 use rover_core::multibody::Model;
+use rover_task::episode::channels::{Field, Sizes, fields};
+use rover_task::episode::{Rules, Settings, TERMS, Weights};
 
 use crate::arguments::{Named, count, number, refused};
 use crate::arrays::{fresh, fresh_rows, vector};

@@ -11,14 +11,15 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyList, PyTuple, PyType};
 use rover_core::caught::Fault;
-use rover_core::draw::{DrawError, PlacementError, Unsuitable};
-use rover_core::episode::EpisodeError;
+use rover_core::contact::placement::PlacementError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::{ModelError, StateError};
 use rover_core::problem::ProblemError;
 use rover_core::quantity::legible;
 use rover_core::simulation::{BatchError, CommandError, SnapshotError};
+use rover_task::draw::{DrawError, Unsuitable};
+use rover_task::episode::EpisodeError;
 
 /// Result of a call that may raise a Python exception.
 pub type Result<T, E = BorderError> = std::result::Result<T, E>;

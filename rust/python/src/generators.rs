@@ -4,7 +4,7 @@
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyInt;
-use rover_core::draw::{Pcg64, Pcg64State};
+use rover_task::draw::{Pcg64, Pcg64State};
 
 use crate::arguments::{count, refused};
 use crate::arrays::{Array, check_size, fresh_rows};

@@ -2,9 +2,9 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::DrawnGround;
 use rover_core::simulation::GrainSimulation as CoreSimulation;
 use rover_core::system::grains::{Packing, arranged};
+use rover_task::draw::DrawnGround;
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Named, count, flags, number};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::DrawnGround;
 use rover_core::geometry::{HeightField as CoreField, Terrain as _};
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, number, refused};
 use crate::arrays::{Array, check_size, one_or_two, two, vector};

@@ -4,7 +4,7 @@
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
-use rover_core::episode::{Episode, Settings, TERMS};
+use rover_task::episode::{Episode, Settings, TERMS};
 
 use crate::errors::Result;
 

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat, PyList, PyMapping};
+use rover_core::contact::placement::{resting_on, resting_pose};
 use rover_core::contact::{Contact, detection::wheel_contacts};
-use rover_core::draw::{DrawnGround, resting_on, resting_pose, rocks::clear_radius};
 use rover_core::multibody::chart::actuation_matrix;
 use rover_core::multibody::landmarks::{self, coordinate_names};
 use rover_core::multibody::{
     Changes, Chart, Kinematics, Model, ModelDescription, ModelError, coordinates,
 };
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
+use rover_task::draw::{DrawnGround, rocks::clear_radius};
 
 use crate::arguments::{Named, number, refused, text, texts};
 use crate::arrays::{Array, fresh, fresh_matrix, fresh_rows, triple, two, vector};

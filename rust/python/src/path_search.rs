@@ -3,8 +3,8 @@
 use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::paths::search::STEPS;
-use rover_core::paths::{
+use rover_task::paths::search::STEPS;
+use rover_task::paths::{
     Arcs, MapTask, Outline, PathCosts, PathSearch as Core, Pose, ScanShape, Search, SearchTask,
     WayMap,
 };

@@ -1,8 +1,8 @@
 //! `Plane`.
 
 use pyo3::prelude::*;
-use rover_core::draw::{DrawnGround, tilted_plane};
 use rover_core::geometry::Plane as CorePlane;
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, number};
 use crate::arrays::{Array, fresh, triple};
@@ -60,7 +60,10 @@ impl Plane {
     fn tilted(slope: &Bound<'_, PyAny>, uphill: &Bound<'_, PyAny>) -> Result<Py<Self>> {
         let angle = number(slope, Kind::Terrain, "slope")?;
         let uphill = number(uphill, Kind::Terrain, "uphill")?;
-        Ok(Py::new(slope.py(), Self::of(tilted_plane(angle, uphill)?))?)
+        Ok(Py::new(
+            slope.py(),
+            Self::of(rover_core::geometry::Plane::tilted(angle, uphill)?),
+        )?)
     }
 
     /// Unit normal out of the ground, (3,).

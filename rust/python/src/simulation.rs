@@ -3,7 +3,6 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::contact::Part;
-use rover_core::draw::DrawnGround;
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, coordinates};
@@ -14,6 +13,7 @@ use rover_core::simulation::{
 };
 use rover_core::solver::SolverOptions;
 use rover_core::system::loops::check_closed;
+use rover_task::draw::DrawnGround;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;

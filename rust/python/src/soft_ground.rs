@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::DrawnGround;
 use rover_core::geometry::SoftGround as CoreGround;
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, refused};
 use crate::errors::Kind;

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::DrawnGround;
 use rover_core::geometry::{
     Clearing, Plane as CorePlane, Rocks, SphereField as CoreField, Terrain as _,
 };
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, Named, number, refused, whole};
 use crate::arrays::{Array, fresh_rows, one_or_two, rows, vector};

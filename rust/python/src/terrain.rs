@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
-use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Union as CoreUnion, ray};
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, is_path, refused};
 use crate::arrays::{Array, rows};

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Terrain as _, TriangleMesh as CoreMesh};
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, refused};
 use crate::arrays::{Array, array, fresh_rows, rows};

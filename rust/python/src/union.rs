@@ -1,7 +1,7 @@
 //! `Union`, the ground that is made of others.
 
 use pyo3::prelude::*;
-use rover_core::draw::DrawnGround;
+use rover_task::draw::DrawnGround;
 
 use crate::errors::Result;
 use crate::height_field::HeightField;

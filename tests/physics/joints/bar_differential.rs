@@ -1,6 +1,6 @@
 //! A rocker-bogie whose differential is a bar with two rods, beside one whose rockers are coupled.
 
-use rover_core::draw::start::resting_pose;
+use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::{Plane, SphereField};
 use rover_core::integrator::Variant;
 use rover_core::multibody::{Model, ModelDescription, coordinates};

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use rover_core::draw::resting_pose;
+use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepReport;
 use rover_core::integrator::Variant;

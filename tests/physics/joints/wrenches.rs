@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use rover_core::draw::resting_pose;
+use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{JointKind, Model, coordinates};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rover_core::draw::resting_pose;
+use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::{Plane, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::integrator::moreau_jean::MoreauJean;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use rover_core::contact::detection::wheel_contacts;
-use rover_core::draw::start::{PlacementError, resting_on};
+use rover_core::contact::placement::{PlacementError, resting_on};
 use rover_core::geometry::{HeightField, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Kinematics, Model, coordinates};

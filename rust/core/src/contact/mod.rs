@@ -9,6 +9,7 @@
 //! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
 //! `rollers` frees wheels across their rollers,
 //! `box_clearance` how far a box is from a surface at least.
+//! [`placement`] puts a rover on its wheels.
 //! [`relocation`] re-evaluates them in another configuration; `contact_slope` has their
 //! derivatives by the poses. `rows` has the rows of the contact
 //! Jacobian and the products with them, [`jacobian`] and [`delassus`] assemble the matrices.
@@ -48,6 +49,7 @@ pub mod limit;
 pub mod pair;
 pub mod pair_detection;
 pub mod part;
+pub mod placement;
 pub mod relocation;
 pub(crate) mod rollers;
 pub(crate) mod rows;

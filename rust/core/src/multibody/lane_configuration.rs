@@ -6,8 +6,8 @@ use super::joint::joint_model::{JointCoordinates, JointModel, advanced};
 use super::joint::{Joint, free};
 use super::mechanism::Mechanism;
 use super::state::Configuration;
-use crate::scalar::quaternion::normalised;
 use crate::scalar::{Dual, Lane, Vec3};
+use crate::spatial::quaternion::normalised;
 
 /// A configuration a lane.
 #[derive(Clone, Debug)]

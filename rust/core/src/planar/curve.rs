@@ -390,12 +390,6 @@ impl Ground for Arc<dyn Ground> {
     }
 }
 
-impl Support<2> for Arc<dyn Ground> {
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
-        (**self).facing(centre, reach, out);
-    }
-}
-
 /// The points of a smooth curve that face a centre, see the page above.
 fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
     let below = centre.y - curve.jet(centre.x)[0];

@@ -34,7 +34,7 @@
 //!
 //! # May use
 //!
-//! [`crate::caught`], `pool`, [`crate::quantity`], [`crate::scalar`], [`crate::spatial`],
+//! [`crate::caught`], [`crate::pool`], [`crate::quantity`], [`crate::scalar`], [`crate::spatial`],
 //! [`crate::multibody`],
 //! [`crate::sand`], [`crate::geometry`], [`crate::contact`], [`crate::problem`],
 //! [`crate::law`], [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`],

@@ -27,7 +27,13 @@ impl PlacedWheel {
             body: wheel.body,
             centre: wheel.centre.into(),
             axle: wheel.axle.into(),
-            shape: SandWheel::of(wheel),
+            shape: SandWheel {
+                radius: wheel.radius,
+                width: wheel.width,
+                rounding: wheel.rounding,
+                grouser_height: wheel.grouser_height,
+                grousers: wheel.grousers,
+            },
         }
     }
 }

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use super::joint_model::{JointCoordinates, JointModel, Placement};
 use super::screw::{Motion, Screw};
-use crate::scalar::quaternion::{exp_rotation, product, rotation};
 use crate::scalar::{Lane, Mat3, Vec3};
+use crate::spatial::quaternion::{exp_rotation, product, rotation};
 
 /// Number of velocities.
 pub const NV: usize = 6;

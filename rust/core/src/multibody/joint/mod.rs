@@ -172,8 +172,9 @@ mod tests {
 
     use super::joint_model::advanced;
     use super::*;
+    use crate::scalar::Vec3;
     use crate::scalar::elementary::sin_cos;
-    use crate::scalar::{Vec3, quaternion};
+    use crate::spatial::quaternion;
 
     /// A machine with one joint of each kind.
     struct Coordinates {

@@ -7,8 +7,8 @@
 
 use super::joint_model::{JointCoordinates, JointModel, Placement};
 use super::screw::{Motion, Screw};
-use crate::scalar::quaternion::{exp_rotation, product, rotation};
 use crate::scalar::{Lane, Mat3, Vec3};
+use crate::spatial::quaternion::{exp_rotation, product, rotation};
 
 /// A spherical joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

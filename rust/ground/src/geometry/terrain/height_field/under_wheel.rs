@@ -1,0 +1,325 @@
+//! Which pieces of a height field a wheel may touch, several cells at once.
+//!
+//! A point of the wheel that is in the ground by no more than a depth has no face further beside
+//! the wheel than this depth in its way. It is no deeper if the ground is outside a smaller wheel:
+//! then the surface lies between the point and the place to which it comes when the wheel shrinks.
+//! So a strip of cells along the wheel suffices, unless one that the wheel crosses reaches into the
+//! smaller wheel.
+//!
+//! The cells of a register are compared with the wheel at once ([`super::wheel`]), in the same way
+//! however many those are.
+
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::{f64x4, f64x8};
+use nalgebra::Vector3;
+
+use super::cells::{CELLS, Cells};
+use super::neighbourhood::{AWAY, ROUNDING};
+use super::wheel::{KINDS, STEEP, Wheel};
+use super::{HeightField, index, narrow};
+use crate::geometry::shape::{Disc, Roller, SupportMap};
+use crate::geometry::terrain::{Neighbourhood, Primitive};
+use friction_contact::scalar::{Instructions, Lane, LaneMask, Single};
+
+/// How deep a wheel may be in the ground, in bounding radii, so that faces as far beside it are all
+/// that matter.
+const SHALLOW: f64 = 0.1;
+
+/// Most cells of a strip with something to touch.
+const MOST_CELLS: usize = 48;
+
+/// Which cells matter.
+struct Region {
+    columns: [usize; 2],
+    rows: [usize; 2],
+    /// Lowest height, and distance from the wheel's centre, m.
+    floor: f64,
+    radius: f64,
+}
+
+/// Cells with pieces that may be touched, each kind a bit.
+struct Found {
+    n: usize,
+    cells: [([usize; 2], u32); MOST_CELLS],
+}
+
+impl HeightField {
+    /// Visits what a disc may touch.
+    pub(super) fn visit_under_disc(
+        &self,
+        part: &Neighbourhood<'_>,
+        disc: &Disc,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        let wheel = Wheel {
+            part,
+            disc,
+            half: 0.0,
+            rounding: 0.0,
+        };
+        self.visit_under(&wheel, visit);
+    }
+
+    /// Visits what a wheel with a width may touch.
+    pub(super) fn visit_under_roller(
+        &self,
+        part: &Neighbourhood<'_>,
+        roller: &Roller,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        let wheel = Wheel {
+            part,
+            disc: &roller.core,
+            half: roller.half,
+            rounding: roller.rounding,
+        };
+        self.visit_under(&wheel, visit);
+    }
+
+    fn visit_under(&self, wheel: &Wheel<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
+        let part = wheel.part;
+        let radius = part.shape.bound() + part.reach;
+        let around = |axis: &Vector3<f64>| part.extent(axis) + part.reach + SHALLOW * radius;
+        let ends = [around(&Vector3::x()), around(&Vector3::z())];
+        let Some([columns, rows]) = self.cells_within(&part.centre, ends) else {
+            return;
+        };
+        let region = Region {
+            columns,
+            rows,
+            floor: part.centre.y - around(&Vector3::y()),
+            radius,
+        };
+        if self.tiles.highest_of(columns, rows) < region.floor {
+            return;
+        }
+        let mut found = Found {
+            n: 0,
+            cells: [([0; 2], 0); MOST_CELLS],
+        };
+        if self.search_strip(wheel, &region, &mut found) {
+            for (cell, kinds) in &found.cells[..found.n] {
+                self.visit_kinds(*cell, *kinds, visit);
+            }
+            return;
+        }
+        self.visit_not_clear(wheel, &region, visit);
+    }
+
+    /// Searches the strip along the wheel. Whether it suffices.
+    fn search_strip(&self, wheel: &Wheel<'_>, region: &Region, found: &mut Found) -> bool {
+        let (c, axle, radius) = (&wheel.part.centre, &wheel.disc.axle, region.radius);
+        let [dx, dz] = self.spacing;
+        // Half the width of what the wheel crosses, by the cells' middles along the axle, for all
+        // heights that it spans; and of the strip.
+        let of_cell = 0.5 * (axle.x.abs() * dx + axle.z.abs() * dz);
+        let tread = wheel.half + wheel.reach();
+        let crossed = tread + axle.y.abs() * radius + of_cell + ROUNDING;
+        let depth = SHALLOW * radius;
+        let wide = crossed + depth;
+        let smaller = (radius - depth) * (radius - depth);
+        let middle = (c.x - self.origin[0]) / dx - 0.5;
+        let per_column = axle.x * dx;
+        let (mut cells, mut has_room, mut may_be_deep) = (Cells::new(), true, false);
+        for j in region.rows[0]..=region.rows[1] {
+            let z = self.origin[1] + (j as f64 + 0.5) * dz - c.z;
+            let range = across(region.columns, middle, [per_column, axle.z * z], wide);
+            let Some(range) = range else {
+                continue;
+            };
+            self.visit_row((j, range), c, region, |i, square| {
+                let beside = per_column * (i as f64 - middle) + axle.z * z;
+                may_be_deep |= square <= smaller
+                    && beside.abs() <= crossed
+                    && !self.is_under([i, j], wheel, depth);
+                cells.add(self, [i, j], c);
+                if cells.n == CELLS {
+                    has_room &= self.take(wheel, &mut cells, |cell| found.add(cell));
+                }
+            });
+        }
+        has_room &= self.take(wheel, &mut cells, |cell| found.add(cell));
+        has_room && !(may_be_deep && self.may_look_away(wheel, region))
+    }
+
+    /// Whether a face may look away from the wheel that lies beside it.
+    #[cold]
+    fn may_look_away(&self, wheel: &Wheel<'_>, region: &Region) -> bool {
+        let beyond = |[a, b]: [usize; 2], n: usize| [a.saturating_sub(1), (b + 1).min(n - 2)];
+        let columns = beyond(region.columns, self.columns);
+        let slope = (self.tiles).steepest(columns, beyond(region.rows, self.rows));
+        (slope / (1.0 + slope)).sqrt() + wheel.disc.axle.y.abs() > AWAY
+    }
+
+    /// In the whole region.
+    #[cold]
+    fn visit_not_clear(
+        &self,
+        wheel: &Wheel<'_>,
+        region: &Region,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        let c = &wheel.part.centre;
+        let mut cells = Cells::new();
+        let mut visit = |(cell, kinds): ([usize; 2], u32)| {
+            self.visit_kinds(cell, kinds, visit);
+            true
+        };
+        for j in region.rows[0]..=region.rows[1] {
+            self.visit_row((j, region.columns), c, region, |i, _| {
+                cells.add(self, [i, j], c);
+                if cells.n == CELLS {
+                    self.take(wheel, &mut cells, &mut visit);
+                }
+            });
+        }
+        self.take(wheel, &mut cells, &mut visit);
+    }
+
+    /// Visits the columns of a row's cells in a region, and the square of the distance of a place
+    /// from all that is over the cell and at most as high as its highest point, m².
+    #[inline(always)]
+    fn visit_row(
+        &self,
+        (j, [begin, end]): (usize, [usize; 2]),
+        place: &Vector3<f64>,
+        region: &Region,
+        mut visit: impl FnMut(usize, f64),
+    ) {
+        let beyond = |axis: usize, k: usize, x: f64| {
+            let low = self.origin[axis] + k as f64 * self.spacing[axis] - x;
+            low.max(-low - self.spacing[axis]).max(0.0)
+        };
+        let (z, most) = (beyond(1, j, place.z), region.radius * region.radius);
+        if z * z > most {
+            return;
+        }
+        let row = |j: usize| &self.heights[j * self.columns + begin..][..end - begin + 2];
+        let mut corners = row(j)
+            .iter()
+            .zip(row(j + 1))
+            .map(|(near, far)| near.max(*far));
+        let mut last = corners.next().unwrap_or(f32::NAN);
+        for (i, next) in (begin..).zip(corners) {
+            let highest = f64::from(last.max(next));
+            last = next;
+            let (x, drop) = (beyond(0, i, place.x), (place.y - highest).max(0.0));
+            let square = x * x + z * z + drop * drop;
+            // A cell without heights has no highest.
+            if highest >= region.floor && square <= most {
+                visit(i, square);
+            }
+        }
+    }
+
+    /// Whether the wheel, smaller by a depth (m), is over the planes of both faces of a cell.
+    fn is_under(&self, cell: [usize; 2], wheel: &Wheel<'_>, depth: f64) -> bool {
+        let from = wheel.part.centre - self.point(cell.map(narrow));
+        let radius = wheel.disc.radius + wheel.reach() - depth;
+        let half = wheel.half + wheel.reach();
+        let [a, b, c, d] = self.cell_heights(cell).map(f64::from);
+        [[b - a, d - b], [d - c, c - a]].iter().all(|[x, z]| {
+            let m = Vector3::new(-x / self.spacing[0], 1.0, -z / self.spacing[1]);
+            let along = m.dot(&wheel.disc.axle);
+            let across = (m.norm_squared() - along * along).max(0.0).sqrt();
+            m.dot(&from) > radius * across + half * along.abs()
+        })
+    }
+
+    /// Empties `cells` and takes those with pieces that the wheel may touch, in order. Whether it
+    /// took all of them.
+    fn take(
+        &self,
+        wheel: &Wheel<'_>,
+        cells: &mut Cells,
+        mut take: impl FnMut(([usize; 2], u32)) -> bool,
+    ) -> bool {
+        let near = self.compare(wheel, cells);
+        let n = std::mem::take(&mut cells.n);
+        let mut any = near.iter().fold(0, |any, near| any | near) & ((1 << n) - 1);
+        let mut all = true;
+        while any != 0 {
+            let k = any.trailing_zeros() as usize;
+            any &= any - 1;
+            let mut kinds = 0;
+            for (kind, near) in near[..STEEP].iter().enumerate() {
+                kinds |= (near >> k & 1) << kind;
+            }
+            if near[STEEP] >> k & 1 == 1 {
+                kinds = self.near_part(cells.places[k], wheel.part);
+            }
+            if kinds != 0 {
+                all &= take((cells.places[k], kinds));
+            }
+        }
+        all
+    }
+
+    /// Which pieces of cells a wheel may touch: for each kind a bit for each cell.
+    fn compare(&self, wheel: &Wheel<'_>, cells: &Cells) -> [u32; KINDS] {
+        match Instructions::of_this_machine() {
+            Instructions::Baseline => self.compare_with::<f64>(Single::Baseline, wheel, cells),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(token) => self.compare_with::<f64x4<_>>(token, wheel, cells),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(token) => self.compare_with::<f64x8<_>>(token, wheel, cells),
+        }
+    }
+
+    fn compare_with<T: Lane>(
+        &self,
+        token: T::Token,
+        wheel: &Wheel<'_>,
+        cells: &Cells,
+    ) -> [u32; KINDS] {
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || {
+                let mut near = [0; KINDS];
+                let mut at = 0;
+                while at < cells.n {
+                    let own = wheel.compare::<T>(token, self.spacing, (cells, at));
+                    for kind in 0..KINDS {
+                        near[kind] |= own[kind].bits() << at;
+                    }
+                    at += T::LANES;
+                }
+                near
+            },
+        )
+    }
+}
+
+impl Found {
+    /// Adds a cell. False if there is no room.
+    #[inline]
+    fn add(&mut self, cell: ([usize; 2], u32)) -> bool {
+        let place = self.cells.get_mut(self.n);
+        let has_room = place.is_some();
+        if let Some(place) = place {
+            *place = cell;
+            self.n += 1;
+        }
+        has_room
+    }
+}
+
+/// First and last of the columns in which `|per_column (i − middle) + rest|` is at most `wide`;
+/// None if there are none.
+#[inline]
+fn across(
+    columns: [usize; 2],
+    middle: f64,
+    [per_column, rest]: [f64; 2],
+    wide: f64,
+) -> Option<[usize; 2]> {
+    if per_column.abs() * 1e6 <= wide {
+        let first = columns[0] as f64 - middle;
+        return ((per_column * first + rest).abs() <= 2.0 * wide).then_some(columns);
+    }
+    let [first, last] = columns.map(|k| k as f64);
+    let (place, beside) = (middle - rest / per_column, (wide / per_column).abs());
+    let (low, high) = ((place - beside).ceil(), (place + beside).floor());
+    (low <= last && high >= first).then(|| [index(low.max(first)), index(high.min(last))])
+}

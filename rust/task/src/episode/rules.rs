@@ -1,0 +1,379 @@
+//! What all episodes of a task share.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::channels::{Field, Sizes, fields};
+use super::ending::Ending;
+use super::error::{EpisodeError, check_lengths};
+use super::progress::Progress;
+use super::quantities::Quantities;
+use super::reward::Weights;
+use rover_core::multibody::Model;
+use rover_core::simulation::ReadingLayout;
+
+/// The settings of a task. SI units, radians.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Physics steps of a control period.
+    pub substeps: usize,
+    /// Control period, s.
+    pub dt: f64,
+    /// Torque of a torque action of 1, (n_wheels), N m.
+    pub torque_limits: Vec<f64>,
+    /// Set-point of a steering action of 1, rad; 0 if actions do not steer.
+    pub max_steering: f64,
+    /// Distance within which the goal is reached, m.
+    pub goal_tolerance: f64,
+    /// Cosine of the tilt beyond which the rover has rolled over.
+    pub cos_max_tilt: f64,
+    /// Time until a high-centred rover ends the episode, s.
+    pub stuck_time: f64,
+    /// Weights of the reward's terms, in the order of [`super::TERMS`].
+    pub weights: Weights,
+    /// Magnitude of gravity, m/s²: observed forces are divided by the mean weight on a wheel.
+    pub gravity: f64,
+    /// Standard deviation of the noise of entries without bounds; 0 without noise.
+    pub noise: f64,
+    /// Points of the height scan, as of [`rover_core::simulation::ReadingRequest`].
+    pub scan: Vec<[f64; 2]>,
+    /// Goals that an episode reaches one after the other, at least one.
+    pub goals: usize,
+    /// Work of the motors, driving or braking, after which the battery is empty, J; None without
+    /// one.
+    pub battery: Option<f64>,
+    /// Distance from where an episode began at which the rover is free: the episode ends, and
+    /// progress is measured from there; None where it is not held.
+    pub free_distance: Option<f64>,
+    /// How far the field reaches beyond the rectangle of start and goals, m; None without an edge.
+    pub field_margin: Option<f64>,
+}
+
+impl Settings {
+    /// Whether every number is within its range; `is_free`: for a machine on a free base.
+    fn check(&self, is_free: bool) -> Result<(), EpisodeError> {
+        let positive = |field, value: f64| (field, value, value > 0.0, "a finite number above 0");
+        let not_negative =
+            |field, value: f64| (field, value, value >= 0.0, "a finite number from 0");
+        let any = |field, value: f64| (field, value, true, "a finite number");
+        let numbers = [
+            positive("dt", self.dt),
+            positive("battery", self.battery.unwrap_or(1.0)),
+            positive("free_distance", self.free_distance.unwrap_or(1.0)),
+            positive("field_margin", self.field_margin.unwrap_or(1.0)),
+            (
+                "goals",
+                self.goals as f64,
+                self.goals == 1 || self.has_course() && is_free,
+                "at least 1, and 1 for a machine on a fixed base",
+            ),
+            positive("gravity", self.gravity),
+            not_negative("noise", self.noise),
+            not_negative("max_steering", self.max_steering),
+            not_negative("goal_tolerance", self.goal_tolerance),
+            any("cos_max_tilt", self.cos_max_tilt),
+            positive("stuck_time", self.stuck_time),
+        ];
+        let lists = (self.torque_limits.iter())
+            .map(|&x| not_negative("torque_limits", x))
+            .chain(self.weights.iter().map(|&x| any("weights", x)))
+            .chain(self.scan.iter().flatten().map(|&x| any("scan", x)));
+        for (field, value, is_within, range) in numbers.into_iter().chain(lists) {
+            if !(is_within && value.is_finite()) {
+                return Err(EpisodeError::OutOfRange {
+                    field,
+                    range,
+                    value,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether there is more than one goal.
+    #[must_use]
+    pub fn has_course(&self) -> bool {
+        self.goals > 1
+    }
+}
+
+/// Indices of what an episode needs in a reading without heights.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadingIndices {
+    /// Leading entries that an observation shares with it.
+    pub shared: usize,
+    /// Indices of the [`super::Quantities`] in the reading, in order.
+    pub scalars: Range<usize>,
+    /// Size of the reading.
+    pub size: usize,
+}
+
+/// Checked settings for the models of one size.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    model: Arc<Model>,
+    settings: Settings,
+    inverse_scale: Vec<f64>,
+    noise: Vec<f64>,
+    places: ReadingIndices,
+    sizes: [usize; 3],
+    steering: Steering,
+}
+
+/// Which entry of an action's steering each wheel follows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Steering {
+    /// By wheel; None where actions do not steer it.
+    entries: Vec<Option<usize>>,
+    n_entries: usize,
+}
+
+impl Steering {
+    /// One entry for each steering joint, in the order of the wheels: wheels that share a joint
+    /// share its entry.
+    fn of(model: &Model) -> Self {
+        let mut joints = Vec::new();
+        let mut entry_of = |joint: usize| {
+            let known = joints.iter().position(|own| *own == joint);
+            known.unwrap_or_else(|| {
+                joints.push(joint);
+                joints.len() - 1
+            })
+        };
+        let entries = (model.wheels().iter())
+            .map(|wheel| wheel.steering.map(&mut entry_of))
+            .collect();
+        Self {
+            entries,
+            n_entries: joints.len(),
+        }
+    }
+
+    /// Actions do not steer.
+    fn none(model: &Model) -> Self {
+        Self {
+            entries: vec![None; model.wheels().len()],
+            n_entries: 0,
+        }
+    }
+}
+
+/// What a reading's size depends on.
+const SIZES: [&str; 3] = ["simulation.v", "simulation.joints", "simulation.wheels"];
+
+/// The numbers of a model in the order of [`SIZES`].
+fn sizes(model: &Model) -> [usize; 3] {
+    [model.nv(), model.n_joints(), model.wheels().len()]
+}
+
+/// Rules are equal if episodes under them are.
+impl PartialEq for Rules {
+    fn eq(&self, other: &Self) -> bool {
+        self.settings == other.settings
+            && self.sizes == other.sizes
+            && self.steering == other.steering
+    }
+}
+
+impl Rules {
+    /// Rules for a model.
+    ///
+    /// # Errors
+    /// `Length`, `OutOfRange`.
+    ///
+    /// # Panics
+    /// If an observation were not a reading, the action and the rest, in this order.
+    pub fn new(model: Arc<Model>, settings: Settings) -> Result<Self, EpisodeError> {
+        let layout = ReadingLayout::new(&model, 0);
+        let place = |name: &str| {
+            let found = layout.fields().iter().find(|(own, _)| *own == name);
+            found.map_or(0..0, |(_, place)| place.clone())
+        };
+        let shared = place("target").end;
+        let places = ReadingIndices {
+            shared,
+            // The last entry of the target is the distance to the goal.
+            scalars: shared - 1..place("solver").end,
+            size: layout.size(),
+        };
+        let n_wheels = model.wheels().len();
+        let steering = if settings.max_steering > 0.0 {
+            Steering::of(&model)
+        } else {
+            Steering::none(&model)
+        };
+        let n_actions = n_wheels + steering.n_entries;
+        check_lengths([("torque_limits", settings.torque_limits.len(), n_wheels)])?;
+        settings.check(model.trees()[0].is_free)?;
+        let mut rules = Self {
+            inverse_scale: Vec::new(),
+            noise: Vec::new(),
+            sizes: sizes(&model),
+            model,
+            settings,
+            places,
+            steering,
+        };
+        for field in rules.observation() {
+            let first = match field.channel.name {
+                "previous_action" => shared,
+                "stuck" => shared + n_actions,
+                _ => field.entries.start,
+            };
+            assert_eq!(field.entries.start, first, "a reading, then the action");
+            let inverse = field.scale.iter().map(|scale| 1.0 / scale);
+            rules.inverse_scale.extend(inverse);
+            if rules.settings.noise > 0.0 {
+                let deviation = rules.settings.noise * f64::from(field.channel.is_measured());
+                rules.noise.extend(field.entries.map(|_| deviation));
+            }
+        }
+        Ok(rules)
+    }
+
+    /// The fields of an observation.
+    #[must_use]
+    pub fn observation(&self) -> Vec<Field> {
+        fields(&Sizes {
+            model: &self.model,
+            actions: self.n_actions(),
+            goals: self.settings.goals,
+            has_battery: self.settings.battery.is_some(),
+            points: self.settings.scan.len(),
+            gravity: self.settings.gravity,
+        })
+    }
+
+    /// The model that they were made for.
+    #[must_use]
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Checks that a model has readings of this size, and wheels that can be steered as far as an
+    /// action asks.
+    ///
+    /// # Errors
+    /// `Length`, `OutOfRange`.
+    pub fn check_model(&self, model: &Model) -> Result<(), EpisodeError> {
+        let own = sizes(model).into_iter().zip(self.sizes);
+        let lists = SIZES.into_iter().zip(own);
+        check_lengths(lists.map(|(field, (actual, expected))| (field, actual, expected)))?;
+        let is_steered = |wheel: usize| self.steering.entries[wheel].is_some();
+        let limit = (model.wheels().iter().enumerate())
+            .filter(|(wheel, _)| is_steered(*wheel))
+            .map(|(_, own)| own.steering.map_or(0.0, |_| own.steering_limit))
+            .fold(f64::INFINITY, f64::min);
+        if self.settings.max_steering > limit * (1.0 + 1e-12) {
+            return Err(EpisodeError::OutOfRange {
+                field: "max_steering",
+                range: "within the steering limit of every steered wheel",
+                value: self.settings.max_steering,
+            });
+        }
+        Ok(())
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Wheels of a rover.
+    #[must_use]
+    pub fn n_wheels(&self) -> usize {
+        self.settings.torque_limits.len()
+    }
+
+    /// Entries of an action: a torque for each wheel, and a set-point for each steering joint if
+    /// actions steer.
+    #[must_use]
+    pub fn n_actions(&self) -> usize {
+        self.n_wheels() + self.n_steering()
+    }
+
+    /// Entries of an action's steering.
+    #[must_use]
+    pub fn n_steering(&self) -> usize {
+        self.steering.n_entries
+    }
+
+    /// Which of them each wheel follows; None where actions do not steer it.
+    #[must_use]
+    pub fn steering_entries(&self) -> &[Option<usize>] {
+        &self.steering.entries
+    }
+
+    /// Commands of a rover: a torque and a set-point for each wheel.
+    #[must_use]
+    pub fn n_commands(&self) -> usize {
+        2 * self.n_wheels()
+    }
+
+    /// Entries of an observation.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.inverse_scale.len()
+    }
+
+    /// Entries of an observation before the heights.
+    #[must_use]
+    pub fn n_state(&self) -> usize {
+        self.size() - self.settings.scan.len()
+    }
+
+    /// Leading entries that a reading and an observation share.
+    #[must_use]
+    pub fn n_shared(&self) -> usize {
+        self.places.shared
+    }
+
+    /// The ending after a control period: a failed step takes precedence, then the goal, then
+    /// rolling over, high-centring, the battery, coming free and leaving the field.
+    #[must_use]
+    pub fn ending(&self, now: &Quantities, progress: &Progress, has_failed: bool) -> Ending {
+        let settings = &self.settings;
+        if has_failed {
+            Ending::StepFailed
+        } else if progress.reached >= settings.goals {
+            Ending::Goal
+        } else if now.cos_tilt < settings.cos_max_tilt {
+            Ending::RollOver
+        } else if progress.stuck_time >= settings.stuck_time {
+            Ending::HighCentred
+        } else if (settings.battery).is_some_and(|battery| progress.energy >= battery) {
+            Ending::BatteryEmpty
+        } else if (settings.free_distance).is_some_and(|free| progress.away >= free) {
+            Ending::Free
+        } else if (settings.field_margin).is_some_and(|margin| progress.outside > margin) {
+            Ending::LeftField
+        } else {
+            Ending::None
+        }
+    }
+
+    /// ReadingIndices in a reading.
+    #[must_use]
+    pub fn places(&self) -> &ReadingIndices {
+        &self.places
+    }
+
+    /// Inverse of the observation's scale (size).
+    #[must_use]
+    pub fn inverse_scale(&self) -> &[f64] {
+        &self.inverse_scale
+    }
+
+    /// Standard deviation of each entry's noise (size); empty without noise.
+    #[must_use]
+    pub fn noise(&self) -> &[f64] {
+        &self.noise
+    }
+
+    /// Whether observations have noise.
+    #[must_use]
+    pub fn is_noisy(&self) -> bool {
+        !self.noise.is_empty()
+    }
+}

@@ -1,0 +1,9 @@
+//! Whole behaviour of the laws and solvers of contact: known answers, recorded problems, invariants.
+
+mod known_answers;
+mod laws;
+mod methods;
+mod npz;
+mod row;
+mod scenes;
+mod shelf;

@@ -1,0 +1,3 @@
+//! Whole behaviour of the driving task: starts and episodes.
+
+mod episodes;
