@@ -11,7 +11,7 @@ A page marks a number with the key that says where it is from, and a table with 
 | `least SCENE CURVE` | smallest error of the curve, cm |
 | `rollout ENGINE ROW` | us a step of `rollout.json` |
 | `solved METHOD` | problems of `solver_profiles.json` that a method of contacts solves |
-| `faster auto` | geometric mean of the time of Siconos' best method over ours, where both solve |
+| `faster WHICH` | time of Siconos' best method over that of `auto`: `mean`, `least`, one problem; how many `problems`, how many `slower` |
 | `policy SCENE; POLICY` | success in percent of `policies.json` |
 | `cell PAGE; ROW; COLUMN` | first number of a cell of a table that a command writes; ROW: its first cells, by slashes |
 
@@ -103,7 +103,7 @@ def value(key: str) -> str:
     if kind == "solved":
         return str(len(times_of(rest)))
     if kind == "faster":
-        return number(faster_than_siconos())
+        return faster(rest)
     if kind == "policy":
         scene, _, policy = rest.partition("; ")
         return policies.success(data(policies.FILE), scene, policy)
@@ -129,12 +129,24 @@ def times_of(method: str) -> dict[str, float]:
     return {name: run[0] for name, run in runs if all(x <= most for x, most in zip(run[2:], bounds, strict=True))}
 
 
-def faster_than_siconos() -> float:
-    """Geometric mean of the time of Siconos' best method of each problem over that of `auto`, where both solve."""
+def siconos_over_ours() -> dict[str, float]:
+    """Time of Siconos' best method over that of `auto`, of every problem of a file that both solve."""
     ours, *peers = [times_of(m) for m in data("solver_profiles.json")["runs"] if m == "auto" or m.startswith("Siconos")]
     best = {name: min(peer[name] for peer in peers if name in peer) for name in set().union(*peers)}
-    ratios = [best[name] / ours[name] for name in sorted(best.keys() & ours.keys())]
-    return math.exp(math.fsum(map(math.log, ratios)) / len(ratios))
+    both = [
+        name for name in sorted(best.keys() & ours.keys()) if not name.startswith(("pile_", "table_", "mechanism_"))
+    ]
+    return {name: best[name] / ours[name] for name in both}
+
+
+def faster(which: str) -> str:
+    """A number of `siconos_over_ours`."""
+    ratios = siconos_over_ours()
+    counts = {"problems": len(ratios), "slower": sum(ratio < 1.0 for ratio in ratios.values())}
+    if which in counts:
+        return str(counts[which])
+    mean = math.exp(math.fsum(map(math.log, ratios.values())) / len(ratios))
+    return number({"mean": mean, "least": min(ratios.values()), **ratios}[which])
 
 
 def table(key: str) -> str:

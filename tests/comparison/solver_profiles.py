@@ -1,6 +1,6 @@
 """Dolan–Moré performance profiles of the contact solvers: ours, and Siconos' where an interpreter has it.
 
-    python -m comparison.solver_profiles [--problems FOLDER] [--siconos PYTHON] [--output FOLDER] [--ratios]
+    python -m comparison.solver_profiles [--problems FOLDER] [--siconos PYTHON] [--output FOLDER]
 
 Each solver starts every problem from zero. Its answer is judged here and not by itself: the natural map of the
 returned impulses, relative to the data, must be 1e-8 or less, and the velocity right to 1e-6 m/s at every contact.
@@ -255,26 +255,6 @@ def compare(problems: list[Problem], siconos: str | None, ours: Sequence[str] = 
     return results
 
 
-def print_ratios(results: dict[str, dict[str, Run]]) -> None:
-    """Time of the fastest of Siconos' methods over that of `auto` where both solve a problem, and the mean."""
-    ratios = []
-    for name, ours in results["auto"].items():
-        peers = {
-            solver: row[name].seconds
-            for solver, row in results.items()
-            if solver.startswith("Siconos") and row[name].is_solved
-        }
-        if not (peers and ours.is_solved):
-            print(f"{name:44} auto {'solved' if ours.is_solved else 'no'}, Siconos {'solved' if peers else 'no'}")
-            continue
-        best = min(peers, key=lambda solver: peers[solver])
-        ratios.append(peers[best] / ours.seconds)
-        print(f"{name:44} {1e6 * ours.seconds:9.1f} us, {best} {1e6 * peers[best]:9.1f} us: {ratios[-1]:8.2f}")
-    if ratios:
-        mean = np.exp(np.mean(np.log(ratios)))
-        print(f"geometric mean of {len(ratios)} problems: {mean:.2f}; least {min(ratios):.2f}")
-
-
 def short(value: float, digits: int) -> float | None:
     """A number of so many digits; None for infinity, which JSON has not."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
@@ -287,14 +267,7 @@ def main() -> None:
     parser.add_argument("--siconos", default="/usr/bin/python3", help="interpreter that can import siconos")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "comparison")
     parser.add_argument("--only", default="", help="part of the names of the problems to run")
-    parser.add_argument(
-        "--ratios", action="store_true", help="only print auto's speed on the recorded problems beside Siconos' best"
-    )
     arguments = parser.parse_args()
-    if arguments.ratios:
-        problems = [p for p in recorded(arguments.problems) if arguments.only in p.name]
-        print_ratios(compare(problems, arguments.siconos, ("auto",)))
-        return
     if arguments.problems is None:
         print("no folder of recorded problems: the synthetic families only")
     problems = [p for p in recorded(arguments.problems) + synthetic() if arguments.only in p.name]

@@ -1,4 +1,4 @@
-//! Whole behaviour of the laws and solvers of contact: known answers, recorded problems, invariants.
+//! Whole behaviour of laws and solvers of contact: known answers, recorded problems, invariants.
 
 mod known_answers;
 mod laws;

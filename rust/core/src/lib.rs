@@ -16,9 +16,9 @@
 #![doc = include_str!("../examples/drive.rs")]
 //! ```
 //!
-//! The laws and solvers of contact are those of [`friction_contact`], with the chapters `cone`, `law`,
-//! `pool`, `problem`, `quantity`, `scalar` and `solver`; shapes, ground and sand are those of
-//! [`rover_ground`], with the chapters `spatial`, `sand` and `geometry`.
+//! The laws and solvers of contact are those of [`friction_contact`], with the chapters `cone`,
+//! `law`, `pool`, `problem`, `quantity`, `scalar` and `solver`; shapes, ground and sand are those
+//! of [`rover_ground`], with the chapters `spatial`, `sand` and `geometry`.
 //!
 //! Chapters, each using only those above it:
 //!

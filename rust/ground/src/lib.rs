@@ -6,7 +6,7 @@
 //! - [`sand`]: the force of sand on a wheel;
 //! - [`geometry`]: shapes, the ground, distances between them, rays.
 #![forbid(unsafe_code)]
-// Same bits on every machine: sines and their like come from `friction_contact::scalar::elementary`.
+// Same bits on every machine: sines and their like are those of `friction_contact::scalar`.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod geometry;

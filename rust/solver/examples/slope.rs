@@ -4,7 +4,7 @@ use friction_contact::problem::{Dimension, FrictionContactProblem};
 use friction_contact::solver::{SolverOptions, SolverWorkspace, solve};
 
 fn main() {
-    let (half, mu, h) = ([0.2, 0.1, 0.15], [0.3; 4], 0.01); // half edges (m), friction, time step (s)
+    let (half, mu, h) = ([0.2, 0.1, 0.15], [0.3; 4], 0.01); // m, friction, s
     let slope = 25.0_f64.to_radians();
     // Velocity and rate of turning of the box; x down the slope, y out of it.
     let inverse_mass =

@@ -17,7 +17,8 @@
 //! Chapters, each using only those above it:
 //!
 //! - [`quantity`]: admissible numbers of a description; [`scalar`]: one problem or several to a
-//!   register; [`space`]: formulas of the plane and of space; [`pool`]: threads that survive a fork;
+//!   register; [`space`]: formulas of the plane and of space; [`pool`]: threads that survive a
+//!   fork;
 //! - [`cone`], [`law`]: the friction cone and the contact laws, one contact at a time;
 //! - [`problem`]: the problem of all contacts, and how well an answer solves it;
 //! - [`solver`]: the methods.

@@ -24,7 +24,8 @@
 //!
 //! # May use
 //!
-//! [`friction_contact::quantity`], [`friction_contact::scalar`], [`crate::spatial`], [`crate::sand`].
+//! [`friction_contact::quantity`], [`friction_contact::scalar`], [`crate::spatial`],
+//! [`crate::sand`].
 //!
 //! From [`crate::sand`] only the numbers of a soil, which a terrain carries.
 

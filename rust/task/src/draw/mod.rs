@@ -26,8 +26,8 @@
 //!
 //! # May use
 //!
-//! [`rover_core::scalar`], [`rover_core::multibody`], [`rover_core::geometry`], [`rover_core::contact`],
-//! [`rover_core::integrator`], [`rover_core::simulation`].
+//! [`rover_core::scalar`], [`rover_core::multibody`], [`rover_core::geometry`],
+//! [`rover_core::contact`], [`rover_core::integrator`], [`rover_core::simulation`].
 
 pub mod domain;
 pub mod error;

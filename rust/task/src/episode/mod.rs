@@ -35,8 +35,8 @@
 //!
 //! # May use
 //!
-//! [`rover_core::scalar`], [`rover_core::multibody`], [`rover_core::integrator`], [`rover_core::simulation`],
-//! [`crate::draw`].
+//! [`rover_core::scalar`], [`rover_core::multibody`], [`rover_core::integrator`],
+//! [`rover_core::simulation`], [`crate::draw`].
 
 pub mod action;
 pub mod batch;

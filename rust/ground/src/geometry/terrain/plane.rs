@@ -63,8 +63,8 @@ impl Plane {
         Ok(Self { normal, offset })
     }
 
-    /// The plane through the origin that rises by `slope` in the direction `uphill` (about +y from +x),
-    /// both rad.
+    /// The plane through the origin that rises by `slope` in the direction `uphill` (about +y from
+    /// +x), both rad.
     ///
     /// # Errors
     /// `NotFinite` for an angle that is not finite.
