@@ -11,7 +11,7 @@ A page marks a number with the key that says where it is from, and a table with 
 | `least SCENE CURVE` | smallest error of the curve, cm |
 | `rollout ENGINE ROW` | us a step of `rollout.json` |
 | `solved METHOD` | problems of `solver_profiles.json` that a method of contacts solves |
-| `faster WHICH` | Siconos' best time over that of `auto`: `mean`, `least`, of a problem; number of `problems`, `slower` |
+| `faster WHICH` | Siconos' best time over that of `auto`: `mean`, `least`, NAME; how many `problems`, `slower` |
 | `policy SCENE; POLICY` | success in percent of `policies.json` |
 | `cell PAGE; ROW; COLUMN` | first number of a cell of a table that a command writes; ROW: its first cells, by slashes |
 
