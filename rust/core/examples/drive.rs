@@ -1,4 +1,5 @@
 //! Ten seconds of a drive in a curve: where the rover is, and with what force its wheels stand.
+#![allow(clippy::print_stdout)] // its purpose
 use std::error::Error;
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
 //! A box of 1 kg on a slope of 25 degrees with friction 0.3: one time step of 10 ms from rest.
+#![allow(clippy::print_stdout)] // its purpose
 use friction_contact::nalgebra::{SMatrix, SVector, Vector3};
 use friction_contact::problem::{Dimension, FrictionContactProblem};
 use friction_contact::solver::{SolverOptions, SolverWorkspace, solve};

@@ -35,6 +35,7 @@ impl Pool {
     }
 
     /// How many there are; 0 stands for one per core.
+    #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }

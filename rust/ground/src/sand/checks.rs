@@ -3,7 +3,7 @@
 use friction_contact::quantity::{QuantityError, finite};
 
 /// Checks a number against a closed range.
-pub fn in_range(
+pub(crate) fn in_range(
     field: &str,
     value: f64,
     [low, high]: [f64; 2],
@@ -22,7 +22,7 @@ pub fn in_range(
 }
 
 /// Checks that a number is finite and not negative.
-pub fn not_negative(field: &str, value: f64) -> Result<(), QuantityError> {
+pub(crate) fn not_negative(field: &str, value: f64) -> Result<(), QuantityError> {
     if finite(field, value)? < 0.0 {
         return Err(QuantityError::Negative {
             field: field.to_owned(),

@@ -31,7 +31,7 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bekker;
-pub mod checks;
+pub(crate) mod checks;
 pub mod memory;
 pub mod patch;
 pub mod piece;

@@ -1,4 +1,5 @@
 //! Unit quaternions x, y, z, w over lanes.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use friction_contact::scalar::elementary::sin_cos;
 use friction_contact::scalar::{Lane, LaneMask};

@@ -124,7 +124,7 @@ impl<const D: usize> GrainScene<D> {
             .walls
             .iter()
             .map(|wall| length(wall.velocity().as_slice()));
-        let ground = self.ground.as_ref().map_or(0.0, |ground| ground.fastest());
+        let ground = self.ground.as_ref().map_or(0.0, Support::fastest);
         walls.fold(ground, f64::max)
     }
 

@@ -122,7 +122,7 @@ impl PairPoint {
     /// Between a point of the first shape and the one of the second that lies `gap` along n.
     #[inline]
     #[must_use]
-    pub fn from_first(feature: usize, x: &Vector3<f64>, n: &Vector3<f64>, gap: f64) -> Self {
+    pub(crate) fn from_first(feature: usize, x: &Vector3<f64>, n: &Vector3<f64>, gap: f64) -> Self {
         Self {
             feature,
             point: x + n * (0.5 * gap),
@@ -153,7 +153,7 @@ impl PairPoint {
 
 /// Some unit vector perpendicular to a unit vector.
 #[must_use]
-pub fn any_tangent(n: &Vector3<f64>) -> Vector3<f64> {
+pub(crate) fn any_tangent(n: &Vector3<f64>) -> Vector3<f64> {
     let e = if n.x.abs() < 0.9 {
         Vector3::x()
     } else {

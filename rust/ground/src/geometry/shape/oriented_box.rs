@@ -89,7 +89,7 @@ const AWAY: f64 = 0.5;
 /// The sides of a corner along the three axes, 1 or −1.
 #[inline]
 #[must_use]
-pub fn signs(number: usize) -> Vector3<f64> {
+pub(crate) fn signs(number: usize) -> Vector3<f64> {
     let sign = |bit: usize| if number >> bit & 1 == 1 { 1.0 } else { -1.0 };
     Vector3::new(sign(0), sign(1), sign(2))
 }

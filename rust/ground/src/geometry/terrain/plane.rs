@@ -76,6 +76,7 @@ impl Plane {
 
     /// Through a point (world, m) with a unit normal.
     #[inline]
+    #[must_use]
     pub fn through(x: &Vector3<f64>, normal: Vector3<f64>) -> Self {
         let offset = -normal.dot(x);
         Self {

@@ -210,7 +210,7 @@ const SHARP: f64 = 0.2;
 /// A part that comes down flat may turn by 0.07 rad in a step before the second edge of a wall is
 /// missed in it. A share, because a surface that is flat but for the rounding of its heights must
 /// not bear a part with each of its edges.
-pub const BEYOND: f64 = 0.05;
+pub(crate) const BEYOND: f64 = 0.05;
 
 /// Most edges that bound a vertex.
 pub const MAX_SPOKES: usize = 12;

@@ -115,6 +115,7 @@ impl Factored {
 
     /// Numbers of a contact's Z, and whether they are those of all velocities.
     #[inline(always)]
+    #[must_use]
     pub fn shape(&self) -> (usize, bool) {
         (self.pattern.as_deref()).map_or((0, false), |own| (own.stride(), own.is_whole()))
     }
