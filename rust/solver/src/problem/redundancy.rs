@@ -46,7 +46,7 @@ const CONCERNED: f64 = 1e-6;
 
 /// Most contacts of a group whose impulses are settled. Those of a heap, which takes many
 /// factorisations anyway, stay as the solver finds them.
-pub const MOST_SETTLED: usize = 32;
+const MOST_SETTLED: usize = 32;
 
 /// A problem and its answer. `D` entries a contact.
 pub(crate) struct Answered<'a, B: Fn(usize, usize) -> [f64; 9]> {
@@ -686,7 +686,7 @@ fn find_groups(W: &[f64], n: usize, d: usize, groups: &mut Vec<usize>) {
 
 impl Redundancy {
     /// Replaces the impulses of a converged answer with velocities `u` and a relative residual by
-    /// the least ones, group by group of contacts that W couples, each of at most [`MOST_SETTLED`].
+    /// the least ones, group by group of contacts that W couples, each of at most 32.
     ///
     /// `tolerance`: the residual that is asked for. Returns the residual if something has changed;
     /// `u` is then that of the new impulses. What would violate the law by more stays.
