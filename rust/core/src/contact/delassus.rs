@@ -204,7 +204,7 @@ impl ContactSystem {
         self.held.get(c).is_some_and(|held| held[0])
     }
 
-    /// [`Self::assemble`] without W, which is left empty, of contacts at several poses.
+    /// [`Self::assemble`] without W, which stays what it was, of contacts at several poses.
     pub(crate) fn assemble_rows(
         &mut self,
         model: &Model,
@@ -213,7 +213,6 @@ impl ContactSystem {
         v: &[f64],
     ) {
         let n = placed.iter().map(|(_, contacts)| contacts.len()).sum();
-        self.W.clear();
         self.held.clear();
         self.spread.clear();
         self.bodies.clear();

@@ -83,7 +83,7 @@ impl TreeSystem<'_> {
     }
 
     /// Rows of contacts at the end pose, and of touches at that of the middle, as
-    /// [`Contacting::assemble`] builds them. W is left empty.
+    /// [`Contacting::assemble`] builds them. W stays what it was.
     pub(super) fn assemble_rows(&mut self, contacts: &[Contact], touches: &[Contact], v: &[f64]) {
         let parts = &mut *self.parts;
         let placed = [
