@@ -256,7 +256,7 @@ SOURCES := pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f)
 
 # The library and its own tests need nothing of Python, and compile side by side.
 $(STAMPS)/library: $(SOURCES)
-	@$(CARGO) test --workspace --lib --test solver --test schemes --locked --quiet --no-run
+	@$(CARGO) test --workspace --tests --locked --quiet --no-run
 	@mkdir -p $(@D) && touch $@
 
 # The compiled core and the package itself, editable: built for development, or as it is shipped. One takes the place of
