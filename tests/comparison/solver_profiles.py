@@ -20,7 +20,7 @@ import select
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -227,10 +227,10 @@ def draw(profiles: dict[str, dict[str, list[float]]], taus: Array, n_problems: i
     plt.close(figure)
 
 
-def compare(problems: list[Problem], siconos: str | None, ours: Sequence[str] = OURS) -> dict[str, dict[str, Run]]:
+def compare(problems: list[Problem], siconos: str | None) -> dict[str, dict[str, Run]]:
     """Every solver on every problem: solver, then problem."""
     solvers: dict[str, Callable[[Problem, float], tuple[float, int, Array]]] = {
-        name: lambda problem, tolerance, name=name: solve_ours(problem, name, tolerance) for name in ours
+        name: lambda problem, tolerance, name=name: solve_ours(problem, name, tolerance) for name in OURS
     }
     with tempfile.TemporaryDirectory() as folder:
         peer = Siconos(siconos, Path(folder)) if siconos and Siconos.is_installed(siconos) else None

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from .test_circles import PATHS, Crate, Module, crate_of
+from .test_circles import PATHS, USES, Crate, Module, crate_of, imported
 
 RUST = Path(__file__).parents[2] / "rust"
 SOURCES = [RUST / crate / "src" for crate in ("solver", "ground", "core", "task")]  # each uses only those before it
 DOORS = {door.parent.name: door for source in SOURCES for door in source.glob("*/mod.rs")}
-OF_CRATE = r"(?:crate|friction_contact|rover_ground|rover_core)"
+BELOW = ("friction_contact", "rover_ground", "rover_core")
+OF_CRATE = rf"(?:crate|{'|'.join(BELOW)})"
 PARTS = re.compile(r"(?P<here>.+?)\n# One call\n(?P<walk>.+?)\n# May use\n(?P<uses>.+?)(?:\n# |\Z)", re.DOTALL)
 
 
@@ -36,10 +37,19 @@ def order() -> list[str]:
 
 def heads_of(crate: Crate, module: Module) -> set[str]:
     """Chapters that a file names, of its own crate and of those below."""
-    paths = [names.split("::") for names in PATHS.findall(crate.code[module])]
-    own = [*crate.imports[module].values(), *filter(None, (crate.absolute(module, path) for path in paths))]
-    below = re.findall(r"\b(?:friction_contact|rover_ground|rover_core)::(\w+)", crate.code[module])
-    return {target[0] for target in own if target} | set(below)
+    code = crate.code[module]
+    paths = [path for _, listed in USES.findall(code) for _, path in imported(listed)]
+    paths += [names.split("::") for names in PATHS.findall(code)]
+    targets = [path[1:] if path[0] in BELOW else crate.absolute(module, path) for path in paths]
+    return {target[0] for target in targets if target}
+
+
+def test_the_reading_finds_chapters_of_the_crates_below() -> None:
+    text = (
+        "use rover_core::{caught, lanes::{Block, step}}; use crate::draw::Pcg64; fn f() { rover_ground::sand::react() }"
+    )
+    crate = Crate({(): "", ("draw",): "", ("paths",): text})
+    assert heads_of(crate, ("paths",)) == {"caught", "lanes", "draw", "sand"}
 
 
 @pytest.mark.parametrize("chapter", DOORS)
