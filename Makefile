@@ -44,8 +44,7 @@ pytest-quick:
 
 test: ## set up, and run the tests that a change must pass, Rust and Python side by side
 	@$(SIDE_BY_SIDE) $(STAMPS)/library $(STAMPS)/test $(STAMPS)/debian-demo $(STAMPS)/debian-test
-	@$(MAKE) --no-print-directory $(STAMPS)/fmu
-	@$(SIDE_BY_SIDE) test-python test-rust
+	@$(SIDE_BY_SIDE) test-rust test-python
 
 # One part goes on after another has failed; the last lines tell how each ended.
 PARTS = lint types deny docs test-rust test-python torture same-bits train-rllib

@@ -59,7 +59,7 @@ def with_noise(run: RoverRun, seed: int) -> RoverRun:
 @pytest.fixture(scope="module")
 def slipping(tmp_path_factory: pytest.TempPathFactory) -> RoverRun:
     """Wheels that spin and hold again."""
-    return a_run(tmp_path_factory.mktemp("run") / "slipping.h5", lambda t: 120.0 if t % 0.5 > 0.3 else 20.0, 2.0)
+    return a_run(tmp_path_factory.mktemp("run") / "slipping.h5", lambda t: 120.0 if t % 0.5 > 0.3 else 20.0, 1.25)
 
 
 @pytest.fixture(scope="module")

@@ -271,9 +271,12 @@ TRAP: dict[str, Any] = {"observation_noise": 0.01, "friction": (0.5, 0.8), "batt
 
 SINGLE = [*(pytest.param(name, {}, id=name) for name in NAMES), *VARIANTS]
 
-EPISODES = [*SINGLE, pytest.param("RoverTrap-v0", TRAP, id="trap, randomised")]
-
-MANY = [*(pytest.param(name, {}, id=name) for name in NAMES), *VARIANTS]
+#: A trap is set by driving into it, so that of two it is the one where everything is drawn.
+EPISODES = [
+    *(pytest.param(name, {}, id=name) for name in NAMES if name != "RoverTrap-v0"),
+    *VARIANTS,
+    pytest.param("RoverTrap-v0", TRAP, id="trap, randomised"),
+]
 
 LIMIT = 7
 
@@ -356,7 +359,7 @@ def test_a_snapshot_a_pickle_and_a_copy_continue_bit_for_bit(name: str, argument
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, pytest.param(AutoresetMode.SAME_STEP, marks=OTHER_MODE)])
-@pytest.mark.parametrize(("name", "arguments"), MANY)
+@pytest.mark.parametrize(("name", "arguments"), SINGLE)
 def test_the_vector_of_the_core_is_a_sync_vector_bit_for_bit(
     name: str, arguments: dict[str, Any], mode: AutoresetMode
 ) -> None:

@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 FILES = [path for path in tracked_files() if path.is_relative_to(ROOT / "tests")]
 PYTHON = [path for path in FILES if path.suffix == ".py"]
 RUST = [path for path in FILES if path.suffix == ".rs"]
+MARKED = [path for path in PYTHON if re.search(r"mark\.(nightly|takes_long)", path.read_text(encoding="utf-8"))]
 IGNORED = re.compile(r'#\[ignore(?: = "([^"]*)")?\]')
 
 
@@ -23,10 +24,10 @@ def tree_of(path: Path) -> ast.Module:
 
 def marks(tree: ast.AST, name: str) -> Iterator[list[ast.expr]]:
     """Arguments of each use of a marker."""
+    called = {call.func: call.args for call in ast.walk(tree) if isinstance(call, ast.Call)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and node.attr == name and ast.unparse(node.value) == "pytest.mark":
-            calls = [call for call in ast.walk(tree) if isinstance(call, ast.Call) and call.func is node]
-            yield calls[0].args if calls else []
+            yield called.get(node, [])
 
 
 def functions(path: Path) -> dict[str, ast.FunctionDef]:
@@ -57,7 +58,7 @@ def is_a_test_of_make_test(name: str) -> bool:
     return function in found and not any(one.startswith("pytest.mark.nightly") for one in own)
 
 
-@pytest.mark.parametrize("path", PYTHON, ids=lambda path: path.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize("path", MARKED, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_a_nightly_test_names_a_cheaper_one(path: Path) -> None:
     for arguments in marks(tree_of(path), "nightly"):
         assert len(arguments) == 1, "which test of make test fails for the same defect?"

@@ -373,7 +373,7 @@ fn bounce_turn_and_are_pushed(n_commands: usize) {
 
 #[test]
 fn narrower_lanes_give_the_same_bits() {
-    give_the_same_bits(3);
+    give_the_same_bits(2);
 }
 
 /// Ignored because it takes 20 s: `make test-all` runs it, and the test above, which runs always,

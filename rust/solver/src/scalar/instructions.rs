@@ -11,16 +11,13 @@ use thiserror::Error;
 pub enum Single {
     /// Instructions that every machine of this architecture has.
     Baseline,
-    /// AVX2.
+    /// AVX2. Wider registers gain nothing for one rover (within 2% in drives on a plane).
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
-    /// AVX-512.
-    #[cfg(target_arch = "x86_64")]
-    Avx512(Avx512),
 }
 
 impl Single {
-    /// The best of this machine.
+    /// The best of those that this process uses.
     #[must_use]
     pub fn best() -> Self {
         match Instructions::of_this_machine() {
@@ -28,7 +25,7 @@ impl Single {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2(token) => Self::Avx2(token),
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512(token) => Self::Avx512(token),
+            Instructions::Avx512(_) => Level::new().as_avx2().map_or(Self::Baseline, Self::Avx2),
         }
     }
 
@@ -39,8 +36,6 @@ impl Single {
             Self::Baseline => f(),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(token) => token.vectorize(f),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(token) => token.vectorize(f),
         }
     }
 }
