@@ -30,7 +30,7 @@ TINY: dict[str, Any] = {
     "group": 2,
     "imitation": {"rounds": 2, "decisions": 60, "epochs": 1, "batch_size": 32},
     "ppo": {"decisions": 96, "n_steps": 8, "batch_size": 24, "n_epochs": 1, "every": 48},
-    "evaluation": {"scenes": {"easy": {"terrain": "plane"}}, "fields": 2},
+    "evaluation": {"scenes": {"easy": {"terrain": "plane", "battery": 200.0}}, "fields": 2},  # ends soon
 }
 
 TWO_PROCESSES = pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
