@@ -10,8 +10,7 @@ use super::part::{Part, wheel_shape};
 use super::ways_out::{OverSurfaces, TOUCH, WaysOut};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
-    SurfacePoint, box_sphere, disc_sphere, disc_triangle, dispatch, is_lowest, roller_sphere,
-    sphere_sphere,
+    SurfacePoint, box_sphere, disc_triangle, dispatch, is_lowest, roller_sphere, sphere_sphere,
 };
 use crate::geometry::{
     Coverage, Disc, Neighbourhood, PlacedShape, Primitive, Roller, Sphere, SupportMap, Terrain,
@@ -433,8 +432,8 @@ fn touch<S: BodyMotion>(
     half_way: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
     match &placed.shape {
-        PlacedShape::Disc(disc) => touch_of_disc(disc, ground, base, half_way),
-        PlacedShape::Roller(roller) => touch_of_roller(roller, ground, base, half_way),
+        PlacedShape::Disc(disc) => touch_of_wheel(&Roller::thin(*disc), ground, base, half_way),
+        PlacedShape::Roller(roller) => touch_of_wheel(roller, ground, base, half_way),
         PlacedShape::Box(solid) => {
             let middle = solid.R.tr_mul(&(ground.centre - base - solid.centre));
             let (R, r) = machine.end.pose(placed.body);
@@ -487,42 +486,22 @@ fn touch<S: BodyMotion>(
     }
 }
 
-/// Normal from a sphere of the ground to a disc at their first contact in a step, if the disc
-/// passes the sphere. The disc moves by `half_way` (m) in half a step and keeps its midpoint axes
+/// Normal from a sphere of the ground to a wheel at their first contact in a step, if the wheel
+/// passes the sphere. The wheel moves by `half_way` (m) in half a step and keeps its midpoint axes
 /// throughout.
-pub(crate) fn touch_of_disc(
-    disc: &Disc,
+pub(crate) fn touch_of_wheel(
+    wheel: &Roller,
     ground: &Sphere,
     base: &Vector3<f64>,
     half_way: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
-    let middle = ground.centre - base - disc.centre;
+    let middle = ground.centre - base - wheel.core.centre;
     let distance = |x: &Vector3<f64>| {
         let ball = Sphere {
-            centre: x + base + disc.centre,
+            centre: x + wheel.core.centre,
             radius: 0.0,
         };
-        let near = disc_sphere::nearest_point(disc, &ball, base);
-        (near.n, near.gap)
-    };
-    first_touch(distance, &middle, &(middle - half_way), ground.radius)
-}
-
-/// Normal from a sphere of the ground to a wheel with a width at their first contact in a step, if
-/// the wheel passes the sphere; `half_way` as for [`touch_of_disc`].
-pub(crate) fn touch_of_roller(
-    roller: &Roller,
-    ground: &Sphere,
-    base: &Vector3<f64>,
-    half_way: &Vector3<f64>,
-) -> Option<Vector3<f64>> {
-    let middle = ground.centre - base - roller.core.centre;
-    let distance = |x: &Vector3<f64>| {
-        let ball = Sphere {
-            centre: x + base + roller.core.centre,
-            radius: 0.0,
-        };
-        let near = roller_sphere::nearest_point(roller, &ball, base);
+        let near = roller_sphere::nearest_point(wheel, &ball, &Vector3::zeros());
         (near.n, near.gap)
     };
     first_touch(distance, &middle, &(middle - half_way), ground.radius)

@@ -120,8 +120,8 @@ mod tests {
 
     #[test]
     fn the_frame_is_continuous_where_the_rim_turns_into_the_face() {
-        use crate::geometry::query::disc_sphere::nearest_point;
-        use crate::geometry::{Disc, Sphere};
+        use crate::geometry::query::roller_sphere::nearest_point;
+        use crate::geometry::{Disc, Roller, Sphere};
         let axle = Vector3::new(0.3, 0.2, 0.9).normalize();
         let spoke = ContactFrame::of_normal(&axle).t;
         let disc = Disc {
@@ -138,7 +138,7 @@ mod tests {
                     centre,
                     radius: 0.05,
                 };
-                let near = nearest_point(&disc, &ground, &Vector3::zeros());
+                let near = nearest_point(&Roller::thin(disc), &ground, &Vector3::zeros());
                 (
                     near,
                     ContactFrame::on_ground(&PlacedShape::Disc(disc), &near),

@@ -27,11 +27,12 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
-use crate::contact::detection::{touch_of_disc, touch_of_roller};
+use crate::contact::detection::touch_of_wheel;
 use crate::contact::{
     Activation, Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers,
 };
 use crate::geometry::query::disc_plane::{FLAT, rolling, to_lowest};
+use crate::geometry::query::section::Section;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
@@ -42,9 +43,6 @@ use crate::solver::batch::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
 
 /// Number of the plane in every terrain that has one.
 const PLANE: u32 = 0;
-
-/// Lengths below which a direction is not taken from a difference, m.
-const NO_DIRECTION: f64 = 1e-12;
 
 /// A contact, of the same wheel or stop in every lane.
 #[derive(Clone, Copy, Debug)]
@@ -647,12 +645,7 @@ impl<T: Lane> Contacts<T> {
                         };
                         self.used.push(slot);
                         let place = slot - slots.start;
-                        let flat = if self.parts.wheels[w].is_wide() {
-                            self.relocate_wide((slot, place), plane, end, s, centre)
-                        } else {
-                            self.relocate(slot, plane, end, s, centre)
-                        };
-                        rest = rest | flat;
+                        rest = rest | self.relocate((slot, place), plane, end, s, centre);
                     }
                 }
             }
@@ -875,7 +868,7 @@ impl<T: Lane> Contacts<T> {
         reach: T,
     ) -> Stand<T> {
         let wheel = &self.parts.wheels[w];
-        let radius = T::splat(self.token, wheel.radius);
+        let radius = T::splat(self.token, wheel.section.radius);
         let (across, along) = (n.cross(s), n.dot(s));
         let length = across.norm();
         let mut from = centre;
@@ -883,7 +876,7 @@ impl<T: Lane> Contacts<T> {
             from += s * radius.like(wheel.along(circle));
         }
         let height = base + n.dot(from);
-        let rounding = radius.like(wheel.rounding);
+        let rounding = radius.like(wheel.section.rounding);
         let gap = height - radius * length - rounding;
         let twist = &self.twists[wheel.carrier];
         let admitted = sight.activation.admits(
@@ -924,84 +917,31 @@ impl<T: Lane> Contacts<T> {
         let half_way = sight.end.origin_of(wheel.tree) - origin + at_end - centre;
         let motion = half_way.norm();
         let need = reach + motion;
-        let mut fallbacks = ground.look_around_wheel(w, origin + centre, wheel.bound, need);
-        if wheel.is_wide() {
-            return fallbacks | self.look_with_tread(w, ground, sight, (s, centre), half_way);
-        }
-        let radius = T::splat(self.token, wheel.radius);
-        let zero = radius.like(0.0);
+        let mut rest = ground.look_around_wheel(w, origin + centre, wheel.bound, need);
         let twist = self.twists[wheel.carrier];
+        let (section, spoke, slots) = (wheel.section, wheel.spoke, wheel.slots.clone());
+        let pose = &sight.middle.bodies[wheel.body];
+        let spoke = || pose.R.times_shared(spoke);
         for sphere in ground.near_wheel(w) {
             let offset = sphere.centre - origin - centre;
-            let along = offset.dot(s);
-            let in_plane = offset - s * along;
-            let in_plane_length = in_plane.norm();
-            let beyond = (in_plane_length - radius).max(zero);
-            let distance = (along * along + beyond * beyond).sqrt();
-            let gap = distance - sphere.radius;
-            let is_deep = (gap - motion).lt(-(radius.like(DEEP) * sphere.radius));
+            let gap = section.distance(s, offset) - sphere.radius;
+            let is_deep = (gap - motion).lt(-(motion.like(DEEP) * sphere.radius));
             if is_deep.any() {
-                let passes = self.passing(w, is_deep, sphere, sight, half_way);
-                fallbacks = fallbacks | passes;
+                rest = rest | self.passing(w, is_deep, sphere, sight, half_way);
             }
             let admitted = sight.activation.admits(
                 gap,
                 #[inline(always)]
                 || {
-                    let to_point = in_plane * (in_plane_length.min(radius) / in_plane_length);
-                    let n = (to_point - offset) * (radius.like(1.0) / distance);
-                    n.dot(twist.linear + twist.angular.cross(centre + to_point))
+                    let near = section.nearest(s, offset, spoke);
+                    near.n.dot(twist.velocity(centre + near.point))
                 },
             );
             if admitted.any() {
-                // Normal or rolling direction are not defined by differences.
-                let least = radius.like(NO_DIRECTION);
-                fallbacks =
-                    fallbacks | (admitted & (in_plane_length.le(least) | distance.le(least)));
-                let slots = self.parts.wheels[w].slots.clone();
-                fallbacks = fallbacks | self.enter(slots, admitted, sphere);
+                rest = rest | self.enter(slots.clone(), admitted, sphere);
             }
         }
-        fallbacks
-    }
-
-    /// Adds the contacts with spheres, at the midpoint, of a wheel that has a width, with the axle
-    /// `s` and the centre `centre` there. `half_way`: motion of the centre to the end of the step,
-    /// m. Returns where contacts must be found lane by lane.
-    #[inline(always)]
-    fn look_with_tread(
-        &mut self,
-        w: usize,
-        ground: &Ground<T>,
-        sight: &Sight<'_, T>,
-        (s, centre): (Vec3<T>, Vec3<T>),
-        half_way: Vec3<T>,
-    ) -> T::Mask {
-        let motion = half_way.norm();
-        let wheel = &self.parts.wheels[w];
-        let twist = self.twists[wheel.carrier];
-        let origin = sight.middle.origin_of(wheel.tree);
-        let slots = wheel.slots.clone();
-        let mut fallbacks = T::mask(self.token, 0);
-        for sphere in ground.near_wheel(w) {
-            let offset = sphere.centre - origin - centre;
-            let near = self.parts.wheels[w].nearest(s, offset);
-            let gap = near.distance - sphere.radius;
-            let is_deep = (gap - motion).lt(-(motion.like(DEEP) * sphere.radius));
-            if is_deep.any() {
-                fallbacks = fallbacks | self.passing(w, is_deep, sphere, sight, half_way);
-            }
-            let admitted = sight.activation.admits(
-                gap,
-                #[inline(always)]
-                || near.n.dot(twist.velocity(centre + near.point)),
-            );
-            if admitted.any() {
-                fallbacks = fallbacks | (admitted & near.undefined);
-                fallbacks = fallbacks | self.enter(slots.clone(), admitted, sphere);
-            }
-        }
-        fallbacks
+        rest
     }
 
     /// Enters a contact with a sphere into the first free one of some slots. Returns where none is.
@@ -1047,28 +987,27 @@ impl<T: Lane> Contacts<T> {
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            let disc = Disc {
-                centre: centre.get(lane).into(),
-                axle: s.get(lane).into(),
-                spoke: spoke.get(lane).into(),
-                radius: wheel.radius,
+            let Section {
+                radius,
+                half,
+                rounding,
+            } = wheel.section;
+            let own = Roller {
+                core: Disc {
+                    centre: centre.get(lane).into(),
+                    axle: s.get(lane).into(),
+                    spoke: spoke.get(lane).into(),
+                    radius,
+                },
+                half,
+                rounding,
             };
             let ball = Sphere {
                 centre: sphere.centre.get(lane).into(),
                 radius: sphere.radius.get(lane),
             };
             let base = Vector3::from(sight.middle.origin_of(wheel.tree).get(lane));
-            let half_way = Vector3::from(half_way.get(lane));
-            let touch = if wheel.is_wide() {
-                let roller = Roller {
-                    core: disc,
-                    half: wheel.half,
-                    rounding: wheel.rounding,
-                };
-                touch_of_roller(&roller, &ball, &base, &half_way)
-            } else {
-                touch_of_disc(&disc, &ball, &base, &half_way)
-            };
+            let touch = touch_of_wheel(&own, &ball, &base, &half_way.get(lane).into());
             if touch.is_some() {
                 passes |= 1 << lane;
             }
@@ -1078,65 +1017,10 @@ impl<T: Lane> Contacts<T> {
 
     /// Evaluates a slot at the end of the step, where the wheel has the axle `s` and the centre
     /// `centre`, and the origin of its tree the given height (m) over the plane of the given normal
-    /// under the wheel. Returns where a frame is not defined.
+    /// under the wheel. `place`: number of the slot among the wheel's. Returns where a frame is not
+    /// defined.
     #[inline(always)]
     fn relocate(
-        &mut self,
-        slot: usize,
-        (n, height): (Vec3<T>, T),
-        end: &Poses<T>,
-        s: Vec3<T>,
-        centre: Vec3<T>,
-    ) -> T::Mask {
-        let wheel = &self.parts.wheels[self.part_of[slot]];
-        let slot = &mut self.slots[slot];
-        let radius = T::splat(self.token, wheel.radius);
-        let flat = radius.like(FLAT);
-        let mut undefined = T::mask(self.token, 0);
-        if (slot.active & !slot.on_sphere).any() {
-            let (t, length) = rolling(n, s);
-            slot.n = n;
-            slot.t = t;
-            slot.point = centre + to_lowest(t, s, radius);
-            slot.gap = height + n.dot(centre) - radius * length;
-            undefined = slot.active & !slot.on_sphere & length.le(flat);
-        }
-        if slot.on_sphere.any() {
-            let sphere = &slot.sphere;
-            let offset = sphere.centre - end.origin_of(wheel.tree) - centre;
-            let in_plane = offset - s * offset.dot(s);
-            let length = in_plane.norm();
-            let outward = in_plane * (radius.like(1.0) / length);
-            let to_point = outward * length.min(radius);
-            let from_sphere = to_point - offset;
-            let distance = from_sphere.norm();
-            let n = from_sphere * (radius.like(1.0) / distance);
-            let across = n.cross(s);
-            let across_length = across.norm();
-            let rolls = across_length.gt(flat);
-            let mut t = across * (radius.like(1.0) / across_length);
-            if (slot.on_sphere & !rolls).any() {
-                // The face touches: along the rim.
-                let rim = s.cross(outward);
-                let rim = rim - n * n.dot(rim);
-                t = Vec3::select(rolls, t, rim * (radius.like(1.0) / rim.norm()));
-            }
-            let here = slot.on_sphere;
-            let least = radius.like(NO_DIRECTION);
-            undefined = undefined | (here & (length.le(least) | distance.le(least)));
-            slot.n = Vec3::select(here, n, slot.n);
-            slot.t = Vec3::select(here, t, slot.t);
-            slot.point = Vec3::select(here, centre + to_point, slot.point);
-            slot.gap = T::select(here, distance - sphere.radius, slot.gap);
-        }
-        slot.finish_frame(wheel.rollers, wheel.across);
-        undefined
-    }
-
-    /// Evaluates a slot of a wheel with a width at the end of the step, with the arguments and the
-    /// result of [`Self::relocate`]. `place`: number of the slot among the wheel's.
-    #[inline(always)]
-    fn relocate_wide(
         &mut self,
         (slot, place): (usize, usize),
         (n, height): (Vec3<T>, T),
@@ -1146,23 +1030,32 @@ impl<T: Lane> Contacts<T> {
     ) -> T::Mask {
         let wheel = &self.parts.wheels[self.part_of[slot]];
         let slot = &mut self.slots[slot];
-        let radius = T::splat(self.token, wheel.radius);
-        let (one, rounding) = (radius.like(1.0), radius.like(wheel.rounding));
-        let flat = radius.like(FLAT);
-        let on_plane = slot.active & !slot.on_sphere;
+        let radius = T::splat(self.token, wheel.section.radius);
+        let (one, flat) = (radius.like(1.0), radius.like(FLAT));
+        let here = slot.on_sphere;
+        let on_plane = slot.active & !here;
         let mut undefined = T::mask(self.token, 0);
         if on_plane.any() {
             let (t, length) = rolling(n, s);
-            let circle = centre + s * radius.like(wheel.along(place));
+            let mut circle = centre;
+            if wheel.is_wide() {
+                circle += s * radius.like(wheel.along(place));
+            }
             slot.n = n;
             slot.t = t;
-            slot.point = circle + to_lowest(t, s, radius) - n * rounding;
-            slot.gap = height + n.dot(circle) - radius * length - rounding;
+            slot.point = circle + to_lowest(t, s, radius);
+            slot.gap = height + n.dot(circle) - radius * length;
+            if wheel.is_wide() {
+                let rounding = radius.like(wheel.section.rounding);
+                slot.point -= n * rounding;
+                slot.gap -= rounding;
+            }
             undefined = on_plane & length.le(flat);
         }
-        if slot.on_sphere.any() {
-            let here = slot.on_sphere;
-            let near = wheel.nearest(s, slot.sphere.centre - end.origin_of(wheel.tree) - centre);
+        if here.any() {
+            let offset = slot.sphere.centre - end.origin_of(wheel.tree) - centre;
+            let spoke = || end.bodies[wheel.body].R.times_shared(wheel.spoke);
+            let near = wheel.section.nearest(s, offset, spoke);
             let across = near.n.cross(s);
             let length = across.norm();
             let rolls = length.gt(flat);
@@ -1173,7 +1066,6 @@ impl<T: Lane> Contacts<T> {
                 let rim = rim - near.n * near.n.dot(rim);
                 t = Vec3::select(rolls, t, rim * (one / rim.norm()));
             }
-            undefined = undefined | (here & near.undefined);
             slot.n = Vec3::select(here, near.n, slot.n);
             slot.t = Vec3::select(here, t, slot.t);
             slot.point = Vec3::select(here, centre + near.point, slot.point);

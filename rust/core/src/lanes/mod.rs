@@ -9,8 +9,8 @@
 //!
 //! - [`machine`]: what the rovers of a block share; `parts`: its wheels, boxes and balls;
 //!   [`lane_rover`]: what a block reads of a rover;
-//! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `wide_wheel`,
-//!   `joint_slots`: contacts of all lanes at once; `lane_detection`, `by_lane`, `free_slots`: of
+//! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `joint_slots`:
+//!   contacts of all lanes at once; `lane_detection`, `by_lane`, `free_slots`: of
 //!   one lane; [`contacts`]: all of them, in slots;
 //! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
 //! - `clusters`: which trees have a problem of their own; `sweeps`: where a contact that touches is
@@ -65,5 +65,4 @@ mod rolling;
 pub mod rows;
 pub mod step;
 mod sweeps;
-mod wide_wheel;
 pub mod yielding;

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 use super::machine::Machine;
 use crate::contact::Part;
+use crate::geometry::query::section::Section;
 use crate::multibody::JointAxis;
 use crate::multibody::joint::{Joint, JointModel, Revolute};
 use crate::multibody::mechanism::{BASE, Link, Mover};
@@ -37,12 +38,7 @@ pub(super) struct Wheel {
     centre: Option<[f64; 3]>,
     axle: Axle,
     pub spoke: [f64; 3],
-    /// Radius of the wheel's circles, m.
-    pub radius: f64,
-    /// Distance of its circles from the middle, m; 0 if it has one.
-    pub half: f64,
-    /// Rounding of its edges, m.
-    pub rounding: f64,
+    pub section: Section,
     /// Whether the wheel yields where it touches.
     pub is_soft: bool,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
@@ -127,9 +123,11 @@ impl Parts {
                     centre: some(wheel.centre),
                     axle,
                     spoke: wheel.spoke,
-                    radius: wheel.radius - wheel.rounding,
-                    half: wheel.half,
-                    rounding: wheel.rounding,
+                    section: Section {
+                        radius: wheel.radius - wheel.rounding,
+                        half: wheel.half,
+                        rounding: wheel.rounding,
+                    },
                     is_soft: wheel.tread.is_some(),
                     rollers: wheel.rollers,
                     across: wheel.across,
@@ -223,13 +221,23 @@ impl Wheel {
     /// Whether the wheel has a width.
     #[inline(always)]
     pub(super) fn is_wide(&self) -> bool {
-        self.half > 0.0 || self.rounding > 0.0
+        self.section.half > 0.0 || self.section.rounding > 0.0
+    }
+
+    /// Place of a circle along the axle, m.
+    #[inline(always)]
+    pub(super) fn along(&self, circle: usize) -> f64 {
+        if circle == 0 {
+            self.section.half
+        } else {
+            -self.section.half
+        }
     }
 
     /// Number of its circles.
     #[inline(always)]
     pub(super) fn n_circles(&self) -> usize {
-        if self.half > 0.0 { 2 } else { 1 }
+        if self.section.half > 0.0 { 2 } else { 1 }
     }
 
     /// Centre relative to the origin of its tree, m.

@@ -21,7 +21,7 @@ impl<T: Lane> Contacts<T> {
     ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
         let origin = sight.middle.origin_of(wheel.tree);
-        let (radius, first) = (wheel.radius, wheel.slots.start);
+        let (radius, first) = (wheel.section.radius, wheel.slots.start);
         let rim = Rim {
             centre: origin + centre,
             axle: s,

@@ -23,9 +23,9 @@ use nalgebra::Vector3;
 use super::chord::{self, LIES};
 use super::crossing::crossing;
 use super::disc_plane::{rim_point_over, rim_points};
-use super::{CHORD, NEAREST, SurfacePoint, disc_sphere};
+use super::{CHORD, NEAREST, SurfacePoint, roller_sphere};
 use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
-use crate::geometry::{Disc, Sphere};
+use crate::geometry::{Disc, Roller};
 
 /// Sine of the angle between a disc and an edge up to which the ends of the chord are the only
 /// points. The lower one is then the point of the normal that separates most but for half the
@@ -202,12 +202,8 @@ fn between(disc: &Disc, edge: &Edge, start: &Vector3<f64>, whole: &Bracket) -> S
 #[inline]
 #[must_use]
 pub fn nearest_at_vertex(disc: &Disc, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
-    let point = Sphere {
-        centre: vertex.place,
-        radius: 0.0,
-    };
-    let near = disc_sphere::nearest_point(disc, &point, base);
     let offset = vertex.place - base - disc.centre;
+    let near = roller_sphere::nearest_to(&Roller::thin(*disc), &offset);
     let abreast = offset - disc.axle * offset.dot(&disc.axle);
     let is_on_face = abreast.norm_squared() < disc.radius * disc.radius;
     let mut sides = [disc.axle, -disc.axle].into_iter();

@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 
 use super::{
     NEAREST, PairPoint, SurfacePoint, box_plane, box_sphere, box_triangle, convex, disc_disc,
-    disc_plane, disc_sphere, disc_triangle, ellipsoid_plane, ellipsoid_sphere, ellipsoid_triangle,
-    hull_plane, hull_sphere, hull_triangle, roller_plane, roller_sphere, roller_triangle,
-    sphere_plane, sphere_sphere, sphere_triangle,
+    disc_plane, disc_triangle, ellipsoid_plane, ellipsoid_sphere, ellipsoid_triangle, hull_plane,
+    hull_sphere, hull_triangle, roller_plane, roller_sphere, roller_triangle, sphere_plane,
+    sphere_sphere, sphere_triangle,
 };
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{PlacedShape, Plane, Roller, Sphere};
@@ -94,7 +94,7 @@ pub fn point_on_sphere(
     base: &Vector3<f64>,
 ) -> SurfacePoint {
     match shape {
-        PlacedShape::Disc(disc) => disc_sphere::nearest_point(disc, ground, base),
+        PlacedShape::Disc(disc) => roller_sphere::nearest_point(&Roller::thin(*disc), ground, base),
         PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_sphere::nearest_point(roller, ground, base)
         }
@@ -252,7 +252,9 @@ pub fn point_over_tangent(
     touch: &Vector3<f64>,
 ) -> SurfacePoint {
     match shape {
-        PlacedShape::Disc(disc) => disc_sphere::point_over_tangent(disc, n, touch),
+        PlacedShape::Disc(disc) => {
+            roller_sphere::point_over_tangent(&Roller::thin(*disc), n, touch)
+        }
         PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_sphere::point_over_tangent(roller, n, touch)
         }
@@ -293,7 +295,7 @@ pub fn nearest_points(first: &PlacedShape<'_>, second: &PlacedShape<'_>) -> Pair
 /// Nearest points of a shape and a ball; n from the shape to the ball.
 fn nearest_to_ball(shape: &PlacedShape<'_>, ball: &Sphere) -> PairPoint {
     match shape {
-        PlacedShape::Disc(disc) => disc_sphere::nearest_points(disc, ball),
+        PlacedShape::Disc(disc) => roller_sphere::nearest_points(&Roller::thin(*disc), ball),
         PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
             roller_sphere::nearest_points(roller, ball)
         }

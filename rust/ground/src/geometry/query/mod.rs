@@ -2,7 +2,7 @@
 //!
 //! | | plane | sphere of the ground | triangles | disc | box | sphere |
 //! |---|---|---|---|---|---|---|
-//! | disc | [`disc_plane`] | [`disc_sphere`] | [`disc_triangle`] | [`disc_disc`] | [`disc_box`] | [`disc_sphere`] |
+//! | disc | [`disc_plane`] | [`roller_sphere`] | [`disc_triangle`] | [`disc_disc`] | [`disc_box`] | [`roller_sphere`] |
 //! | wheel with a width | [`roller_plane`] | [`roller_sphere`] | [`roller_triangle`] | as a disc | as a disc | [`roller_sphere`] |
 //! | box | [`box_plane`] | [`box_sphere`] | [`box_triangle`] | | [`box_box`] | [`box_sphere`] |
 //! | sphere | [`sphere_plane`] | [`sphere_sphere`] | [`sphere_triangle`] | | | [`sphere_sphere`] |
@@ -33,7 +33,6 @@ mod crossing;
 pub mod disc_box;
 pub mod disc_disc;
 pub mod disc_plane;
-pub mod disc_sphere;
 pub mod disc_triangle;
 pub mod dispatch;
 pub mod ellipsoid_plane;
@@ -47,6 +46,7 @@ pub mod pairs;
 pub mod roller_plane;
 pub mod roller_sphere;
 pub mod roller_triangle;
+pub mod section;
 pub mod sphere_plane;
 pub mod sphere_sphere;
 pub mod sphere_triangle;

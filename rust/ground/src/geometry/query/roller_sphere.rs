@@ -1,25 +1,15 @@
-//! Wheel with a width on a sphere: the point of the wheel nearest to the sphere's centre.
+//! Wheel on a sphere: the point of the wheel nearest to the sphere's centre, by [`super::section`].
 //!
-//! In the half-plane through the axle and the sphere's centre a the wheel is a rectangle, from −h
-//! to h along the axle and up to the circles' radius away from it, rounded by ρ. With the point E
-//! of the rectangle nearest to a, at the distance d (negative inside),
-//!
-//! ```text
-//! gap = d − ρ − r_s,   n = unit(E − a) (inside unit(a − E)),   point = E − ρ n
-//! ```
-//!
-//! E is the sphere's centre clamped to the rectangle: over the tread it keeps its place along the
-//! axle, over a side face its distance from the axle, and else it is on a circle. Inside it is on
-//! the nearest of tread and sides. The nearest point minimises over the wheel, so the gap's
-//! gradient is nᵀ times the Jacobian of the *material* point.
+//! With a sphere of radius r_s the gap is the distance of its centre from the wheel, less r_s. The
+//! nearest point minimises over the wheel, so the gap's gradient is nᵀ times the Jacobian of the
+//! *material* point (envelope theorem). A disc is a wheel without width.
 
 use nalgebra::Vector3;
 
+use super::section::{NO_DIRECTION, Section};
 use super::{NEAREST, PairPoint, SurfacePoint};
 use crate::geometry::{Roller, Sphere};
-
-/// Lengths below which a direction is not taken from a difference, m.
-const NO_DIRECTION: f64 = 1e-12;
+use friction_contact::scalar::Vec3;
 
 /// Sine of the angle to the axle or to the tread below which a normal is taken to be along it, for
 /// a wheel that passes a sphere. It turns by less in a step that is long enough for that.
@@ -34,8 +24,8 @@ enum Side {
     Far,
 }
 
-/// A place relative to a wheel.
-pub(super) struct Seen<'a> {
+/// A place in a wheel.
+struct Seen<'a> {
     roller: &'a Roller,
     /// Unit, from the axle to the place.
     outward: Vector3<f64>,
@@ -47,8 +37,7 @@ pub(super) struct Seen<'a> {
 
 impl<'a> Seen<'a> {
     /// A place given from the wheel's centre, m.
-    #[inline]
-    pub(super) fn at(roller: &'a Roller, offset: &Vector3<f64>) -> Self {
+    fn at(roller: &'a Roller, offset: &Vector3<f64>) -> Self {
         let s = &roller.core.axle;
         let along = offset.dot(s);
         let across = offset - s * along;
@@ -67,7 +56,6 @@ impl<'a> Seen<'a> {
     }
 
     /// Depth under a side, m; negative beyond it.
-    #[inline]
     fn depth(&self, side: Side) -> f64 {
         match side {
             Side::Tread => self.roller.core.radius - self.away,
@@ -76,39 +64,8 @@ impl<'a> Seen<'a> {
         }
     }
 
-    /// Whether the place is in the wheel's rectangle, without its rounding.
-    #[inline]
-    fn is_inside(&self) -> bool {
-        self.depth(Side::Tread) > 0.0 && self.depth(Side::Near) > 0.0
-    }
-
-    /// The wheel's nearest point; for a place that is inside, the one on the nearer side.
-    #[inline]
-    pub(super) fn nearest(&self) -> SurfacePoint {
-        if self.is_inside() {
-            let is_tread = self.depth(Side::Tread) <= self.depth(Side::Near);
-            return self.through(if is_tread { Side::Tread } else { Side::Near });
-        }
-        let Roller { core, half, .. } = self.roller;
-        let out = self.away.min(core.radius);
-        let along = self.along.clamp(-half, *half);
-        let inward = self.outward * (out - self.away) + core.axle * (along - self.along);
-        let distance = inward.norm();
-        // On a face it pushes along the axle, on the edge itself back, and not over.
-        let n = if distance > NO_DIRECTION {
-            inward / distance
-        } else if self.away < core.radius {
-            core.axle * -1.0_f64.copysign(self.along)
-        } else {
-            -self.outward
-        };
-        self.point([out, along], n, distance)
-    }
-
-    /// The wheel's point for a place that is in the wheel, on the nearest side through which it may
-    /// leave along the normal; if there is none, the nearest.
-    #[cold]
-    pub(super) fn nearest_open(&self, is_open: impl Fn(&Vector3<f64>) -> bool) -> SurfacePoint {
+    /// The wheel's point on the nearest side through which the place may leave along the normal.
+    fn nearest_open(&self, is_open: impl Fn(&Vector3<f64>) -> bool) -> Option<SurfacePoint> {
         // Abreast of the faces, and under the tread.
         let (beside, under) = (self.depth(Side::Tread), self.depth(Side::Near));
         let sides = [
@@ -121,11 +78,9 @@ impl<'a> Seen<'a> {
             .map(|(side, _)| self.through(side))
             .filter(|point| is_open(&point.n));
         open.max_by(|a, b| a.gap.total_cmp(&b.gap))
-            .unwrap_or_else(|| self.nearest())
     }
 
     /// The wheel's point on one of its sides.
-    #[inline]
     fn through(&self, side: Side) -> SurfacePoint {
         let Roller { core, half, .. } = self.roller;
         let depth = self.depth(side);
@@ -144,7 +99,6 @@ impl<'a> Seen<'a> {
     }
 
     /// The wheel's point for one of the rectangle, `distance` (m) away along n.
-    #[inline]
     fn point(&self, [out, along]: [f64; 2], n: Vector3<f64>, distance: f64) -> SurfacePoint {
         let Roller { core, rounding, .. } = self.roller;
         let of_core = core.centre + self.outward * out + core.axle * along;
@@ -160,11 +114,41 @@ impl<'a> Seen<'a> {
     }
 }
 
+/// The point nearest to a place, which is given from the wheel's centre, m.
+#[inline]
+pub(super) fn nearest_to(roller: &Roller, offset: &Vector3<f64>) -> SurfacePoint {
+    let core = &roller.core;
+    let near = Section::of(roller).nearest(Vec3::from(core.axle), Vec3::from(*offset), || {
+        Vec3::from(core.spoke)
+    });
+    SurfacePoint {
+        feature: NEAREST,
+        point: core.centre + Vector3::from(near.point),
+        n: near.n.into(),
+        // On a side face n is along the axle; t is then the rim's direction, its limit where the
+        // rim meets the face.
+        rolling: core.axle.cross(&near.outward.into()),
+        gap: near.distance,
+    }
+}
+
+/// The point for a place that is in the wheel, on the nearest side through which it may leave along
+/// the normal; if there is none, the nearest.
+#[cold]
+pub(super) fn nearest_open(
+    roller: &Roller,
+    offset: &Vector3<f64>,
+    is_open: impl Fn(&Vector3<f64>) -> bool,
+) -> SurfacePoint {
+    let open = Seen::at(roller, offset).nearest_open(is_open);
+    open.unwrap_or_else(|| nearest_to(roller, offset))
+}
+
 /// Nearest point of the wheel to a sphere; `base` as in [`super::dispatch`].
 #[inline]
 #[must_use]
 pub fn nearest_point(roller: &Roller, sphere: &Sphere, base: &Vector3<f64>) -> SurfacePoint {
-    let near = Seen::at(roller, &(sphere.centre - base - roller.core.centre)).nearest();
+    let near = nearest_to(roller, &(sphere.centre - base - roller.core.centre));
     SurfacePoint {
         gap: near.gap - sphere.radius,
         ..near
@@ -216,5 +200,71 @@ pub fn point_over_tangent(roller: &Roller, n: &Vector3<f64>, touch: &Vector3<f64
         n: *n,
         rolling: core.spoke,
         gap: n.dot(&(reach - offset)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Disc;
+    use proptest::prelude::*;
+
+    fn unit(a: f64, b: f64) -> Vector3<f64> {
+        Vector3::new(a.cos() * b.cos(), b.sin(), a.sin() * b.cos())
+    }
+
+    fn wheel(a: f64, b: f64) -> Disc {
+        let axle = unit(a, b);
+        Disc {
+            centre: Vector3::new(0.3, 0.1, -0.2),
+            axle,
+            spoke: crate::geometry::query::any_tangent(&axle),
+            radius: 0.3,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_point_of_the_disc_is_nearer(
+            a in -3.0..3.0, b in -1.5..1.5,
+            place in prop::array::uniform3(-0.6..0.6), phi in 0.0..std::f64::consts::TAU, share in 0.0..1.0,
+        ) {
+            let wheel = wheel(a, b);
+            let base = Vector3::new(1.0, 2.0, 3.0);
+            let sphere = Sphere { centre: base + wheel.centre + Vector3::from(place), radius: 0.05 };
+            let near = nearest_point(&Roller::thin(wheel), &sphere, &base);
+            let E = near.point - wheel.centre;
+            prop_assert!(E.norm() <= wheel.radius + 1e-12 && E.dot(&wheel.axle).abs() < 1e-12);
+            prop_assert!((sphere.distance(&(base + near.point)) - near.gap).abs() < 1e-12);
+            let outward = near.point + base - sphere.centre;
+            prop_assert!((outward - near.n * (near.gap + sphere.radius)).norm() < 1e-12);
+            let side = wheel.axle.cross(&wheel.spoke);
+            let other = (wheel.spoke * f64::cos(phi) + side * f64::sin(phi)) * (wheel.radius * share);
+            prop_assert!(near.gap <= sphere.distance(&(base + wheel.centre + other)) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn degenerate_positions_have_normals() {
+        let wheel = wheel(0.3, 0.2);
+        let rim = wheel.spoke * wheel.radius;
+        let places = [
+            Vector3::zeros(),     // a = b0 = c
+            wheel.axle * 0.1,     // b0 = c
+            wheel.axle * -1e-300, // b0 = c, barely beside
+            rim * 0.5,            // E = a on the face
+            rim,                  // E = a on the rim
+            rim * 0.5 + wheel.axle * 1e-13,
+        ];
+        for place in places {
+            let sphere = Sphere {
+                centre: wheel.centre + place,
+                radius: 0.05,
+            };
+            let near = nearest_point(&Roller::thin(wheel), &sphere, &Vector3::zeros());
+            assert!((near.n.norm() - 1.0).abs() < 1e-12);
+            assert!(near.gap.is_finite() && near.point.iter().all(|x| x.is_finite()));
+            assert!(near.gap >= -0.05 - 1e-15);
+        }
     }
 }

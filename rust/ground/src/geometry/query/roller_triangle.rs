@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use super::CIRCLE;
 use super::roller_plane::{rim_points, swept};
-use super::roller_sphere::Seen;
+use super::roller_sphere::{nearest_open, nearest_to};
 use super::{SurfacePoint, disc_triangle, is_lowest, sphere_triangle};
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{Roller, Sphere};
@@ -164,10 +164,10 @@ fn on_tread(roller: &Roller, edge: &Edge, base: &Vector3<f64>) -> Option<(Surfac
 #[inline]
 #[must_use]
 pub fn nearest_at_vertex(roller: &Roller, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
-    let seen = Seen::at(roller, &(vertex.place - base - roller.core.centre));
-    let near = seen.nearest();
+    let offset = vertex.place - base - roller.core.centre;
+    let near = nearest_to(roller, &offset);
     if near.gap < 0.0 && !vertex.bears(&near.n) {
-        return seen.nearest_open(|n| vertex.bears(n));
+        return nearest_open(roller, &offset, |n| vertex.bears(n));
     }
     near
 }

@@ -35,6 +35,17 @@ impl Roller {
         }
     }
 
+    /// A disc as a wheel without width.
+    #[inline]
+    #[must_use]
+    pub fn thin(disc: Disc) -> Self {
+        Self {
+            core: disc,
+            half: 0.0,
+            rounding: 0.0,
+        }
+    }
+
     /// R, m.
     #[inline]
     #[must_use]
