@@ -67,7 +67,7 @@ fn machine(
 fn machines() -> Vec<(&'static str, ModelDescription)> {
     let mut soft = ModelDescription::rover();
     for wheel in &mut soft.wheels {
-        (wheel.stiffness, wheel.damping) = (Some(2e6), Some(2e4));
+        (wheel.stiffness, wheel.damping) = (Some(2e5), Some(2e4));
     }
     vec![
         ("nothing", ModelDescription::rover()),

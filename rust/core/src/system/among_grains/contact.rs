@@ -24,6 +24,11 @@ impl GrainTouch {
     pub fn grain(&self) -> u32 {
         self.key.b
     }
+
+    /// The grain, and how high above its surface the part's point is, m.
+    pub(super) fn pushed(&self) -> (u32, f64) {
+        (self.grain(), self.gap_start)
+    }
 }
 
 /// A contact of a step.

@@ -11,10 +11,11 @@
 //!
 //! The law of a touch is that of the grains ([`super::grains`]): frames are those of the start of
 //! the step, and a pair may close by its gap. Both sides are pushed at the same point, that of the
-//! grain's surface, so the impulses conserve linear and angular momentum. With touches, all
-//! contacts of a step are one problem, solved on the bodies' velocities
-//! ([`crate::problem::BodyPairs`]): forces go both ways within the step. Without, each side is
-//! solved by its own method and moves as it would alone.
+//! part's surface, so the impulses conserve linear and angular momentum, and a wheel that yields
+//! rolls on its own radius, as it does on other ground. With touches, all contacts of a step are
+//! one problem, solved on the bodies' velocities ([`crate::problem::BodyPairs`]): forces go both
+//! ways within the step. Without, each side is solved by its own method and moves as it would
+//! alone.
 //!
 //! Decisions about a whole step apply to both: whether to repeat it, and whether the last step's
 //! impulses serve as a forecast. The energy is not audited, as that of grains is not.

@@ -81,9 +81,9 @@ impl TreeAmongGrains<'_> {
     }
 
     /// Subtracts the grains' velocities from those of the touches.
-    fn subtract_rims(&self, touches: &[GrainTouch], v: &[f64], u: &mut [f64]) {
+    fn subtract_points(&self, touches: &[GrainTouch], v: &[f64], u: &mut [f64]) {
         for (touch, u) in touches.iter().zip(u.as_chunks_mut::<3>().0) {
-            (self.bed).subtract_rim(touch.grain(), v, &touch.contact.frame.rows(), u);
+            (self.bed).subtract_point(touch.pushed(), v, &touch.contact.frame.rows(), u);
         }
     }
 
@@ -92,8 +92,8 @@ impl TreeAmongGrains<'_> {
         let (bed, parts, model) = (&self.bed, &*self.parts, self.tree.model);
         let own = parts.of_tree.iter().map(|c| (None, c));
         let touches = parts.touches.iter();
-        let touches = touches.map(|touch| (Some(touch.grain()), &touch.contact));
-        let pair = |(grain, c): (_, &Contact)| bed.pair_with(grain, &c.frame.rows());
+        let touches = touches.map(|touch| (Some(touch.pushed()), &touch.contact));
+        let pair = |(pushed, c): (_, &Contact)| bed.pair_with(pushed, &c.frame.rows());
         pairs.machine.clear();
         pairs.machine.extend(own.chain(touches).map(pair));
         pairs.rows.clear();
@@ -371,7 +371,7 @@ impl Contacting for TreeAmongGrains<'_> {
         (self.tree).assemble_rows(&parts.of_tree, &parts.contacts, v.1);
         u_b.copy_from_slice(&self.tree.parts.system.u);
         let touched = &mut u_b[3 * parts.of_tree.len()..];
-        self.subtract_rims(&self.parts.touches, v.0, touched);
+        self.subtract_points(&self.parts.touches, v.0, touched);
         let mut pairs = std::mem::take(&mut self.bed.parts.pairs);
         self.push_tree(&mut pairs);
         self.bed.parts.pairs = pairs;
@@ -429,7 +429,7 @@ impl Contacting for TreeAmongGrains<'_> {
         let (system, kinematics) = (&tree.parts.system, &tree.parts.kinematics);
         let (touches, touched) = ((first, &parts.contacts[..]), &mut out_b[3 * first..]);
         system.add_local_of_velocity(tree.model, kinematics, touches, v_b, touched);
-        self.subtract_rims(&parts.touches, v_a, touched);
+        self.subtract_points(&parts.touches, v_a, touched);
     }
 
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
@@ -457,7 +457,7 @@ impl Contacting for TreeAmongGrains<'_> {
             *out += own;
         }
         for (touch, p) in parts.touches.iter().zip(parts.touched(p_b)) {
-            (self.bed).push_grain(touch.grain(), &touch.contact.frame.rows(), p, out_a);
+            (self.bed).push_grain(touch.pushed(), &touch.contact.frame.rows(), p, out_a);
         }
     }
 

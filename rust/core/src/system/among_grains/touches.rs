@@ -58,7 +58,7 @@ pub(super) fn find(
                         part,
                         body: part.body(model),
                         other: None,
-                        point: point.on_first(),
+                        point: point.on_second(),
                         frame: ContactFrame::of_pair(&shape, point),
                         gap: point.gap,
                         excess: 0.0,
@@ -105,7 +105,7 @@ fn approach_of(
     } = &touch.contact;
     let own = (tree.parts.kinematics).point_velocity(tree.model, *body, point, v_b);
     let mut u = [frame.n.dot(&own), 0.0, 0.0];
-    bed.subtract_rim(touch.grain(), v_a, &frame.rows(), &mut u);
+    bed.subtract_point(touch.pushed(), v_a, &frame.rows(), &mut u);
     u[0]
 }
 

@@ -158,14 +158,19 @@ impl<const D: usize> GrainSystem<'_, D> {
         self.scene.grains.len()
     }
 
-    /// A pair of nothing that moves, as the machine's side, with a grain, or with none.
+    /// A pair of nothing that moves, as the machine's side, with a grain that is pushed at a point
+    /// `gap` (m) above its surface, or with none.
     pub(in crate::system) fn pair_with(
         &self,
-        grain: Option<u32>,
+        pushed: Option<(u32, f64)>,
         frame: &[SVector<f64, D>; D],
     ) -> RoundPair<D> {
         let nothing = (NOWHERE, 0.0, 0.0);
-        let (at, c, s) = grain.map_or(nothing, |grain| side(self.scene, self.asleep, grain));
+        let (at, c, s) = pushed.map_or(nothing, |(grain, gap)| {
+            let (at, c, s) = side(self.scene, self.asleep, grain);
+            let radius = self.scene.grains.radius()[grain as usize];
+            (at, c, s * ((radius + gap) / radius))
+        });
         RoundPair {
             bodies: [NOWHERE, at],
             frame: frame.map(Into::into),
@@ -175,40 +180,42 @@ impl<const D: usize> GrainSystem<'_, D> {
         }
     }
 
-    /// Subtracts the velocity of a grain's rim that faces along n, in a contact's frame.
-    pub(in crate::system) fn subtract_rim(
+    /// Subtracts the velocity of a grain's point that is `gap` (m) above its surface along n, in a
+    /// contact's frame.
+    pub(in crate::system) fn subtract_point(
         &self,
-        grain: u32,
+        (grain, gap): (u32, f64),
         v: &[f64],
         frame: &[SVector<f64, D>; D],
         u: &mut [f64],
     ) {
         let (i, V) = (grain as usize, body_velocities(D));
-        let radius = self.scene.grains.radius()[i];
+        let arm = self.scene.grains.radius()[i] + gap;
         let mut rim = SVector::zeros();
-        add_rim_velocity(&v[V * i..V * (i + 1)], -radius, &frame[0], -1.0, &mut rim);
+        add_rim_velocity(&v[V * i..V * (i + 1)], -arm, &frame[0], -1.0, &mut rim);
         for (u, direction) in u.iter_mut().zip(frame) {
             *u += direction.dot(&rim);
         }
     }
 
-    /// `out += H p` of one impulse that pushes a grain from the side that n points to.
+    /// `out += H p` of one impulse that pushes a grain at a point `gap` (m) above its surface along
+    /// n.
     pub(in crate::system) fn push_grain(
         &self,
-        grain: u32,
+        (grain, gap): (u32, f64),
         frame: &[SVector<f64, D>; D],
         p: &[f64; D],
         out: &mut [f64],
     ) {
         let (i, V) = (grain as usize, body_velocities(D));
         let out = &mut out[V * i..V * (i + 1)];
-        let radius = self.scene.grains.radius()[i];
+        let arm = self.scene.grains.radius()[i] + gap;
         let turn = moment(frame, p);
         for k in 0..D {
             out[k] -= (0..D).map(|r| frame[r][k] * p[r]).sum::<f64>();
         }
         for k in D..V {
-            out[k] += radius * turn[k - D];
+            out[k] += arm * turn[k - D];
         }
     }
 
