@@ -131,7 +131,8 @@ impl<T: Lane> Gyroscopic<T> {
         }
     }
 
-    /// Solves the system in place of the load, by elimination without exchanges. Notes where a
+    /// Solves the system in place of the load, by elimination without exchanges; the matrix keeps
+    /// the inverses of the pivots. Notes where a
     /// pivot is not positive although the symmetric part of C is there: with a positive definite
     /// symmetric part every pivot is positive.
     ///
@@ -149,13 +150,15 @@ impl<T: Lane> Gyroscopic<T> {
             self.is_lost[cluster] = self.is_lost[cluster] | is_lost;
             let path = mechanism.velocity_path(k);
             let path = &path[..path.len() - 1];
+            let inverse = pivot.like(1.0) / pivot;
+            own[k] = inverse;
             for &j in path {
-                let factor = before[j * n + k] / pivot;
+                let factor = before[j * n + k] * inverse;
                 for &i in path {
                     before[j * n + i] -= factor * own[i];
                 }
             }
-            let factor = b[k] / pivot;
+            let factor = b[k] * inverse;
             for &i in path {
                 b[i] -= factor * own[i];
             }
@@ -166,7 +169,7 @@ impl<T: Lane> Gyroscopic<T> {
             for &j in &path[..path.len() - 1] {
                 rest -= A[j * n + k] * b[j];
             }
-            b[k] = rest / A[k * n + k];
+            b[k] = rest * A[k * n + k];
         }
     }
 }

@@ -44,17 +44,24 @@ impl<T: Lane> Block<T> {
             || self.push_and_drive(is_any, persists),
         );
         self.load_implicitly(is_any);
-        self.weigh(Some(At::Start));
+        if self.is_any_explicit() {
+            self.weigh(Some(At::Start));
+            T::vectorize(
+                token,
+                #[inline(always)]
+                || self.add_torque_and_pushed(is_any),
+            );
+            self.weigh(Some(At::Mean));
+            T::vectorize(
+                token,
+                #[inline(always)]
+                || self.add_torque_and_correction(is_any),
+            );
+        }
         T::vectorize(
             token,
             #[inline(always)]
-            || self.add_torque_and_pushed(is_any),
-        );
-        self.weigh(Some(At::Mean));
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || self.add_torque_and_correction(is_any),
+            || self.finish_load(),
         );
     }
 
@@ -134,6 +141,12 @@ impl<T: Lane> Block<T> {
             *y = *torque - h * *y;
         }
         self.correct_impulse(is_any);
+    }
+
+    /// The contacts' free velocity from the free change of the velocity.
+    #[inline(always)]
+    fn finish_load(&mut self) {
+        let (h, _) = self.time_step();
         self.take_implicit();
         self.close_loops();
         self.rows.local(&self.contacts, &self.y, &mut self.u);

@@ -28,6 +28,13 @@ impl<T: Lane> Block<T> {
         (self.any(&self.is_gyroscopic) & self.going).any()
     }
 
+    /// Whether any group of any rover of the step has explicit gyroscopic terms.
+    #[inline(always)]
+    pub(super) fn is_any_explicit(&self) -> bool {
+        let explicit = self.is_gyroscopic.iter().map(|own| !*own & self.going);
+        explicit.fold(false, |any, own| any | own.any()) || !self.is_any_implicit()
+    }
+
     /// Keeps M̂, which its factor replaces, for implicit gyroscopic terms.
     pub(super) fn keep_mass_matrix(&mut self) {
         if !self.is_any_implicit() {
