@@ -32,6 +32,11 @@ pub(super) struct Touching {
 /// take 3 to 6.
 const MAX_STEPS: usize = 60;
 
+/// Most steps in a row that leave more than nine tenths of the slope. Where no impulses in the
+/// cones cause the motion θ falls for ever, and the slope stays. Of rovers that fell on their side,
+/// 315 searches that found impulses had at most 4 such steps in a row, 181 others 10 to 59.
+const MOST_IDLE: usize = 6;
+
 /// The projection of impulses onto the cones and the plane of equal motion.
 ///
 /// In the coordinates `√w y`, with Q orthonormal null vectors (by rows), `Π = 1 − Qᵀ Q` and y' the
@@ -77,10 +82,10 @@ impl Cones {
         let mut value = self.evaluate(touching, d, n, false);
         std::mem::swap(&mut self.gradient, &mut self.next);
         let mut size_of_gradient = norm(&self.gradient);
-        let mut is_found = false;
+        let (mut is_found, mut n_idle) = (false, 0);
         for _ in 0..MAX_STEPS {
             is_found = size_of_gradient <= ON_THE_CONE * scale;
-            if is_found {
+            if is_found || n_idle > MOST_IDLE {
                 break;
             }
             let epsilon = (1e-2 * size_of_gradient / scale).clamp(1e-14, 1e-4);
@@ -105,6 +110,11 @@ impl Cones {
                 let left = norm(&self.next);
                 // The value has only half of the digits of its slope.
                 if own <= value + 1e-4 * share * fall || left <= 0.5 * size_of_gradient {
+                    n_idle = if left > 0.9 * size_of_gradient {
+                        n_idle + 1
+                    } else {
+                        0
+                    };
                     (value, size_of_gradient, goes_on) = (own, left, true);
                     break;
                 }

@@ -23,7 +23,7 @@ pub(super) const NO_DIRECTION: f64 = 1e-12;
 /// Section of a wheel through its axle.
 #[derive(Clone, Copy, Debug)]
 pub struct Section {
-    /// Of the circles, m.
+    /// Radius of the circles, m.
     pub radius: f64,
     /// Distance of the circles from the middle, m; 0 for a disc and a torus.
     pub half: f64,
