@@ -7,7 +7,8 @@
     clippy::float_cmp
 )] // one long comparison; numbers drawn by a sine; equal bits are the claim
 
-use fearless_simd::{f64x4, f64x8};
+#[cfg(target_arch = "x86_64")]
+use rover_core::scalar::{Eights, Fours};
 use rover_core::scalar::{Instructions, Lane, Single};
 
 mod contacts;
@@ -31,9 +32,9 @@ fn on_every_register(work: &mut impl OverLanes) {
         match instructions {
             Instructions::Baseline => work.run::<f64>(Single::Baseline),
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(token) => work.run::<f64x4<_>>(token),
+            Instructions::Avx2(token) => work.run::<Fours>(token),
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512(token) => work.run::<f64x8<_>>(token),
+            Instructions::Avx512(token) => work.run::<Eights>(token),
         }
     }
 }

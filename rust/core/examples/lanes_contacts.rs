@@ -27,6 +27,8 @@ use rover_core::multibody::lane_configuration::LaneConfiguration;
 use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::multibody::{Factor, MassMatrix};
+#[cfg(target_arch = "x86_64")]
+use rover_core::scalar::{Eights, Fours};
 use rover_core::scalar::{Instructions, Lane, LaneMask, Single, Vec3};
 use rover_core::solver::batch::problem::ContactProblem;
 
@@ -223,11 +225,11 @@ fn main() {
             (1, _) => Block::<f64>::new(Single::best(), &model, &records).repeat(last, n),
             #[cfg(target_arch = "x86_64")]
             (4, Instructions::Avx2(token)) => {
-                Block::<fearless_simd::f64x4<_>>::new(token, &model, &records).repeat(last, n);
+                Block::<Fours>::new(token, &model, &records).repeat(last, n);
             }
             #[cfg(target_arch = "x86_64")]
             (8, Instructions::Avx512(token)) => {
-                Block::<fearless_simd::f64x8<_>>::new(token, &model, &records).repeat(last, n);
+                Block::<Eights>::new(token, &model, &records).repeat(last, n);
             }
             _ => panic!("no {width} lanes on this machine"),
         }
@@ -241,12 +243,12 @@ fn main() {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512(token) => {
                 println!("{}, ns per rover: eight lanes", ground.name());
-                Block::<fearless_simd::f64x8<_>>::new(token, &model, &records).times();
+                Block::<Eights>::new(token, &model, &records).times();
             }
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2(token) => {
                 println!("{}, ns per rover: four lanes", ground.name());
-                Block::<fearless_simd::f64x4<_>>::new(token, &model, &records).times();
+                Block::<Fours>::new(token, &model, &records).times();
             }
             Instructions::Baseline => {}
         }

@@ -16,6 +16,8 @@ use rover_core::multibody::lane_configuration::LaneConfiguration;
 use rover_core::multibody::poses::Poses;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::multibody::{Factor, MassMatrix};
+#[cfg(target_arch = "x86_64")]
+use rover_core::scalar::{Eights, Fours};
 use rover_core::scalar::{Instructions, Lane, Single, Vec3};
 
 const PHASES: [&str; 7] = [
@@ -162,11 +164,11 @@ fn main() {
             ("1", _) => Block::<f64>::new(Single::best(), &model).announce(phase, n),
             #[cfg(target_arch = "x86_64")]
             ("4", Instructions::Avx2(token)) => {
-                Block::<fearless_simd::f64x4<_>>::new(token, &model).announce(phase, n);
+                Block::<Fours>::new(token, &model).announce(phase, n);
             }
             #[cfg(target_arch = "x86_64")]
             ("8", Instructions::Avx512(token)) => {
-                Block::<fearless_simd::f64x8<_>>::new(token, &model).announce(phase, n);
+                Block::<Eights>::new(token, &model).announce(phase, n);
             }
             _ => panic!("no {width} lanes on this machine"),
         }
@@ -176,7 +178,7 @@ fn main() {
     println!("ns per rover   alone   lanes");
     macro_rules! table {
         ($vector:ident, $token:expr) => {{
-            let mut block = Block::<fearless_simd::$vector<_>>::new($token, &model);
+            let mut block = Block::<$vector>::new($token, &model);
             for phase in PHASES {
                 let (alone, lanes) = (single.time(phase), block.time(phase));
                 println!("{phase:12} {alone:7.1} {lanes:7.1}");
@@ -185,9 +187,9 @@ fn main() {
     }
     match Instructions::of_this_machine() {
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(token) => table!(f64x8, token),
+        Instructions::Avx512(token) => table!(Eights, token),
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(token) => table!(f64x4, token),
+        Instructions::Avx2(token) => table!(Fours, token),
         Instructions::Baseline => {
             for phase in PHASES {
                 println!("{phase:12} {:7.1}", single.time(phase));

@@ -67,9 +67,9 @@ pub struct Differentiator {
 enum Passes {
     Singles(Box<Tangent<f64>>),
     #[cfg(target_arch = "x86_64")]
-    Fours(Box<Tangent<fearless_simd::f64x4<fearless_simd::Avx2>>>),
+    Fours(Box<Tangent<crate::scalar::Fours>>),
     #[cfg(target_arch = "x86_64")]
-    Eights(Box<Tangent<fearless_simd::f64x8<fearless_simd::Avx512>>>),
+    Eights(Box<Tangent<crate::scalar::Eights>>),
 }
 
 impl Passes {

@@ -37,9 +37,9 @@ pub struct LaneBatch {
 enum Blocks {
     Singles,
     #[cfg(target_arch = "x86_64")]
-    Fours(Box<Lanes<fearless_simd::f64x4<fearless_simd::Avx2>>>),
+    Fours(Box<Lanes<crate::scalar::Fours>>),
     #[cfg(target_arch = "x86_64")]
-    Eights(Box<Lanes<fearless_simd::f64x8<fearless_simd::Avx512>>>),
+    Eights(Box<Lanes<crate::scalar::Eights>>),
 }
 
 impl LaneBatch {

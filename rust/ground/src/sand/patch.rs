@@ -4,8 +4,6 @@
 //! eight at a time. A machine with fewer lanes takes them in turns and keeps a sum for each of the
 //! eight: the bits do not depend on the lanes.
 
-#[cfg(target_arch = "x86_64")]
-use fearless_simd::{f64x4, f64x8};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::bekker::mobilised;
@@ -16,6 +14,8 @@ use super::ruts::RutsNear;
 use super::sliding::{OnRing, Rolling, Slid};
 use super::soil::{Law, Soil};
 use super::wheel::{Rules, SandWheel, Skin};
+#[cfg(target_arch = "x86_64")]
+use friction_contact::scalar::{Eights, Fours};
 use friction_contact::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
 /// Pose of a wheel.
@@ -163,9 +163,9 @@ pub fn react_with(
     let total = match instructions {
         Instructions::Baseline => frame.sum::<f64>(Single::Baseline),
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(token) => frame.sum::<f64x4<_>>(token),
+        Instructions::Avx2(token) => frame.sum::<Fours>(token),
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512(token) => frame.sum::<f64x8<_>>(token),
+        Instructions::Avx512(token) => frame.sum::<Eights>(token),
     };
     reaction.is_touching = total.is_touching;
     for k in 0..2 {

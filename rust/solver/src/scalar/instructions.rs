@@ -3,8 +3,26 @@
 use std::sync::OnceLock;
 
 #[cfg(target_arch = "x86_64")]
-use fearless_simd::{Avx2, Avx512, Level, Simd};
+use fearless_simd::{Avx2, Level, Simd, f64x4};
+#[cfg(all(target_arch = "x86_64", eight_lanes))]
+use fearless_simd::{Avx512, f64x8};
 use thiserror::Error;
+
+#[cfg(target_arch = "x86_64")]
+use super::lane::Lane;
+
+/// Four rovers to a register, with AVX2.
+#[cfg(target_arch = "x86_64")]
+pub type Fours = f64x4<Avx2>;
+
+/// Eight rovers to a register, with AVX-512.
+#[cfg(all(target_arch = "x86_64", eight_lanes))]
+pub type Eights = f64x8<Avx512>;
+
+/// Stands for eight rovers to a register in a build that has none, so that nothing more is compiled
+/// for them.
+#[cfg(all(target_arch = "x86_64", not(eight_lanes)))]
+pub type Eights = Fours;
 
 /// Instructions that a single rover's step is compiled for. Its bits do not depend on them.
 #[derive(Clone, Copy, Debug)]
@@ -47,10 +65,10 @@ pub enum Instructions {
     Baseline,
     /// Four rovers to a register.
     #[cfg(target_arch = "x86_64")]
-    Avx2(Avx2),
-    /// Eight rovers to a register.
+    Avx2(<Fours as Lane>::Token),
+    /// Eight rovers to a register; never in builds for development.
     #[cfg(target_arch = "x86_64")]
-    Avx512(Avx512),
+    Avx512(<Eights as Lane>::Token),
 }
 
 /// Instructions that this process cannot use.
@@ -102,13 +120,16 @@ impl Instructions {
         }
     }
 
-    /// All that this machine has, the widest first.
+    /// All that this machine has and this build knows, the widest first.
     #[must_use]
     pub fn all_of_this_machine() -> Vec<Self> {
         #[cfg(target_arch = "x86_64")]
         let wide = {
             let level = Level::new();
+            #[cfg(eight_lanes)]
             let eight = level.as_avx512().map(Self::Avx512);
+            #[cfg(not(eight_lanes))]
+            let eight = None;
             let four = level.as_avx2().map(Self::Avx2);
             eight.into_iter().chain(four)
         };
@@ -123,9 +144,9 @@ impl Instructions {
         match self {
             Self::Baseline => 1,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => 4,
+            Self::Avx2(_) => Fours::LANES,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => 8,
+            Self::Avx512(_) => Eights::LANES,
         }
     }
 

@@ -10,7 +10,7 @@
 //! # One call
 //!
 //! ```text
-//! Instructions::of_this_machine() ──► token of Single, f64x4 or f64x8
+//! Instructions::of_this_machine() ──► token of Single, Fours or Eights
 //! T::vectorize(token, || formula(x, y))    the closure is compiled for the token's instructions
 //!                        │
 //!                        └─ x: T           f64, four or eight lanes; each has the same bits
@@ -30,6 +30,8 @@ pub mod linear;
 mod registers;
 
 pub use dual::Dual;
+#[cfg(target_arch = "x86_64")]
+pub use instructions::{Eights, Fours};
 pub use instructions::{Instructions, InstructionsError, Single};
 pub use lane::{Lane, LaneMask, MAX_LANES};
 pub use linear::{Mat3, Vec3};

@@ -5,14 +5,14 @@
 //! edges those that are convex, by four heights, and between two such planes. What is left is
 //! built. [`super::under_wheel`] says more of wheels.
 
-#[cfg(target_arch = "x86_64")]
-use fearless_simd::{f64x4, f64x8};
 use nalgebra::Vector3;
 
 use super::planes::{AT_EDGE, Heights, upright};
 use super::{HeightField, PIECES, index, narrow, number};
 use crate::geometry::shape::{OrientedBox, PlacedShape};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
+#[cfg(target_arch = "x86_64")]
+use friction_contact::scalar::{Eights, Fours};
 use friction_contact::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
 /// Cosine of the angle to the way from a part to a face from which on the face looks away, as in
@@ -38,11 +38,11 @@ impl HeightField {
                 }
                 #[cfg(target_arch = "x86_64")]
                 Instructions::Avx2(token) => {
-                    self.visit_around_solid::<f64x4<_>>(token, part, visit);
+                    self.visit_around_solid::<Fours>(token, part, visit);
                 }
                 #[cfg(target_arch = "x86_64")]
                 Instructions::Avx512(token) => {
-                    self.visit_around_solid::<f64x8<_>>(token, part, visit);
+                    self.visit_around_solid::<Eights>(token, part, visit);
                 }
             },
         }

@@ -9,8 +9,6 @@
 //! The cells of a register are compared with the wheel at once ([`super::wheel`]), in the same way
 //! however many those are.
 
-#[cfg(target_arch = "x86_64")]
-use fearless_simd::{f64x4, f64x8};
 use nalgebra::Vector3;
 
 use super::cells::{CELLS, Cells};
@@ -19,6 +17,8 @@ use super::wheel::{KINDS, STEEP, Wheel};
 use super::{HeightField, index, narrow};
 use crate::geometry::shape::{Disc, Roller, SupportMap};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
+#[cfg(target_arch = "x86_64")]
+use friction_contact::scalar::{Eights, Fours};
 use friction_contact::scalar::{Instructions, Lane, LaneMask, Single};
 
 /// How deep a wheel may be in the ground, in bounding radii, so that faces as far beside it are all
@@ -260,9 +260,9 @@ impl HeightField {
         match Instructions::of_this_machine() {
             Instructions::Baseline => self.compare_with::<f64>(Single::Baseline, wheel, cells),
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(token) => self.compare_with::<f64x4<_>>(token, wheel, cells),
+            Instructions::Avx2(token) => self.compare_with::<Fours>(token, wheel, cells),
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512(token) => self.compare_with::<f64x8<_>>(token, wheel, cells),
+            Instructions::Avx512(token) => self.compare_with::<Eights>(token, wheel, cells),
         }
     }
 
