@@ -8,9 +8,6 @@ use fearless_simd::{Avx2, Level, Simd, f64x4};
 use fearless_simd::{Avx512, f64x8};
 use thiserror::Error;
 
-#[cfg(target_arch = "x86_64")]
-use super::lane::Lane;
-
 /// Four rovers to a register, with AVX2.
 #[cfg(target_arch = "x86_64")]
 pub type Fours = f64x4<Avx2>;
@@ -19,10 +16,18 @@ pub type Fours = f64x4<Avx2>;
 #[cfg(all(target_arch = "x86_64", eight_lanes))]
 pub type Eights = f64x8<Avx512>;
 
+/// Proof that this machine has the instructions of [`Eights`].
+#[cfg(all(target_arch = "x86_64", eight_lanes))]
+type OfEights = Avx512;
+
 /// Stands for eight rovers to a register in a build that has none, so that nothing more is compiled
 /// for them.
 #[cfg(all(target_arch = "x86_64", not(eight_lanes)))]
 pub type Eights = Fours;
+
+/// Proof that this machine has the instructions of [`Eights`].
+#[cfg(all(target_arch = "x86_64", not(eight_lanes)))]
+type OfEights = Avx2;
 
 /// Instructions that a single rover's step is compiled for. Its bits do not depend on them.
 #[derive(Clone, Copy, Debug)]
@@ -65,10 +70,10 @@ pub enum Instructions {
     Baseline,
     /// Four rovers to a register.
     #[cfg(target_arch = "x86_64")]
-    Avx2(<Fours as Lane>::Token),
+    Avx2(Avx2),
     /// Eight rovers to a register; never in builds for development.
     #[cfg(target_arch = "x86_64")]
-    Avx512(<Eights as Lane>::Token),
+    Avx512(OfEights),
 }
 
 /// Instructions that this process cannot use.
@@ -144,9 +149,9 @@ impl Instructions {
         match self {
             Self::Baseline => 1,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => Fours::LANES,
+            Self::Avx2(_) => 4,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => Eights::LANES,
+            Self::Avx512(_) => 8,
         }
     }
 
