@@ -103,7 +103,7 @@ where
         scene.check_configuration(&q).expect("a configuration");
         let nv = scene.nv();
         Self {
-            scratch: Scratch::new(&q, nv, 3 * scene.grains.len(), D),
+            scratch: Scratch::new(&q, 3 * scene.grains.len()),
             v: vec![0.0; nv],
             q,
             time: 0.0,

@@ -50,7 +50,7 @@ pub(crate) fn free_acceleration<S: MechanicalSystem>(
     a: &mut Vec<f64>,
 ) -> Result<(), StepError> {
     system.place_middle(q);
-    system.update_mass_matrix(options);
+    system.update_mass_matrix(options, true, true);
     if !system.factorise(options) {
         return Err(StepError::SingularMassMatrix { time });
     }

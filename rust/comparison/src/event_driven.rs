@@ -345,7 +345,7 @@ impl<S: MechanicalSystem> Run<'_, S> {
         let mut change = Vec::new();
         for iteration in 0..4 {
             self.system.place_middle(q);
-            self.system.update_mass_matrix(self.options);
+            self.system.update_mass_matrix(self.options, true, true);
             if !self.system.factorise(self.options) {
                 return Err(StepError::SingularMassMatrix { time: self.time });
             }
@@ -422,7 +422,7 @@ impl<S: MechanicalSystem> Run<'_, S> {
     fn strike(&mut self, q: &S::Configuration, v: &mut [f64]) -> Result<(), StepError> {
         let mut contacts = Vec::new();
         find(self.system, q, v, TOUCHING, f64::INFINITY, &mut contacts);
-        self.system.update_mass_matrix(self.options);
+        self.system.update_mass_matrix(self.options, true, true);
         if !self.system.factorise(self.options) {
             return Err(StepError::SingularMassMatrix { time: self.time });
         }

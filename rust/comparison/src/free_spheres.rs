@@ -93,6 +93,7 @@ pub struct SphereContact {
 
 impl UnilateralContact for SphereContact {
     type Key = (u32, u32);
+    type Local = [f64; 3];
 
     fn key(&self) -> (u32, u32) {
         self.key
@@ -270,9 +271,8 @@ fn add_transposed(
 }
 
 impl Dynamics for SphereSystem<'_> {
+    type T = f64;
     type Configuration = Placement;
-
-    const DIMENSION: Dimension = Dimension::Three;
 
     fn nv(&self) -> usize {
         NV * self.bodies.count()
@@ -290,6 +290,12 @@ impl Dynamics for SphereSystem<'_> {
         }
         if self.bodies.slab.is_some() {
             q.turn *= UnitQuaternion::from_scaled_axis(spin(v, self.bodies.n) * h);
+        }
+    }
+
+    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Placement, to: &mut Placement) {
+        if lanes(0) {
+            to.clone_from(from);
         }
     }
 
@@ -314,7 +320,7 @@ impl Dynamics for SphereSystem<'_> {
         self.parts.end.clone_from(q);
     }
 
-    fn update_mass_matrix(&mut self, _options: &StepOptions) {
+    fn update_mass_matrix(&mut self, _options: &StepOptions, _: bool, _: bool) {
         let n = self.bodies.count();
         // Each sphere is like the others, and nothing here changes in a run.
         if self.parts.roots.len() != n {
@@ -382,6 +388,8 @@ impl Forces for SphereSystem<'_> {
 
 impl Contacting for SphereSystem<'_> {
     type Contact = SphereContact;
+
+    const DIMENSION: Dimension = Dimension::Three;
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<SphereContact>) {
         out.clear();

@@ -155,7 +155,7 @@ impl<S: MechanicalSystem> Iterate<S> {
         system.place_middle(&self.q);
         system.place_end(&self.q);
         system.relocate(&mut self.contacts);
-        system.update_mass_matrix(options);
+        system.update_mass_matrix(options, true, true);
         if !system.factorise(options) {
             return Err(StepError::SingularMassMatrix { time });
         }

@@ -1,6 +1,6 @@
 //! Moreau–Jean with positions projected until nothing penetrates, at the end of every step.
 //!
-//! The rover's own projection ([`rover_core::integrator::position_projection`]) treats the contacts
+//! The rover's own projection (`rover_core::integrator::projection`) treats the contacts
 //! of the step, which the forecast chose at its start. A body that the impulses deflected may end
 //! inside another one that was not a contact. Here all contacts are detected again at the end of
 //! the step, and
@@ -103,7 +103,7 @@ impl<S: MechanicalSystem> Integrator<S> for ProjectedToConvergence {
             if deepest >= -DEPTH {
                 break;
             }
-            system.update_mass_matrix(options);
+            system.update_mass_matrix(options, true, true);
             if pass == MOST || !system.factorise(options) {
                 report.status = StepStatus::NotConverged;
                 break;

@@ -197,7 +197,7 @@ impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
         let reach = 3.0 * h * largest_displacement(system, before) + 2.0 * g * h * h;
         find(system, q, before, reach, f64::INFINITY, &mut contacts);
         system.place_middle(q);
-        system.update_mass_matrix(options);
+        system.update_mass_matrix(options, true, true);
         if !system.factorise(options) {
             return Err(StepError::SingularMassMatrix { time });
         }

@@ -25,8 +25,6 @@ pub struct Penetration {
 }
 
 impl LocatedContact for SphereContact {
-    type Vector = [f64; 3];
-
     fn normal(&self) -> [f64; 3] {
         self.frame.rows()[0].into()
     }

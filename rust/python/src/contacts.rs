@@ -2,9 +2,10 @@
 
 use pyo3::prelude::*;
 use rover_core::contact::{Contact, Part};
+use rover_core::integrator::Local;
 use rover_core::multibody::Model;
 use rover_core::simulation::{
-    ActiveContact, BedMemory, Components, GrainBed, GrainSimulation, LocatedContact, Scene,
+    ActiveContact, BedMemory, GrainBed, GrainSimulation, LocatedContact, Scene,
 };
 use rover_core::system::PlanarContact;
 use rover_core::system::grains::GrainContact;
@@ -22,11 +23,11 @@ struct Columns {
 
 fn rows<C: LocatedContact>(
     active: &[ActiveContact<C>],
-    f: impl Fn(&ActiveContact<C>) -> C::Vector,
+    f: impl Fn(&ActiveContact<C>) -> C::Local,
 ) -> Array {
-    let rows: Vec<C::Vector> = active.iter().map(f).collect();
+    let rows: Vec<C::Local> = active.iter().map(f).collect();
     let numbers = rows.iter().flat_map(AsRef::as_ref).copied();
-    Array::shaped(numbers.collect(), &[rows.len(), C::Vector::N])
+    Array::shaped(numbers.collect(), &[rows.len(), C::Local::N])
 }
 
 impl Columns {

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use rover_core::integrator::{Local, UnilateralContact};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::{
-    AnySnapshot, Components, DenseOperator, LocatedContact, Scene, Simulation,
-};
+use rover_core::simulation::{AnySnapshot, DenseOperator, Scene, Simulation};
 
 use crate::arguments::count;
 use crate::arrays::{Array, fresh, fresh_matrix};
@@ -159,7 +158,7 @@ where
     S::Parts: DenseOperator,
 {
     let (W, q, mu) = simulation.last_problem();
-    let size = mu.len() * <S::Contact as LocatedContact>::Vector::N;
+    let size = mu.len() * <S::Contact as UnilateralContact>::Local::N;
     let q = if size == 0 { &q[..0] } else { q };
     let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
     (fresh_matrix(&W), fresh(q), fresh(mu))

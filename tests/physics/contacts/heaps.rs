@@ -20,7 +20,7 @@ fn solve_every_step(side: usize, seed: u64, steps: usize) -> usize {
 #[test]
 fn every_step_of_27_boxes_is_solved_until_they_lie() {
     let most = solve_every_step(3, 3, 480);
-    assert!(most > 110, "{most} contacts");
+    assert!(most > 100, "{most} contacts");
 }
 
 /// From the first touch until the lower half lies.

@@ -1,17 +1,22 @@
 //! The contacts of a system: where they are, their rows of Hᵀ, and the problem that they pose.
 
+use std::fmt::Debug;
+
 use super::dynamics::Dynamics;
+use super::local::Local;
 use super::options::StepOptions;
 use crate::contact::Activation;
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
-use crate::problem::FrictionContactProblem;
+use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
 /// A contact as time stepping sees it: a key and a gap.
 pub trait UnilateralContact {
     /// Identifies a contact from one step to the next.
-    type Key: Copy + Ord;
+    type Key: Copy + Ord + Debug;
+    /// `[f64; 2]` in the plane, `[f64; 3]` in space.
+    type Local: Local<f64> + AsRef<[f64]> + PartialEq;
 
     /// Key of the contact, unique within a step.
     fn key(&self) -> Self::Key;
@@ -29,9 +34,15 @@ pub trait UnilateralContact {
 /// Key of a system's contacts.
 pub type KeyOf<S> = <<S as Contacting>::Contact as UnilateralContact>::Key;
 
-/// Contacts with d components each (2 or 3, [`Dynamics::DIMENSION`]): local vectors run contact by
-/// contact `normal, tangent, (tangent)`.
-pub trait Contacting: Dynamics {
+/// Components of a system's contacts.
+pub type LocalOf<S> = <<S as Contacting>::Contact as UnilateralContact>::Local;
+
+/// Contacts with d components each (2 or 3, [`Contacting::DIMENSION`]): local vectors run contact
+/// by contact `normal, tangent, (tangent)`.
+pub trait Contacting: Dynamics<T = f64> {
+    /// Whether contacts have one tangent or two.
+    const DIMENSION: Dimension;
+
     /// A contact: the data from which the system rebuilds its rows of Hᵀ.
     type Contact: UnilateralContact + Clone;
 
@@ -101,9 +112,9 @@ pub trait Contacting: Dynamics {
         rebound(options.restitution, u_N_before)
     }
 
-    /// Mass of a cluster, kg, of a machine of which any contact yields. By default none does.
-    fn compliant_mass(&self, _cluster: usize) -> Option<f64> {
-        None
+    /// Whether any contact may yield. By default none does.
+    fn yields(&self) -> bool {
+        false
     }
 
     /// Springs and damper of a contact at the velocity `v` (nv); `None`, the default, if it is
@@ -113,7 +124,7 @@ pub trait Contacting: Dynamics {
     }
 
     /// Adds numbers along n, t, b of each contact (n_c), 1/kg, to the diagonal of the assembled W.
-    /// Called only for a system that has a [compliant mass](Self::compliant_mass).
+    /// Called only for a system of which contacts may [yield](Self::yields).
     fn soften(&mut self, _diagonal: impl Iterator<Item = [f64; 3]>) {}
 
     /// Whether a solve that does not converge suggests that the problem has no answer. True by

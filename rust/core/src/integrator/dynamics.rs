@@ -1,71 +1,27 @@
-//! The dynamics of a system: configurations, poses, the mass matrix and its factor, closed loops.
+//! The dynamics of systems: configurations, poses, the mass matrix and its factor, closed loops.
 
-use nalgebra::Vector3;
-
-use super::carried_velocity::Moving;
 use super::options::StepOptions;
-use crate::problem::Dimension;
+use crate::scalar::{Lane, Vec3};
 
 /// Penetration that is tolerated by default, m, of a system without a size of its own.
 const TOLERATED: f64 = 1e-8;
 
-/// Energy of a state, and its overall momentum.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MechanicalEnergy {
-    /// J.
-    pub kinetic: f64,
-    /// J.
-    pub potential: f64,
-    /// Linear momentum, kg m/s.
-    pub momentum: Vector3<f64>,
-    /// kg.
-    pub mass: f64,
-    /// Whether a base or a loop passes the momentum on to the world; the momentum is zero then.
-    pub is_held: bool,
-}
+/// A truth value for each lane of systems.
+pub type MaskOf<S> = <<S as Dynamics>::T as Lane>::Mask;
 
-impl MechanicalEnergy {
-    /// Energy and momentum of two clusters together.
-    pub(crate) fn with(self, other: Self) -> Self {
-        let is_held = self.is_held || other.is_held;
-        let momentum = self.momentum + other.momentum;
-        Self {
-            kinetic: self.kinetic + other.kinetic,
-            potential: self.potential + other.potential,
-            momentum: if is_held { Vector3::zeros() } else { momentum },
-            mass: self.mass + other.mass,
-            is_held,
-        }
-    }
-}
-
-impl MechanicalEnergy {
-    /// By how much it exceeds that of another state, J.
-    pub(crate) fn above(&self, other: &Self) -> f64 {
-        (self.kinetic - other.kinetic) + (self.potential - other.potential)
-    }
-
-    /// What of it a change of the velocity changes.
-    pub(crate) fn moving(&self) -> Moving<f64> {
-        Moving {
-            kinetic: self.kinetic,
-            momentum: self.momentum.into(),
-        }
-    }
-}
-
-/// What moves, and its inertia. Vectors of factor coordinates as in [`super::mechanical_system`].
+/// What moves, and its inertia: one system, or one in each lane of the scalar. Vectors of factor
+/// coordinates as in [`super::mechanical_system`].
 pub trait Dynamics {
-    /// A point of the configuration space, of any size; the system defines ⊕.
-    type Configuration: Clone + PartialEq;
+    /// The scalar: `f64` for one system.
+    type T: Lane;
 
-    /// Whether contacts have one tangent or two.
-    const DIMENSION: Dimension;
+    /// A point of the configuration space, of any size; the system defines ⊕.
+    type Configuration: Clone;
 
     /// Current number of velocities.
     fn nv(&self) -> usize;
 
-    /// Number of clusters, see `super::groups`; by default the system is one.
+    /// Number of clusters, see `super::grouped`; by default the system is one.
     fn n_clusters(&self) -> usize {
         1
     }
@@ -75,21 +31,22 @@ pub trait Dynamics {
         0
     }
 
-    /// Takes the coordinates of some clusters from another configuration. Called only for a system
-    /// of several clusters.
-    fn take_clusters(
-        &self,
-        _from: &Self::Configuration,
-        _is_taken: &dyn Fn(usize) -> bool,
-        _to: &mut Self::Configuration,
-    ) {
+    /// The axis along which a velocity translates all that its root carries; by default none.
+    fn translation_axis(&self, _velocity: usize) -> Option<usize> {
+        None
+    }
+
+    /// Whether a cluster passes its momentum on to the world, by a base or a loop. By default it
+    /// does not.
+    fn is_held(&self, _cluster: usize) -> bool {
+        false
     }
 
     /// `to = from ⊕ h v`, without allocating.
     fn set_moved(
         &self,
         from: &Self::Configuration,
-        v: &[f64],
+        v: &[Self::T],
         h: f64,
         to: &mut Self::Configuration,
     ) {
@@ -98,10 +55,18 @@ pub trait Dynamics {
     }
 
     /// `q ⊕= h v`.
-    fn advance(&self, q: &mut Self::Configuration, v: &[f64], h: f64);
+    fn advance(&self, q: &mut Self::Configuration, v: &[Self::T], h: f64);
+
+    /// Takes the coordinates of each cluster from another configuration in the lanes of its mask.
+    fn take(
+        &self,
+        lanes: impl Fn(usize) -> MaskOf<Self>,
+        from: &Self::Configuration,
+        to: &mut Self::Configuration,
+    );
 
     /// Whether every entry of a configuration is finite.
-    fn is_finite(&self, q: &Self::Configuration) -> bool;
+    fn is_finite(&self, q: &Self::Configuration) -> MaskOf<Self>;
 
     /// Removes rounding from a configuration that is about to become the state (unit quaternions).
     fn normalise(&self, _q: &mut Self::Configuration) {}
@@ -112,45 +77,50 @@ pub trait Dynamics {
     /// Kinematics at the configuration where contact frames and Jacobians are evaluated.
     fn place_end(&mut self, q: &Self::Configuration);
 
-    /// Computes M at the middle pose, and the implicit weights of the stiff forces.
-    fn update_mass_matrix(&mut self, options: &StepOptions);
+    /// Computes M at the middle pose, and the implicit weights of the stiff forces. `going`: lanes
+    /// of the step. `is_first`: unless the step is taken again.
+    fn update_mass_matrix(&mut self, options: &StepOptions, going: MaskOf<Self>, is_first: bool);
 
     /// Factors `M̂ = M + (implicit forces) = Fᵀ F`; false if it is not positive definite in
     /// floating point.
     #[must_use]
-    fn factorise(&mut self, options: &StepOptions) -> bool;
+    fn factorise(&mut self, options: &StepOptions) -> MaskOf<Self>;
 
     /// `out = M v` (nv), kg m/s and kg m²/s. Called between `update_mass_matrix` and `factorise`,
     /// which may add implicit terms.
-    fn multiply_mass(&self, v: &[f64], out: &mut [f64]);
+    fn multiply_mass(&self, v: &[Self::T], out: &mut [Self::T]);
 
-    /// Whether the gyroscopic terms of a cluster are too stiff to be explicit in this step. By
-    /// default never.
-    fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64], _cluster: usize) -> bool {
+    /// Largest angular speed of a frame whose pose matters, rad/s; none, the default, where no
+    /// frame turns. Marks in `is_gyroscopic` (n_clusters), where nothing is marked, the clusters
+    /// whose gyroscopic terms are too stiff to be explicit in this step.
+    fn turning(
+        &mut self,
+        _options: &StepOptions,
+        _v: &[Self::T],
+        _is_gyroscopic: &mut [MaskOf<Self>],
+    ) -> Option<Self::T> {
+        None
+    }
+
+    /// Whether the system has an energy that is audited. By default it has none.
+    fn is_audited(&self) -> bool {
         false
     }
 
-    /// Kinetic and potential energy of each cluster in a state, J, and its momentum; `out` is
-    /// cleared first, and stays empty if the system is not audited.
+    /// Calls `each` with every cluster, its kinetic and potential energy in a state, J, and its
+    /// linear momentum, kg m/s. Called only for a system that [is audited](Self::is_audited).
     fn energies(
         &mut self,
         _options: &StepOptions,
         _q: &Self::Configuration,
-        _v: &[f64],
-        out: &mut Vec<MechanicalEnergy>,
+        _v: &[Self::T],
+        _each: impl FnMut(usize, [Self::T; 2], Vec3<Self::T>),
     ) {
-        out.clear();
     }
 
-    /// Largest angular speed of a frame whose pose matters, rad/s. By default 0.
-    fn turning(&self, _v: &[f64]) -> f64 {
-        0.0
-    }
-
-    /// The axis along which a velocity translates all that its root carries; none for any other
-    /// velocity. By default the first velocities are those of the only root.
-    fn translation_axis(&self, velocity: usize) -> Option<usize> {
-        (velocity < Self::DIMENSION.components()).then_some(velocity)
+    /// Mass of a cluster, kg; none, the default, if neither an energy nor a compliance needs it.
+    fn mass(&self, _cluster: usize) -> Option<Self::T> {
+        None
     }
 
     /// Whether [`super::Forces::balance`] conserves the momenta of free flight at any step, so that
@@ -160,31 +130,38 @@ pub trait Dynamics {
     }
 
     /// `y = F⁻ᵀ impulse`, in place: an impulse (nv) into factor coordinates.
-    fn half_solve(&self, impulse: &mut [f64]);
+    fn half_solve(&self, impulse: &mut [Self::T]);
 
     /// Changes `y` so that the step from `v_begin` to `v + F⁻¹ y` obeys the system's closed loops.
     /// [`super::Contacting::add_impulses`] keeps that. By default there are none.
     fn close_velocity(
         &mut self,
         _options: &StepOptions,
-        _v_begin: &[f64],
-        _v: &[f64],
-        _y: &mut [f64],
+        _v_begin: &[Self::T],
+        _v: &[Self::T],
+        _y: &mut [Self::T],
     ) {
     }
 
     /// `out +=` the generalized impulse (nv) of the loops after the last
-    /// [`Self::close_velocity`], with the contacts' impulses p (d n_c, or none).
-    fn add_loop_impulse(&mut self, _p: &[f64], _out: &mut [f64]) {}
+    /// [`Self::close_velocity`], without that of contacts.
+    fn add_loop_impulse(&mut self, _out: &mut [Self::T]) {}
 
-    /// Makes a configuration and a velocity at the end of a step obey the closed loops; p: the
-    /// step's impulses. Returns the widest gap that is left, m or rad.
-    fn close_end(&mut self, _p: &[f64], _q: &mut Self::Configuration, _v: &mut [f64]) -> f64 {
-        0.0
+    /// Makes a configuration and a velocity at the end of a step obey the closed loops in some
+    /// lanes; p (d n_c): the step's impulses. Returns the widest gap that is left, m or rad; none
+    /// without loops.
+    fn close_end(
+        &mut self,
+        _lanes: MaskOf<Self>,
+        _p: &[Self::T],
+        _q: &mut Self::Configuration,
+        _v: &mut [Self::T],
+    ) -> Option<Self::T> {
+        None
     }
 
     /// `Δv = F⁻¹ y`, in place: factor coordinates (nv) into a change of the velocity.
-    fn half_solve_back(&self, y: &mut [f64]);
+    fn half_solve_back(&self, y: &mut [Self::T]);
 
     /// Penetration of a cluster that is tolerated, m.
     fn tolerated(&self, options: &StepOptions, _cluster: usize) -> f64 {
@@ -193,5 +170,5 @@ pub trait Dynamics {
 
     /// Largest displacement of a cluster, m, that `y` (nv) causes away from the contact points; it
     /// limits the projection.
-    fn displacement(&self, y: &[f64], cluster: usize) -> f64;
+    fn displacement(&self, y: &[Self::T], cluster: usize) -> Self::T;
 }

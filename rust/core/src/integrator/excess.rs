@@ -1,8 +1,6 @@
-//! Energy balance of a step, and by how much it exceeds what was supplied.
+//! By how much the energy of a step exceeds what was supplied.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use super::dynamics::MechanicalEnergy;
-use super::work::Work;
 use crate::scalar::{Lane, Vec3};
 
 /// Excess, as a fraction of the kinetic energy, above which the step is repeated.
@@ -13,19 +11,6 @@ const ROUNDINGS: f64 = 64.0;
 
 /// Largest relative increase of the energy of free motion in a step.
 const RAISE: f64 = 1.0;
-
-/// Energy balance of a group in a step.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Balance {
-    pub after: MechanicalEnergy,
-    pub excess: Excess<f64>,
-    pub work: Work,
-    /// Work of the contacts by their law, and what yielding ones release.
-    pub contact_work: f64,
-    pub released: f64,
-    /// What the audit removes.
-    pub removed: f64,
-}
 
 /// Excess of the change of the energy over what was supplied, and what it is compared with, J.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
-//! The forces of a system, without those of its contacts.
+//! The forces of systems, without those of their contacts.
 
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, MaskOf};
 use super::options::StepOptions;
 use super::work::Work;
 
@@ -10,23 +10,37 @@ pub(crate) const MOST_REVISIONS: usize = 6;
 
 /// Start of a step.
 #[derive(Debug)]
-pub struct Start<'a, Q> {
+pub struct Start<'a, Q, T = f64> {
     /// Configuration.
     pub configuration: &'a Q,
     /// Velocity (nv).
-    pub v: &'a [f64],
+    pub v: &'a [T],
 }
 
-impl<Q> Clone for Start<'_, Q> {
+impl<'a, Q, T> Start<'a, Q, T> {
+    /// At a configuration and a velocity (nv).
+    pub fn at(configuration: &'a Q, v: &'a [T]) -> Self {
+        Self { configuration, v }
+    }
+}
+
+impl<Q, T> Clone for Start<'_, Q, T> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<Q> Copy for Start<'_, Q> {}
+impl<Q, T> Copy for Start<'_, Q, T> {}
+
+/// Start of a step of a kind of systems.
+pub type StartOf<'a, S> = Start<'a, <S as Dynamics>::Configuration, <S as Dynamics>::T>;
 
 /// The impulse of the forces over a step, their branches and their work.
 pub trait Forces: Dynamics {
+    /// Finds at the beginning of [`Self::load`] what does not depend on the mean velocity. By
+    /// default nothing.
+    fn begin_load(&mut self, _options: &StepOptions, _start: StartOf<'_, Self>) {}
+
     /// `impulse = h F(q_m, v_mean)` (nv), N s and N m s: the impulse of all forces except contact
     /// forces over the step.
     ///
@@ -34,105 +48,112 @@ pub trait Forces: Dynamics {
     fn load(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Self::Configuration>,
-        v_mean: &[f64],
-        impulse: &mut [f64],
+        start: StartOf<'_, Self>,
+        v_mean: &[Self::T],
+        impulse: &mut [Self::T],
     );
 
     /// Adds to the impulse of [`Self::load`] (nv) what does not act on the mean velocity. By
     /// default nothing.
-    fn add_given(&self, _options: &StepOptions, _impulse: &mut [f64]) {}
+    fn add_given(&self, _options: &StepOptions, _impulse: &mut [Self::T]) {}
 
-    /// [`Self::load`] with implicit gyroscopic terms; the result is in factor coordinates.
+    /// Begins [`Self::load_gyroscopic`]; `scratch` (nv) is overwritten. By default nothing.
+    fn begin_gyroscopic(&mut self, _options: &StepOptions, _scratch: &mut [Self::T]) {}
+
+    /// [`Self::load`] with implicit gyroscopic terms.
     ///
     /// With `C(q_m, v_mean) v` the gyroscopic part of the bias and J
     /// (`impulse`, nv) a forecast of the contacts' generalized impulse
     ///
     /// ```text
-    /// (M̂ + θ h C) Δv = h (τ − G − C v) + J,        y = F Δv − F⁻ᵀ J
+    /// (M̂ + θ h C) Δv = h (τ − G − C v) + J,        y = M̂ Δv − J
     /// ```
     ///
     /// If the actual impulse equals the forecast J, the whole step is implicit. Called only for a
-    /// system that may be [`Dynamics::is_gyroscopic`].
+    /// system of which [`Dynamics::turning`] marks a cluster.
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Self::Configuration>,
-        v_mean: &[f64],
-        _impulse: &[f64],
-        y: &mut [f64],
+        start: StartOf<'_, Self>,
+        v_mean: &[Self::T],
+        _impulse: &[Self::T],
+        y: &mut [Self::T],
     ) {
         self.load(options, start, v_mean, y);
-        self.half_solve(y);
     }
 
     /// Chooses the branch of each piecewise force at the start of a step. By default there is none.
-    fn choose_branches(&mut self, _start: Start<'_, Self::Configuration>) {}
+    /// `v` (nv): before it.
+    fn choose_branches(&mut self, _v: &[Self::T]) {}
 
-    /// Moves each piecewise force one branch towards the branch that holds at `v_end`; true if one
-    /// has changed and the step must be repeated. By default there is none.
-    fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
-        false
-    }
-
-    /// Whether the forces of a step whose repetitions are used up are those at its solution. By
-    /// default they are.
-    fn is_settled(&mut self, _v_end: &[f64]) -> bool {
+    /// Whether a force may be on another branch at the end of the step. By default it may.
+    fn may_revise(&self) -> bool {
         true
     }
 
-    /// Most repetitions of a step that [`Self::revise`] asks for.
-    fn most_revisions(&self) -> usize {
+    /// Moves each piecewise force of some lanes, at least one, a branch towards that which holds at
+    /// `v_end`. Returns the lanes of which a branch has changed, whose step must be repeated. By
+    /// default there is none.
+    fn revise(&mut self, lanes: MaskOf<Self>, _v: &[Self::T], _v_end: &[Self::T]) -> MaskOf<Self> {
+        lanes & !lanes
+    }
+
+    /// Lanes whose repetitions are used up and whose forces are not those at the solution. By
+    /// default there is none.
+    fn unsettled(&mut self, lanes: MaskOf<Self>, _v_end: &[Self::T]) -> MaskOf<Self> {
+        lanes & !lanes
+    }
+
+    /// Most repetitions of a lane's step that [`Self::revise`] asks for.
+    fn most_revisions(&self, _lane: usize) -> usize {
         MOST_REVISIONS
     }
 
     /// Work of the own forces of each cluster (n_clusters) but gravity over a step that ends with
-    /// `v_end`.
+    /// `v_end`; `out` is zero before. By default they do none.
     fn work(
         &mut self,
         _options: &StepOptions,
-        _start: Start<'_, Self::Configuration>,
-        _v_end: &[f64],
-        out: &mut [Work],
+        _start: StartOf<'_, Self>,
+        _v_end: &[Self::T],
+        _out: &mut [Work<Self::T>],
     ) {
-        out.fill(Work::default());
     }
 
     /// Energy that springs and position controls of each cluster (n_clusters) store in a
-    /// configuration, J, but for a constant. By default there are none.
-    fn stored(&self, _q: &Self::Configuration, out: &mut [f64]) {
-        out.fill(0.0);
-    }
+    /// configuration, J, but for a constant; `out` is zero before. By default there are none.
+    fn stored(&self, _q: &Self::Configuration, _out: &mut [Self::T]) {}
 
     /// Work that the torques, motors and wrenches of such a step, as they are at its end, supply
-    /// over a `displacement` (nv) that is added to it, J.
+    /// over a `displacement` (nv) that is added to it, J; none, the default, where nothing supplies
+    /// any.
     fn work_of_displacement(
         &mut self,
         _options: &StepOptions,
-        _start: Start<'_, Self::Configuration>,
-        _v_end: &[f64],
-        _displacement: &[f64],
-    ) -> f64 {
-        0.0
+        _start: StartOf<'_, Self>,
+        _v_end: &[Self::T],
+        _displacement: &[Self::T],
+    ) -> Option<Self::T> {
+        None
     }
 
-    /// The step (or part of a step) whose work was last requested becomes the state. By default
-    /// nothing is recorded.
-    fn accept(&mut self) {}
+    /// The step (or part of a step) whose work was last requested becomes the state in some lanes;
+    /// p (d n_c): its contacts' impulses. By default nothing is recorded.
+    fn accept(&mut self, _lanes: MaskOf<Self>, _p: &[Self::T]) {}
 
     /// Called before the iterations of a Newton variant: stores what it needs of the start. By
     /// default nothing.
-    fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}
+    fn begin_balance(&mut self, _start: StartOf<'_, Self>) {}
 
     /// [`Self::load`] for the iterate `v_end`: implicit forces enter with their value there. By
     /// default there are none.
     fn load_at_end(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Self::Configuration>,
-        _v_end: &[f64],
-        v_mean: &[f64],
-        impulse: &mut [f64],
+        start: StartOf<'_, Self>,
+        _v_end: &[Self::T],
+        v_mean: &[Self::T],
+        impulse: &mut [Self::T],
     ) {
         self.load(options, start, v_mean, impulse);
     }
@@ -145,19 +166,19 @@ pub trait Forces: Dynamics {
     fn balance(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Self::Configuration>,
-        v_end: &[f64],
-        v_mean: &[f64],
-        scratch: &mut [f64],
-        impulse: &mut [f64],
+        start: StartOf<'_, Self>,
+        v_end: &[Self::T],
+        v_mean: &[Self::T],
+        scratch: &mut [Self::T],
+        impulse: &mut [Self::T],
     ) {
         for ((change, end), begin) in impulse.iter_mut().zip(v_end).zip(start.v) {
-            *change = end - begin;
+            *change = *end - *begin;
         }
         self.multiply_mass(impulse, scratch);
         self.load_at_end(options, start, v_end, v_mean, impulse);
         for (impulse, momentum) in impulse.iter_mut().zip(&*scratch) {
-            *impulse -= momentum;
+            *impulse -= *momentum;
         }
     }
 }

@@ -14,10 +14,10 @@
 
 use super::contact_modes::{Answer, HeldLaw};
 use super::contacting::UnilateralContact;
+use super::local::Local;
 use super::mechanical_system::MechanicalSystem;
 use super::options::{Stabilisation, StepOptions};
 use super::scratch::ScratchOf;
-use super::step_contacts::{shift, softness};
 use crate::law::compliance::Yielding;
 use crate::problem::Operator;
 
@@ -63,25 +63,25 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
         is_common: impl Fn(&C) -> bool,
     ) -> Option<Self> {
         let law = law_of_last(system, ws).filter(|law| law.residual() <= SAME)?;
-        let (n, size) = (ws.contacts.len(), law.p.len());
-        let problem = system.problem(&ws.q_free[..size], &ws.mu[..n]);
+        let (n, size) = (ws.list.contacts.len(), law.p.len());
+        let problem = system.problem(&ws.free_velocity()[..size], &ws.list.mu[..n]);
         let Operator::Dense(W) = problem.operator() else {
             return None;
         };
-        let is_common: Vec<bool> = ws.contacts.iter().map(is_common).collect();
+        let is_common: Vec<bool> = ws.list.contacts.iter().map(is_common).collect();
         let projection = if is_projected::<S>(options, ws) {
             Some(Projection::of(system, options, ws, &law, (W, &is_common))?)
         } else {
             None
         };
         Some(Self {
-            contacts: ws.contacts.clone(),
+            contacts: ws.list.contacts.clone(),
             answer: law.answer(W, &is_common),
             law,
             projection,
             W: W.to_vec(),
             response: response(system, size),
-            yields: ws.yielding.iter().map(Yielding::is_soft).collect(),
+            yields: ws.data.laws.iter().map(Yielding::is_soft).collect(),
         })
     }
 }
@@ -96,20 +96,25 @@ impl Projection {
         (W, is_common): (&[f64], &[bool]),
     ) -> Option<Self> {
         let (h, d) = (options.time_step, S::DIMENSION.components());
-        let (n, size) = (ws.contacts.len(), solved.p.len());
-        let lambda = ws.p_position[..size].to_vec();
+        let (n, size) = (ws.list.contacts.len(), solved.p.len());
+        let lambda = Local::flat(&ws.gaps.p)[..size].to_vec();
         let mut displacement: Vec<f64> = (W.chunks_exact(size.max(1)))
             .map(|row| row.iter().zip(&lambda).map(|(w, p)| w * p).sum())
             .collect();
         let (mut counts, mut moved) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        for (i, contact) in ws.contacts.iter().enumerate() {
-            let given = shift(system, options, ws, i)[0] + softness(ws, i)[0] * ws.p[d * i];
-            let u = solved.u[d * i] - given;
-            let gap = match ws.yielding.get(i) {
-                Some(law) if law.is_soft() => law.unexplained,
-                _ => contact.gap() + options.theta * h * (u - ws.u_before[d * i]),
+        for (i, contact) in ws.list.contacts.iter().enumerate() {
+            let (p, before) = (ws.problems.p[i][0], ws.list.u_before[i][0]);
+            let (u, gap) = match ws.data.laws.get(i) {
+                Some(law) if law.is_soft() => {
+                    let given = law.shift[0] + law.diagonal[0] * p;
+                    (solved.u[d * i] - given, law.unexplained)
+                }
+                _ => {
+                    let u = solved.u[d * i] - system.normal_shift(options, contact, before);
+                    (u, contact.gap() + options.theta * h * (u - before))
+                }
             };
-            let is_moved = ws.groups.group(ws.groups.of_contact(i)).is_moved;
+            let is_moved = ws.data.is_deep[ws.list.home_of(i)];
             let may_move = is_moved && !system.is_immovable(i);
             let is_counted = may_move && (gap >= 0.0 || gap + h * u < 0.0);
             moved.push(is_moved);
@@ -120,7 +125,9 @@ impl Projection {
         let with =
             |mu: Vec<f64>| HeldLaw::new(lambda.clone(), displacement.clone(), mu, weight.clone());
         // A displacement that friction locked was found without it.
-        let laws = [ws.mu[..n].to_vec(), vec![0.0; n]].into_iter().map(with);
+        let laws = [ws.list.mu[..n].to_vec(), vec![0.0; n]]
+            .into_iter()
+            .map(with);
         let law = laws.into_iter().find(|law| law.residual() <= SAME)?;
         let answer = law.answer(W, is_common);
         Some(Self {
@@ -152,7 +159,7 @@ fn response<S: MechanicalSystem>(system: &S, size: usize) -> Vec<f64> {
 
 /// Whether the step that was just taken with `ws` projected the position.
 pub(crate) fn is_projected<S: MechanicalSystem>(options: &StepOptions, ws: &ScratchOf<S>) -> bool {
-    options.stabilisation == Stabilisation::Projection && ws.groups.all().any(|own| own.is_moved)
+    options.stabilisation == Stabilisation::Projection && ws.data.is_deep.contains(&true)
 }
 
 /// The law of the step that was just taken with `ws`, whose matrices the system still holds; none
@@ -160,18 +167,18 @@ pub(crate) fn is_projected<S: MechanicalSystem>(options: &StepOptions, ws: &Scra
 ///
 /// The velocities are those before the energy audit.
 pub(crate) fn law_of_last<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>) -> Option<HeldLaw> {
-    let (n, d) = (ws.contacts.len(), S::DIMENSION.components());
-    let (size, mu) = (d * n, &ws.mu[..n]);
-    let Operator::Dense(W) = system.problem(&ws.q_free[..size], mu).operator() else {
+    let (n, d) = (ws.list.contacts.len(), S::DIMENSION.components());
+    let (size, mu) = (d * n, &ws.list.mu[..n]);
+    let Operator::Dense(W) = system.problem(&ws.free_velocity()[..size], mu).operator() else {
         return None;
     };
     let rows = (0..size).map(|i| &W[i * size..][..size]);
-    let sums = rows.zip(&ws.q_free).map(|(row, q)| {
-        let pushed = row.iter().zip(&ws.p).map(|(w, p)| w * p);
+    let sums = rows.zip(ws.free_velocity()).map(|(row, q)| {
+        let pushed = row.iter().zip(ws.impulses_of_problem()).map(|(w, p)| w * p);
         q + pushed.sum::<f64>()
     });
     let weight = (0..n).map(|i| W[d * i * (size + 1)]);
-    let p = ws.p[..size].to_vec();
+    let p = ws.impulses_of_problem()[..size].to_vec();
     Some(HeldLaw::new(
         p,
         sums.collect(),

@@ -1,9 +1,9 @@
 //! The interface of time stepping to a mechanical system `M(q) dv = F(q, v) dt + H(q) dp`, in which
 //! ⊕ moves q along v.
 //!
-//! Every scheme of this chapter is written once, over this trait. The multibody tree implements it
-//! with its sparse factor, a planar ball or two-wheel rover with small dense matrices, and a bed of
-//! disks with a diagonal matrix.
+//! The multibody tree implements it with its sparse factor, a planar ball or two-wheel rover with
+//! small dense matrices, and a bed of disks with a diagonal matrix. Dynamics and forces are over a
+//! scalar, contacts those of one system.
 //!
 //! A system holds its description and scratch for its matrices, never its state. The scheme passes
 //! in configurations and velocities and calls in the order
@@ -25,6 +25,6 @@ use super::contacting::Contacting;
 use super::forces::Forces;
 
 /// A system with unilateral contacts: what has [`super::Dynamics`], [`Forces`] and [`Contacting`].
-pub trait MechanicalSystem: Forces + Contacting {}
+pub trait MechanicalSystem: Forces<T = f64, Configuration: PartialEq> + Contacting {}
 
-impl<S: Forces + Contacting> MechanicalSystem for S {}
+impl<S: Forces<T = f64, Configuration: PartialEq> + Contacting> MechanicalSystem for S {}

@@ -2,35 +2,41 @@
 //!
 //! | scheme | file | order in smooth phases | through impacts |
 //! |---|---|---|---|
-//! | Moreau–Jean, one linearised step | [`moreau_jean`] | 2, gyroscopic terms explicit or implicit by the spin | 1 |
+//! | Moreau–Jean, one linearised step | [`scheme`] | 2, gyroscopic terms explicit or implicit by the spin | 1 |
 //! | Moreau–Jean, Newton on the end-of-step forces | [`moreau_jean_newton`] | 2 | 1 |
 //!
 //! Both schemes treat impacts and persistent contact by the same law at velocity level and locate
-//! no events. [`position_projection`] removes the penetration that the velocity law leaves, and
-//! keeps the kinetic energy (`carried_velocity`). [`energy_audit`] checks the energy of every step.
+//! no events. The linearised step is written once, for systems in the lanes of any scalar
+//! (`systems`): several rovers in a register, or one of anything. Its parts are `load`, `impacts`,
+//! `yielding`, `closing`, `audit` with `balance`, and `projection`, which removes the penetration
+//! that the velocity law leaves and keeps the kinetic energy (`carried_velocity`). Clusters that do
+//! not touch each other decide for themselves (`grouped`). All that changes in a step is in `data`.
+//!
+//! There are two efforts. The usual one takes lanes as far as they are alike; a lane that needs
+//! more leaves the others before its state changes. All effort, for one system, is
+//! [`moreau_jean`]: it repeats a step with implicit terms and in halves, solves its problems by
+//! every means (`solving`), those of a group for themselves (`island`), and shortens what still
+//! gains energy (`shortening`). A [`MechanicalSystem`] has its contacts in a list (`listed`).
 //! `held_step` differentiates a step while the modes of its contacts ([`contact_modes`]) hold.
 //!
-//! Each scheme is an [`Integrator`], written once, for any [`MechanicalSystem`]: the multibody tree
-//! and the planar systems ([`crate::system`], [`crate::planar`]) step through the same code. The
-//! schemes share the treatment of contacts (`step_contacts`), and `variant` chooses one of them by
-//! the options. Clusters that do not touch each other decide for themselves (`groups`), and have
-//! their contacts solved for themselves (`island`).
+//! Each scheme is an [`Integrator`] for any [`MechanicalSystem`], and `variant` chooses one of them
+//! by the options.
 //!
 //! # One call
 //!
-//! A Moreau–Jean step, `attempt` in moreau_jean; every line but the last is a call of the system:
+//! A Moreau–Jean step, in [`scheme`]; every line but the last two is a call of the systems:
 //!
 //! ```text
-//! q, v ──► place_middle, place_end          q + (1−θ) h v and q + h v
-//!      ──► detect, relocate                 the contacts of the step
-//!      ──► update_mass_matrix, factorise    M̂ = Fᵀ F
+//! q, v ──► place                            q + (1−θ) h v and q + h v
+//!      ──► detect, recall                   the contacts of the step, and the last impulses
+//!      ──► update_mass, factorise           M̂ = Fᵀ F
 //!      ──► assemble                         Z = F⁻ᵀ H, W = Zᵀ Z
-//!      ──► load, half_solve                 free change of velocity; twice, for the bias at v_m
-//!      ──► solve                            p, by crate::solver
-//!      ──► add_impulses, half_solve_back    v⁺ and q⁺ = q ⊕ h (θ v⁺ + (1−θ) v)
-//!      ──► revise, energy_audit             another branch or too much energy: again, or halved
-//!      ──► position_projection              what penetrates is moved out
-//!      ──► StepReport
+//!      ──► load                             free change of velocity; twice, for the bias at v_m
+//!      ──► pose                             W, q, μ: solved elsewhere
+//!      ──► read, add_impulses               p, v⁺ and q⁺ = q ⊕ h (θ v⁺ + (1−θ) v)
+//!      ──► revise                           another branch of a force: again
+//!      ──► audit::judge                     too much energy: corrected, or the lane leaves
+//!      ──► projection                       what penetrates is moved out
 //! ```
 //!
 //! # May use
@@ -38,45 +44,58 @@
 //! [`crate::caught`], [`crate::scalar`], [`crate::spatial`], [`crate::law`], [`crate::contact`],
 //! [`crate::problem`], [`crate::solver`].
 //!
-//! No machine: a scheme knows a [`MechanicalSystem`].
+//! No machine: a scheme knows a [`MechanicalSystem`], or systems in lanes.
 
 pub mod accuracy;
+pub(crate) mod audit;
+pub(crate) mod balance;
 pub(crate) mod carried_velocity;
+mod closing;
 pub mod contact_modes;
 pub mod contacting;
+pub(crate) mod data;
 pub mod dynamics;
-mod elastic_energy;
-pub mod energy_audit;
 pub mod error;
 pub(crate) mod excess;
 pub mod forces;
-mod groups;
+pub(crate) mod grouped;
 pub(crate) mod held_step;
+mod impacts;
 mod island;
+mod listed;
+mod load;
+pub mod local;
 pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;
 pub mod options;
-pub mod position_projection;
 pub mod probe;
+pub(crate) mod projection;
 pub mod report;
-mod scheme;
+pub mod scheme;
 pub mod scratch;
-pub(crate) mod step_contacts;
+mod shortening;
+mod solving;
+mod stepping;
+pub(crate) mod systems;
 mod variant;
 pub mod warm_start;
 pub mod work;
+mod yielding;
 
 pub use accuracy::Accuracy;
 pub use contacting::{Contacting, KeyOf, UnilateralContact};
-pub use dynamics::{Dynamics, MechanicalEnergy};
+pub use data::Obstacle;
+pub use dynamics::{Dynamics, MaskOf};
 pub use error::{OptionsError, StepError};
-pub use forces::{Forces, Start};
+pub(crate) use forces::MOST_REVISIONS;
+pub use forces::{Forces, Start, StartOf};
+pub use local::Local;
 pub use mechanical_system::MechanicalSystem;
 pub use options::{Stabilisation, StepOptions, Variant};
 pub use probe::{NoProbe, Phase, Probe};
 pub use report::{StepReport, StepStatus};
-pub use scheme::{Integrator, StateMut};
-pub use scratch::{Scratch, ScratchOf};
+pub use scratch::{Scratch, ScratchOf, StateMut};
+pub use stepping::Integrator;
 pub use warm_start::WarmStart;
 pub use work::Work;

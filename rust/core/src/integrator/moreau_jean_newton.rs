@@ -12,29 +12,34 @@
 //! screws, total linear and angular momentum change by the impulses alone: free flight conserves
 //! them to the tolerance of the iteration, at any step. For θ = ½ the scheme is symmetric and of
 //! order 2. The energy of free flight oscillates with the third power of the rotation per step and
-//! does not drift; the audit ([`super::energy_audit`]) accepts this, since a correction would
+//! does not drift; the audit ([`super::audit`]) accepts this, since a correction would
 //! violate the momentum. The iteration matrix M̂(q_m) differs from the true Jacobian by O(h), which
 //! is also the convergence factor.
 //!
 //! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and
-//! the correction r as in [`super::moreau_jean`].
+//! the correction r as in [`super::scheme`].
 
-use super::contacting::{KeyOf, UnilateralContact};
-use super::energy_audit::{Audit, GAIN, Verdict, note_energy_before};
+use super::balance::{GAIN, Limits};
+use super::closing::close_end;
+use super::contacting::KeyOf;
 use super::error::StepError;
 use super::forces::{MOST_REVISIONS, Start};
-use super::groups::Group;
+use super::impacts::{find_impacts, weigh_contacts};
+use super::listed::{Listed, ListedData, PosedOf};
+use super::load::correct_impulse;
+use super::local::Local;
 use super::mechanical_system::MechanicalSystem;
-use super::moreau_jean::{MoreauJean, finish};
+use super::moreau_jean::{advance, begin, project_and_accept};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
-use super::scheme::{Integrator, StateMut};
-use super::scratch::ScratchOf;
-use super::step_contacts::{
-    add_correction, assemble_contacts, close_end, excuse_gaps, find_impacts, solve_contacts,
-};
+use super::scheme::recall;
+use super::scratch::{Scratch, ScratchOf, StateMut};
+use super::shortening::judge_at_last;
+use super::stepping::Integrator;
+use super::systems::Systems;
 use super::warm_start::WarmStart;
+use super::yielding::{add_shifts, forget_bounces, remove_shifts, yield_under_load};
 use crate::contact::Activation;
 
 /// Relative change below which an iteration that no longer contracts has reached rounding.
@@ -56,56 +61,76 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         &self,
         system: &mut S,
         options: &StepOptions,
-        state: StateMut<'_, S::Configuration>,
+        mut state: StateMut<'_, S::Configuration>,
         warm_start: &mut WarmStart<KeyOf<S>>,
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let ws = scratch;
-        ws.fit(system.nv(), system.n_clusters());
-        let start = Start {
-            configuration: &*state.configuration,
-            v: &*state.v,
+        scratch.load(system, &state, warm_start);
+        let Scratch {
+            data: d,
+            list,
+            problems,
+            gaps,
+            ..
+        } = &mut *scratch;
+        let s = &mut Listed {
+            system,
+            options,
+            list,
         };
-        note_energy_before(system, options, start, ws);
-        system.choose_branches(start);
-        system.begin_balance(start);
-        ws.v.copy_from_slice(start.v);
-        let (mut report, is_settled) = settle(system, options, start, warm_start, ws, probe);
-        ws.leaves_open = false;
-        let verdict = if is_settled {
-            move_to_the_end(system, options, start, ws);
-            close_end(system, ws, &mut report);
-            let audit = Audit {
-                is_last: |_: &Group| false,
-                gain: GAIN,
-                drift: drift(system, options, start),
-            };
-            let is_solved = report.is_converged();
-            if !ws.before.is_empty() || ws.groups.all().any(|own| own.is_same) {
-                find_impacts(system, options, warm_start, ws);
-            }
-            let verdict = audit.judge(system, options, start, warm_start, ws, &mut report);
-            if is_solved { verdict } else { Verdict::Coarse }
+        let (report, is_settled) = settle(s, d, problems, probe);
+        s.list.leaves_open = false;
+        let report = if is_settled && conclude(s, d, problems, report) {
+            // The contacts were measured at the end of the last iterate, the end of the step.
+            d.is_at_end = true;
+            project_and_accept(s, d, gaps, probe)?;
+            d.reports[0]
         } else {
-            // An iterate that has not converged satisfies no law.
-            Verdict::Coarse
-        };
-        if verdict == Verdict::Coarse {
-            // Take the linearised step and report it.
-            let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
-            return Ok(StepReport {
+            // An iterate that has not converged satisfies no law: take the linearised step and
+            // report it.
+            let taken = advance(system, options, scratch, probe)?;
+            StepReport {
                 newton_iterations: report.newton_iterations,
-                retaken: taken.retaken + 1,
+                retaken: report.retaken + taken.retaken + 1,
                 ..taken
-            });
-        }
-        // The contacts were measured at the end of the last iterate, the end of the step.
-        ws.gap_end.clear();
-        ws.gap_end
-            .extend(ws.contacts.iter().map(UnilateralContact::gap));
-        excuse_gaps(system, ws);
-        finish(system, options, state, warm_start, ws, report, probe)
+            }
+        };
+        scratch.store(&mut state, warm_start);
+        Ok(report)
+    }
+}
+
+/// The end of a step whose iteration settled, and its energy; whether it stands.
+fn conclude<S: MechanicalSystem>(
+    s: &mut Listed<'_, S>,
+    d: &mut ListedData<S>,
+    problems: &mut PosedOf<S>,
+    report: StepReport,
+) -> bool {
+    let (reports, memories) = (&mut d.reports, &mut d.next_memories);
+    s.take_answers(s.options, true, problems, reports, memories);
+    forget_bounces(s, d);
+    d.reports[0] = report;
+    find_mean(s, d);
+    (s.system).set_moved(&d.start, &d.v_mean, s.options.time_step, &mut d.end);
+    close_end(s, d, true);
+    let is_solved = d.reports[0].is_converged();
+    s.system.normalise(&mut d.end);
+    find_impacts(s, d);
+    weigh_contacts(s, d);
+    let limits = Limits {
+        gain: GAIN,
+        drift: drift(s, d),
+    };
+    judge_at_last(s, d, problems, limits) && is_solved
+}
+
+/// `d.v_mean` for the iterate `d.v_end`.
+fn find_mean<S: MechanicalSystem>(s: &Listed<'_, S>, d: &mut ListedData<S>) {
+    let theta = s.options.theta;
+    for ((mean, end), begin) in d.v_mean.iter_mut().zip(&d.v_end).zip(&d.v) {
+        *mean = theta * end + (1.0 - theta) * begin;
     }
 }
 
@@ -114,34 +139,36 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
 /// The loads that the motion leaves open are found in the last iterate alone, which the contraction
 /// so far predicts, or which is the last one allowed.
 fn settle<S: MechanicalSystem>(
-    system: &mut S,
-    options: &StepOptions,
-    start: Start<'_, S::Configuration>,
-    warm_start: &WarmStart<KeyOf<S>>,
-    ws: &mut ScratchOf<S>,
+    s: &mut Listed<'_, S>,
+    d: &mut ListedData<S>,
+    problems: &mut PosedOf<S>,
     probe: &mut dyn Probe,
 ) -> (StepReport, bool) {
+    let options = s.options;
     let mut report = StepReport {
         steps: 1,
         status: StepStatus::NotConverged,
         ..StepReport::default()
     };
+    begin_iteration(s, d);
     let mut is_settled = false;
     let mut revisions = 0;
     let mut unsolved = 0;
     let mut last_change = f64::INFINITY;
-    ws.leaves_open = options.newton_max_iterations > 1;
+    s.list.leaves_open = options.newton_max_iterations > 1;
     for iteration in 0..options.newton_max_iterations {
-        let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe) else {
+        if !iterate(s, d, problems, iteration, probe) {
             break;
-        };
+        }
+        let solved = problems.report;
         report.iterations += solved.iterations;
+        report.retaken += solved.retaken;
         report.residual = solved.residual;
-        report.n_contacts = solved.n_contacts;
-        report.immovable_contacts = solved.immovable_contacts;
+        report.n_contacts = s.list.contacts.len();
+        report.immovable_contacts = (0..report.n_contacts).filter(|i| s.immovable(*i)).count();
         report.newton_iterations = iteration + 1;
         // A maximum ignores NaN, so check for it.
-        if !ws.v.iter().all(|x| x.is_finite()) {
+        if !d.v_end.iter().all(|x| x.is_finite()) {
             break;
         }
         // Iterating on an iterate that violates the law is useless; smaller steps have
@@ -154,23 +181,24 @@ fn settle<S: MechanicalSystem>(
         if unsolved == MOST_UNSOLVED {
             break;
         }
-        let change = ws.dv.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        let change = d.y.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let size = d.v_end.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         // Converged, or as far as rounding allows: the change is small and no longer shrinks.
         let is_small = change <= options.newton_tolerance * size;
         let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
         let expected = change * (change / last_change);
-        let left_open = ws.leaves_open && report.n_contacts > 0;
+        let left_open = s.list.leaves_open && report.n_contacts > 0;
         let will_end = last_change.is_finite() && expected <= options.newton_tolerance * size;
-        ws.leaves_open = !will_end && iteration + 2 < options.newton_max_iterations;
+        s.list.leaves_open = !will_end && iteration + 2 < options.newton_max_iterations;
         last_change = change;
         if is_small || is_rounding {
-            let is_open = left_open && system.open_problem(&ws.q_free, &ws.mu).is_some();
+            let q = Local::flat(&problems.q);
+            let is_open = left_open && s.system.open_problem(q, &s.list.mu).is_some();
             if is_open && iteration + 1 < options.newton_max_iterations {
-                ws.leaves_open = false;
+                s.list.leaves_open = false;
                 continue;
             }
-            if revisions < MOST_REVISIONS && system.revise(start, &ws.v) {
+            if revisions < MOST_REVISIONS && s.system.revise(true, &d.v, &d.v_end) {
                 revisions += 1;
                 last_change = f64::INFINITY;
                 continue;
@@ -184,88 +212,109 @@ fn settle<S: MechanicalSystem>(
     (report, is_settled)
 }
 
-/// `ws.end` for the velocity `ws.v`.
-fn move_to_the_end<S: MechanicalSystem>(
-    system: &S,
-    options: &StepOptions,
-    start: Start<'_, S::Configuration>,
-    ws: &mut ScratchOf<S>,
-) {
-    let (h, theta) = (options.time_step, options.theta);
-    for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
-        *mean = theta * end + (1.0 - theta) * begin;
-    }
-    system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
+/// The first iterate is the velocity before the step.
+fn begin_iteration<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>) {
+    begin(s, d);
+    (d.going, d.is_last) = (true, true);
+    d.obstacles[0] = None;
+    d.shares.clear();
+    d.is_gyroscopic.fill(false);
+    s.system.choose_branches(&d.v);
+    s.system.begin_balance(Start {
+        configuration: &d.start,
+        v: &d.v,
+    });
+    d.v_end.copy_from_slice(&d.v);
 }
 
 /// Fraction of the kinetic energy that free flight may gain or lose in the step.
-fn drift<S: MechanicalSystem>(
-    system: &S,
-    options: &StepOptions,
-    start: Start<'_, S::Configuration>,
-) -> f64 {
-    let turn = options.time_step * system.turning(start.v);
-    if system.conserves_momenta() && turn <= MOST_TURN {
+fn drift<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>) -> f64 {
+    let turning = s.system.turning(s.options, &d.v, &mut d.is_gyroscopic);
+    d.is_gyroscopic.fill(false); // the balance is at the end of the step
+    let turn = s.options.time_step * turning.unwrap_or(0.0);
+    if s.system.conserves_momenta() && turn <= MOST_TURN {
         turn * turn * turn
     } else {
         0.0
     }
 }
 
-/// One iteration: `ws.v` changes by `ws.dv`. None if the mass matrix cannot be factored, which
+/// One iteration: `d.v_end` changes by `d.y`. False if the mass matrix cannot be factored, which
 /// means that the iterate has diverged.
 fn iterate<S: MechanicalSystem>(
-    system: &mut S,
-    options: &StepOptions,
-    start: Start<'_, S::Configuration>,
-    warm_start: &WarmStart<KeyOf<S>>,
-    ws: &mut ScratchOf<S>,
+    s: &mut Listed<'_, S>,
+    d: &mut ListedData<S>,
+    problems: &mut PosedOf<S>,
     iteration: usize,
     probe: &mut dyn Probe,
-) -> Option<StepReport> {
+) -> bool {
+    let options = s.options;
     let (h, theta) = (options.time_step, options.theta);
-
-    for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
-        *mean = theta * end + (1.0 - theta) * begin;
-    }
-    system.set_moved(start.configuration, &ws.v_mean, theta * h, &mut ws.middle);
-    system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
-    system.place_middle(&ws.middle);
-    system.place_end(&ws.end);
+    find_mean(s, d);
+    (s.system).set_moved(&d.start, &d.v_mean, theta * h, &mut d.middle);
+    (s.system).set_moved(&d.start, &d.v_mean, h, &mut d.end);
+    s.system.place_middle(&d.middle);
+    s.system.place_end(&d.end);
     probe.end(Phase::Kinematics);
     if iteration == 0 {
         // The set of contacts of a step is decided once, by the forecast.
         let (gravity, measured) = (options.gravity.into(), theta * h);
         let activation = Activation::of_step(gravity, h, options.forecast, measured);
-        system.detect(start.v, activation, &mut ws.contacts);
-        (ws.groups).find(system, options, &ws.contacts, warm_start, &[]);
+        s.find_contacts(&d.v, activation);
+        recall(s, d, problems);
+        s.read_start(problems, &mut d.p_last);
     }
-    system.relocate(&mut ws.contacts);
+    s.system.relocate(&mut s.list.contacts);
     probe.end(Phase::Detection);
-    system.update_mass_matrix(options);
+    s.system.update_mass_matrix(options, true, true);
     probe.end(Phase::MassMatrix);
-    system.balance(
-        options,
-        start,
-        &ws.v,
-        &ws.v_mean,
-        &mut ws.correction,
-        &mut ws.impulse,
-    );
+    let start = Start {
+        configuration: &d.start,
+        v: &d.v,
+    };
+    let (v_end, v_mean) = (&d.v_end, &d.v_mean);
+    (s.system).balance(options, start, v_end, v_mean, &mut d.foreseen, &mut d.y);
     probe.end(Phase::Bias);
-    if !system.factorise(options) {
-        return None;
+    if !s.system.factorise(options) {
+        return false;
     }
-    ws.half_solve(|impulse| system.half_solve(impulse));
     probe.end(Phase::Factor);
-    assemble_contacts(system, options, start.v, warm_start, ws);
-    add_correction(system, options, warm_start, ws);
-    if iteration > 0 {
-        ws.p.copy_from_slice(&ws.p_last);
+    s.assemble(&d.v);
+    yield_at_end(s, d);
+    let is_any = d.persists.contains(&true);
+    if is_any {
+        s.generalized_impulse(true, &d.p_last, &mut d.pushed);
     }
+    correct_impulse(s, d, is_any);
     probe.end(Phase::Delassus);
-    let solved = solve_contacts(system, options, start.v, ws, iteration == 0, probe);
-    ws.p_last.clone_from(&ws.p);
+    s.system.close_velocity(options, &d.v, &d.v_end, &mut d.y);
+    s.system.local(&d.y, Local::flat_mut(&mut d.u));
+    let u = Local::flat_mut(&mut d.u);
+    (s.system).add_local_of_velocity(&s.list.contacts, &d.v_end, u);
+    add_shifts(s, d);
+    s.pose(options, &d.u, &d.p_last, &d.is_same, true, problems);
+    s.solve(&d.v_end, (&d.y, &d.laws), problems);
+    probe.end(Phase::Solve);
+    s.read(problems, &mut d.p, &mut d.u);
+    remove_shifts(s, d);
+    s.add_impulses(true, &d.p, &mut d.y);
+    s.add_moments(&mut d.y);
+    s.system.half_solve_back(&mut d.y);
+    for (v, change) in d.v_end.iter_mut().zip(&d.y) {
+        *v += change;
+    }
     probe.end(Phase::Update);
-    Some(solved)
+    true
+}
+
+/// The laws of contacts that yield, for the iterate.
+fn yield_at_end<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>) {
+    if d.laws.is_empty() {
+        return;
+    }
+    let u = Local::flat_mut(&mut d.pushes);
+    u.fill(0.0);
+    (s.system).add_local_of_velocity(&s.list.contacts, &d.v_end, u);
+    yield_under_load(s, d, true);
+    s.soften(&d.laws);
 }

@@ -8,8 +8,8 @@ use super::moreau_jean_newton::MoreauJeanNewton;
 use super::options::{StepOptions, Variant};
 use super::probe::Probe;
 use super::report::StepReport;
-use super::scheme::{Integrator, StateMut};
-use super::scratch::ScratchOf;
+use super::scratch::{ScratchOf, StateMut};
+use super::stepping::Integrator;
 use super::warm_start::WarmStart;
 
 /// Dispatches to the scheme of the variant; no other place chooses it.

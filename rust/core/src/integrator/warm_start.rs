@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::contacting::UnilateralContact;
-use super::mechanical_system::MechanicalSystem;
 use crate::contact::ContactKey;
 
 /// Number of remembered contacts from which bisection is tried before a linear search.
@@ -92,16 +91,6 @@ impl<K: Copy + Ord> WarmStart<K> {
         n == contacts.len() && contacts.iter().enumerate().all(is_known)
     }
 
-    /// Whether the contacts of a cluster persisted in the last step. Of a system with several
-    /// clusters, the entries of [`Self::persistent`] are 0 where they did not.
-    pub(super) fn persists<S>(&self, system: &S, cluster: usize) -> bool
-    where
-        S: MechanicalSystem,
-    {
-        let mut own = self.persistent.iter().enumerate();
-        own.any(|(k, x)| *x != 0.0 && system.cluster_of_velocity(k) == cluster)
-    }
-
     /// Remembers the impulses `p` (d n_c).
     pub fn remember<C: UnilateralContact<Key = K>>(&mut self, contacts: &[C], d: usize, p: &[f64]) {
         self.impulses.clear();
@@ -111,14 +100,6 @@ impl<K: Copy + Ord> WarmStart<K> {
             (c.key(), impulse)
         });
         self.impulses.extend(remembered);
-    }
-
-    /// Forgets the impulses of some contacts, in the order of detection.
-    pub(super) fn forget(&mut self, which: &[bool]) {
-        let forgotten = self.impulses.iter_mut().zip(which);
-        for ((_, p), _) in forgotten.filter(|(_, which)| **which) {
-            *p = [0.0; 3];
-        }
     }
 }
 
@@ -130,6 +111,7 @@ mod tests {
 
     impl UnilateralContact for Named {
         type Key = u32;
+        type Local = [f64; 2];
         fn key(&self) -> u32 {
             self.0
         }

@@ -37,6 +37,7 @@ use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
 use crate::integrator::WarmStart;
+use crate::integrator::grouped::Grouped;
 use crate::multibody::{Model, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::solver::batch::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};

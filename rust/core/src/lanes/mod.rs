@@ -1,22 +1,23 @@
 //! The fast step of a rover, one or several to a register.
 //!
 //! Most steps of a wheeled rover are alike: a tree of joints on a free base, wheels that roll and
-//! slip, motors, springs and stops. The code of such a step is generic over a scalar
-//! ([`crate::scalar`]): one rover, four or eight. The rovers of a block share their tree, so the
-//! code branches on the kind of a joint or a wheel, never on its state. What is rare, such as a
-//! chassis on the ground, is found rover by rover. If a rover needs something else, it leaves the
-//! block before its state changes, and the general step of [`crate::integrator`] takes it.
+//! slip, motors, springs and stops. Several rovers of one machine take them together
+//! ([`crate::integrator::scheme`]), in the lanes of a scalar ([`crate::scalar`]): one, four or
+//! eight. They share their tree, so the code branches on the kind of a joint or a wheel, never on
+//! its state. What is rare, such as a chassis on the ground, is found rover by rover. If a rover
+//! needs something else, it leaves the block before its state changes, and
+//! [`crate::integrator::moreau_jean`] takes its step alone.
 //!
 //! - [`machine`]: what the rovers of a block share; `parts`: its wheels, boxes and balls;
 //!   [`lane_rover`]: what a block reads of a rover;
 //! - [`ground`], `contact_plane`, `pieces`: the ground near a wheel; `rolling`, `joint_slots`:
 //!   contacts of all lanes at once; `lane_detection`, `by_lane`, `free_slots`: of
 //!   one lane; [`contacts`]: all of them, in slots;
-//! - [`rows`]: Jacobian and Delassus operator; [`yielding`]: wheels that yield;
+//! - [`rows`]: Jacobian and Delassus operator; `yielding`: wheels that yield;
 //! - `clusters`: which trees have a problem of their own; `sweeps`: where a contact that touches is
 //!   solved with all others fixed. The problems are solved by [`crate::solver::batch`];
-//! - [`step`]: the step. The dynamics of the tree are those of [`crate::multibody`], its drives
-//!   those of [`crate::system`].
+//! - [`block`]: rovers that take their steps together, as the systems of the scheme. The dynamics
+//!   of the tree are those of [`crate::multibody`], its drives those of [`crate::system`].
 //!
 //! # One call
 //!
@@ -39,7 +40,7 @@
 //!               Block::finish ──► Block::store_rover
 //! ```
 //!
-//! A lane that falls back takes the general step: [`crate::simulation`], [`crate::integrator`].
+//! A lane that falls back takes its step alone: [`crate::simulation`], [`crate::integrator`].
 //!
 //! # May use
 //!
@@ -48,13 +49,13 @@
 //! [`crate::system`].
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+pub mod block;
 mod by_lane;
 mod clusters;
 mod contact_plane;
 pub mod contacts;
 mod free_slots;
 pub mod ground;
-mod groups;
 mod joint_slots;
 mod lane_detection;
 pub mod lane_rover;
@@ -63,6 +64,5 @@ mod parts;
 mod pieces;
 mod rolling;
 pub mod rows;
-pub mod step;
 mod sweeps;
-pub mod yielding;
+mod yielding;

@@ -12,10 +12,9 @@
 //! where x_i is x itself below the first part with an absolute angle, and above it the origin of
 //! that part. M, the bias and the contacts' rows are sums of these columns.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 
-use crate::integrator::MechanicalEnergy;
-use crate::multibody::Motor;
+use crate::multibody::{Energy, Motor};
 use crate::scalar::elementary::sin_cos;
 
 /// A body of the tree.
@@ -363,22 +362,25 @@ impl PlanarTree {
         -self.parts.iter().enumerate().map(of).sum::<f64>()
     }
 
-    /// Energy and momentum at a state (nv, nv).
+    /// Total mass, kg.
     #[must_use]
-    pub fn energy(&self, q: &[f64], v: &[f64], gravity: &Vector2<f64>) -> MechanicalEnergy {
+    pub fn mass(&self) -> f64 {
+        self.parts.iter().map(|part| part.mass).sum()
+    }
+
+    /// Energy, J, and linear momentum, kg m/s, at a state (nv, nv).
+    #[must_use]
+    pub fn energy(&self, q: &[f64], v: &[f64], gravity: &Vector2<f64>) -> (Energy, [f64; 2]) {
         let (n, poses) = (self.nv(), self.poses(q));
         let mut M = vec![0.0; n * n];
         self.mass_matrix(&poses, &mut M);
         let dot = |a: &[f64]| a.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
         let momentum: Vec<f64> = M.chunks_exact(n).map(dot).collect();
-        MechanicalEnergy {
+        let energy = Energy {
             kinetic: 0.5 * dot(&momentum),
             potential: self.potential(&poses, gravity),
-            momentum: Vector3::new(momentum[0], momentum[1], 0.0),
-            // A force along x acts on the whole mass.
-            mass: M[0],
-            is_held: false,
-        }
+        };
+        (energy, [momentum[0], momentum[1]])
     }
 
     /// Largest angular speed of a frame whose pose matters, rad/s.

@@ -96,8 +96,6 @@ pub type GrainSimulation<const D: usize> = Simulation<GrainBed<D>>;
 pub type SoilSimulation = GrainSimulation<2>;
 
 impl<const D: usize> LocatedContact for GrainContact<D> {
-    type Vector = [f64; D];
-
     fn normal(&self) -> [f64; D] {
         self.n.into()
     }
@@ -403,7 +401,7 @@ where
         self.memory.moments = moments
             .filter_map(|(key, s)| Some((renumbering.key(*key)?, *s)))
             .collect();
-        self.scratch = Scratch::new(&self.state.configuration, self.scene.nv(), room, D);
+        self.scratch = Scratch::new(&self.state.configuration, room);
         self.active.clear();
     }
 

@@ -71,7 +71,7 @@ pub mod stepping;
 mod steps_in_sand;
 pub mod turns;
 
-pub use active_contact::{ActiveContact, Components, LocatedContact};
+pub use active_contact::{ActiveContact, LocatedContact};
 pub use any_snapshot::AnySnapshot;
 pub use batch::Batch;
 pub use differentiator::{

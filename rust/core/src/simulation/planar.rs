@@ -34,8 +34,6 @@ impl DenseOperator for PlanarScratch {
 }
 
 impl LocatedContact for PlanarContact {
-    type Vector = [f64; 2];
-
     fn normal(&self) -> [f64; 2] {
         self.n.into()
     }
@@ -99,11 +97,8 @@ impl Scene for PlanarScene {
         _command: &Self::Command,
     ) -> Energy {
         let gravity = options.gravity.xy();
-        let energy = (self.machine).energy(&state.configuration, &state.v, &gravity);
-        Energy {
-            kinetic: energy.kinetic,
-            potential: energy.potential,
-        }
+        let (energy, _) = (self.machine).energy(&state.configuration, &state.v, &gravity);
+        energy
     }
 
     fn fingerprint(&self) -> u64 {

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::lanes::step::Block;
+use crate::lanes::block::Block;
 use crate::solver::SolverOptions;
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;

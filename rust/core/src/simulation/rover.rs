@@ -104,8 +104,6 @@ impl DenseOperator for RoverParts {
 }
 
 impl LocatedContact for Contact {
-    type Vector = [f64; 3];
-
     fn normal(&self) -> [f64; 3] {
         self.frame.rows()[0].into()
     }

@@ -99,12 +99,11 @@ impl RoverInGrains {
 
     fn with_friction(friction: f64, rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Self {
         let q = (bed.q().clone(), rover.q().clone());
-        let nv = bed.scene.nv() + rover.scene.nv();
         let room = bed.scene.contact_capacity() + rover.scene.contact_capacity();
         Self {
             friction,
             warm_start: WarmStart::with_capacity(room, 0),
-            scratch: Scratch::new(&q, nv, room, 3),
+            scratch: Scratch::new(&q, room),
             parts: CompositeScratch::default(),
         }
     }

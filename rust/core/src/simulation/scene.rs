@@ -65,7 +65,7 @@ pub trait Scene: Clone {
         &self,
         parts: &Self::Parts,
         contact: &Self::Contact,
-    ) -> <Self::Contact as LocatedContact>::Vector;
+    ) -> <Self::Contact as UnilateralContact>::Local;
 
     /// Called at the start of a call, or after the state was set: resets sums over a call. By
     /// default there are none.
@@ -124,10 +124,10 @@ pub trait Scene: Clone {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound(
     serialize = "S::Configuration: Serialize, S::Command: Serialize, S::Memory: Serialize, SceneKey<S>: Serialize, \
-                 S::Contact: Serialize, <S::Contact as LocatedContact>::Vector: Serialize",
+                 S::Contact: Serialize, <S::Contact as UnilateralContact>::Local: Serialize",
     deserialize = "S::Configuration: Deserialize<'de>, S::Command: Deserialize<'de>, S::Memory: Deserialize<'de>, \
                    SceneKey<S>: Deserialize<'de>, S::Contact: Deserialize<'de>, \
-                   <S::Contact as LocatedContact>::Vector: Deserialize<'de>"
+                   <S::Contact as UnilateralContact>::Local: Deserialize<'de>"
 ))]
 pub struct Snapshot<S: Scene> {
     /// [`Scene::fingerprint`] of its scene.

@@ -1,14 +1,14 @@
 //! The simulation of a scene.
 
-use super::active_contact::{ActiveContact, Components, LocatedContact};
+use super::active_contact::ActiveContact;
 use super::error::SnapshotError;
 use super::profile::Stopwatch;
 use super::scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
 use super::state::State;
 use crate::caught::caught;
 use crate::integrator::{
-    Integrator, NoProbe, OptionsError, Probe, Scratch, StepError, StepOptions, StepReport,
-    WarmStart,
+    Integrator, Local, NoProbe, OptionsError, Probe, Scratch, StepError, StepOptions, StepReport,
+    UnilateralContact, WarmStart,
 };
 use crate::multibody::Energy;
 use crate::problem::{Dimension, FrictionContactProblem, undetermined_loads};
@@ -48,12 +48,11 @@ impl<S: Scene> Simulation<S> {
     ) -> Result<Self, OptionsError> {
         options.check()?;
         let (nv, n) = (scene.nv(), scene.contact_capacity());
-        let d = <S::Contact as LocatedContact>::Vector::N;
         Ok(Self {
             command: scene.command(),
             memory: scene.memory(),
             parts: scene.parts(),
-            scratch: Scratch::new(&configuration, nv, n, d),
+            scratch: Scratch::new(&configuration, n),
             state: State::at_rest(configuration, nv),
             warm_start: WarmStart::with_capacity(n, nv),
             active: Vec::with_capacity(n),
@@ -329,9 +328,8 @@ impl<S: Scene> Simulation<S> {
         let time = self.state.time;
         caught(|| step(self)).map_err(|fault| {
             self.scene.recover(&mut self.parts, &mut self.memory);
-            let (nv, n) = (self.scene.nv(), self.scene.contact_capacity());
-            let d = <S::Contact as LocatedContact>::Vector::N;
-            self.scratch = Scratch::new(&self.state.configuration, nv, n, d);
+            let n = self.scene.contact_capacity();
+            self.scratch = Scratch::new(&self.state.configuration, n);
             StepError::Internal { time, fault }
         })
     }
@@ -403,15 +401,15 @@ impl<S: Scene> Simulation<S> {
     }
 
     pub(super) fn list_active(&mut self) {
-        let d = <S::Contact as LocatedContact>::Vector::N;
         let (scene, parts) = (&self.scene, &self.parts);
+        let d = <S::Contact as UnilateralContact>::Local::N;
         let impulses = self.scratch.impulses().chunks_exact(d);
         let local = impulses.zip(self.scratch.velocities().chunks_exact(d));
         let active = |(contact, (p, u)): (&S::Contact, (&[f64], &[f64]))| ActiveContact {
             contact: *contact,
             position: scene.position(parts, contact),
-            impulse: Components::of(p),
-            velocity: Components::of(u),
+            impulse: Local::of(p),
+            velocity: Local::of(u),
         };
         self.active.clear();
         self.active
@@ -470,7 +468,7 @@ where
     /// Contacts whose impulses the motion of the last step leaves open; see [`undetermined_loads`].
     #[must_use]
     pub fn undetermined_loads(&self) -> usize {
-        let dimension = match <S::Contact as LocatedContact>::Vector::N {
+        let dimension = match <S::Contact as UnilateralContact>::Local::N {
             2 => Dimension::Two,
             _ => Dimension::Three,
         };

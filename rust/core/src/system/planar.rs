@@ -8,12 +8,12 @@ use super::fitted_theta::implicit_weight;
 use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
-    Contacting, Dynamics, Forces, MechanicalEnergy, Start, StepOptions, UnilateralContact, Work,
+    Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::multibody::MotorLine;
 use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
 use crate::problem::{Dimension, FrictionContactProblem};
-use crate::scalar::Single;
+use crate::scalar::{Single, Vec3};
 
 /// Key of a contact between a disc and the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -59,6 +59,7 @@ impl PlanarContact {
 
 impl UnilateralContact for PlanarContact {
     type Key = PlanarKey;
+    type Local = [f64; 2];
 
     fn key(&self) -> PlanarKey {
         self.key
@@ -168,9 +169,8 @@ impl PlanarSystem<'_> {
 }
 
 impl Dynamics for PlanarSystem<'_> {
+    type T = f64;
     type Configuration = Vec<f64>;
-
-    const DIMENSION: Dimension = Dimension::Two;
 
     fn nv(&self) -> usize {
         self.machine.nv()
@@ -179,6 +179,16 @@ impl Dynamics for PlanarSystem<'_> {
     fn advance(&self, q: &mut Vec<f64>, v: &[f64], h: f64) {
         for (q, v) in q.iter_mut().zip(v) {
             *q += h * v;
+        }
+    }
+
+    fn translation_axis(&self, velocity: usize) -> Option<usize> {
+        (velocity < 2).then_some(velocity)
+    }
+
+    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Vec<f64>, to: &mut Vec<f64>) {
+        if lanes(0) {
+            to.clone_from(from);
         }
     }
 
@@ -194,7 +204,7 @@ impl Dynamics for PlanarSystem<'_> {
         self.machine.place(q, &mut self.parts.end);
     }
 
-    fn update_mass_matrix(&mut self, options: &StepOptions) {
+    fn update_mass_matrix(&mut self, options: &StepOptions, _: bool, _: bool) {
         let parts = &mut *self.parts;
         parts.matrices.set_mass(self.machine, &parts.middle);
         let step = (options.time_step, options.theta);
@@ -218,8 +228,12 @@ impl Dynamics for PlanarSystem<'_> {
         self.parts.matrices.multiply_mass(v, out);
     }
 
-    fn turning(&self, v: &[f64]) -> f64 {
-        self.machine.turning(v)
+    fn turning(&mut self, _: &StepOptions, v: &[f64], _: &mut [bool]) -> Option<f64> {
+        Some(self.machine.turning(v))
+    }
+
+    fn is_audited(&self) -> bool {
+        true
     }
 
     fn energies(
@@ -227,10 +241,14 @@ impl Dynamics for PlanarSystem<'_> {
         options: &StepOptions,
         q: &Vec<f64>,
         v: &[f64],
-        out: &mut Vec<MechanicalEnergy>,
+        mut each: impl FnMut(usize, [f64; 2], Vec3<f64>),
     ) {
-        out.clear();
-        out.push(self.machine.energy(q, v, &options.gravity.xy()));
+        let (energy, [x, y]) = self.machine.energy(q, v, &options.gravity.xy());
+        each(0, energy.kinetic_and_potential(), Vec3::new(x, y, 0.0));
+    }
+
+    fn mass(&self, _cluster: usize) -> Option<f64> {
+        Some(self.machine.mass())
     }
 
     fn half_solve(&self, y: &mut [f64]) {
@@ -257,7 +275,7 @@ impl Forces for PlanarSystem<'_> {
         self.load_at_end(options, start, start.v, v_mean, y);
     }
 
-    fn choose_branches(&mut self, start: Start<'_, Vec<f64>>) {
+    fn choose_branches(&mut self, v: &[f64]) {
         let motors = &mut self.parts.motors;
         motors.clear();
         for (input, &torque) in self.inputs.iter().enumerate() {
@@ -269,16 +287,16 @@ impl Forces for PlanarSystem<'_> {
                     theta: 0.5,
                 };
                 own.line.set_lane(0, Some(&motor.motor), torque);
-                own.line.choose(own.rate(start.v));
+                own.line.choose(own.rate(v));
                 motors.push(own);
             }
         }
     }
 
-    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
+    fn revise(&mut self, _: bool, v: &[f64], v_end: &[f64]) -> bool {
         let mut is_new = false;
         for own in &mut self.parts.motors {
-            let rate = own.implicit_rate(start.v, v_end);
+            let rate = own.implicit_rate(v, v_end);
             is_new |= own.line.revise(true, rate);
         }
         is_new
@@ -309,9 +327,9 @@ impl Forces for PlanarSystem<'_> {
         start: Start<'_, Vec<f64>>,
         v_end: &[f64],
         displacement: &[f64],
-    ) -> f64 {
+    ) -> Option<f64> {
         self.set_driving(start.v, v_end);
-        sum_of_products(&self.parts.driving, displacement)
+        Some(sum_of_products(&self.parts.driving, displacement))
     }
 
     fn work(
@@ -342,6 +360,8 @@ impl Forces for PlanarSystem<'_> {
 }
 
 impl Contacting for PlanarSystem<'_> {
+    const DIMENSION: Dimension = Dimension::Two;
+
     type Contact = PlanarContact;
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<PlanarContact>) {

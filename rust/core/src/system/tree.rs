@@ -3,8 +3,6 @@
 //! The forces of its joints are implicit ([`super::drives`]). `M̂ = Lᵀ D L` along the tree; the
 //! contact system stores `Z` along each contact's path.
 
-use nalgebra::Vector3;
-
 use super::command::Command;
 use super::extent::{Turning, displacement, tolerated};
 use super::gyroscopic::Turned;
@@ -21,7 +19,7 @@ use crate::contact::{
 use crate::geometry::Terrain;
 use crate::integrator::forces::MOST_REVISIONS;
 use crate::integrator::{
-    Contacting, Dynamics, Forces, MechanicalEnergy, Start, StepOptions, UnilateralContact, Work,
+    Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
@@ -30,9 +28,11 @@ use crate::multibody::energy::energies;
 use crate::multibody::{Configuration, Factor, Model};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::sand::RutMap;
+use crate::scalar::Vec3;
 
 impl UnilateralContact for Contact {
     type Key = ContactKey;
+    type Local = [f64; 3];
 
     #[inline]
     fn key(&self) -> ContactKey {
@@ -175,9 +175,8 @@ impl TreeSystem<'_> {
 }
 
 impl Dynamics for TreeSystem<'_> {
+    type T = f64;
     type Configuration = Configuration;
-
-    const DIMENSION: Dimension = Dimension::Three;
 
     #[inline]
     fn nv(&self) -> usize {
@@ -194,13 +193,17 @@ impl Dynamics for TreeSystem<'_> {
         self.model.mechanism().cluster_of_velocity(k)
     }
 
-    fn take_clusters(
-        &self,
-        from: &Configuration,
-        is_taken: &dyn Fn(usize) -> bool,
-        to: &mut Configuration,
-    ) {
-        to.take_clusters(self.model, from, is_taken);
+    #[inline]
+    fn is_held(&self, cluster: usize) -> bool {
+        self.model.mechanism().is_held(cluster)
+    }
+
+    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Configuration, to: &mut Configuration) {
+        if self.n_clusters() > 1 {
+            to.take_clusters(self.model, from, &lanes);
+        } else if lanes(0) {
+            to.clone_from(from);
+        }
     }
 
     #[inline]
@@ -229,7 +232,7 @@ impl Dynamics for TreeSystem<'_> {
     }
 
     #[inline]
-    fn update_mass_matrix(&mut self, options: &StepOptions) {
+    fn update_mass_matrix(&mut self, options: &StepOptions, _: bool, _: bool) {
         self.parts.apply(self.model, &self.command.wrenches);
         if let Some((sand, scene, _)) = self.sand() {
             sand.linearise(&scene, true, step(options), options.gravity.into());
@@ -265,18 +268,19 @@ impl Dynamics for TreeSystem<'_> {
     }
 
     #[inline]
-    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], cluster: usize) -> bool {
-        let turning = Turning::of_cluster(0.0, self.model.mechanism(), v, cluster);
-        turning.is_gyroscopic(options.time_step)
-    }
-
-    #[inline]
-    fn turning(&self, v: &[f64]) -> f64 {
-        let mechanism = self.model.mechanism();
-        let of_frames = |own| Turning::of_cluster(0.0, mechanism, v, own).of_frames();
-        (0..mechanism.n_clusters())
-            .map(of_frames)
-            .fold(0.0, f64::max)
+    fn turning(
+        &mut self,
+        options: &StepOptions,
+        v: &[f64],
+        is_gyroscopic: &mut [bool],
+    ) -> Option<f64> {
+        let mut most = 0.0_f64;
+        for (cluster, own) in is_gyroscopic.iter_mut().enumerate() {
+            let turning = Turning::of_cluster(0.0, self.model.mechanism(), v, cluster);
+            *own = turning.is_gyroscopic(options.time_step);
+            most = most.max(turning.of_frames());
+        }
+        Some(most)
     }
 
     fn translation_axis(&self, velocity: usize) -> Option<usize> {
@@ -290,17 +294,17 @@ impl Dynamics for TreeSystem<'_> {
         self.model.is_free_tree() && self.model.loops().is_empty()
     }
 
+    fn is_audited(&self) -> bool {
+        !self.parts.has_given_sand()
+    }
+
     fn energies(
         &mut self,
         options: &StepOptions,
         q: &Configuration,
         v: &[f64],
-        out: &mut Vec<MechanicalEnergy>,
+        mut each: impl FnMut(usize, [f64; 2], Vec3<f64>),
     ) {
-        out.clear();
-        if self.parts.has_given_sand() {
-            return;
-        }
         let TreeScratch {
             q: lane,
             energy: scratch,
@@ -310,21 +314,15 @@ impl Dynamics for TreeSystem<'_> {
         let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
         let gravity = options.gravity.into();
         let found = energies(mechanism, inertias, lane, v, gravity, scratch);
-        out.extend(found.iter().enumerate().map(|(cluster, own)| {
-            // A tree on a fixed base, or tied to the world, passes momentum on to it.
-            let is_held = mechanism.is_held(cluster);
-            MechanicalEnergy {
-                kinetic: own.energy.kinetic,
-                potential: own.energy.potential,
-                momentum: if is_held {
-                    Vector3::zeros()
-                } else {
-                    own.momentum.into()
-                },
-                mass: inertias.mass_of(mechanism, cluster),
-                is_held,
-            }
-        }));
+        for (cluster, own) in found.iter().enumerate() {
+            each(cluster, own.energy.kinetic_and_potential(), own.momentum);
+        }
+    }
+
+    #[inline]
+    fn mass(&self, cluster: usize) -> Option<f64> {
+        let model = self.model;
+        Some(model.inertias().mass_of(model.mechanism(), cluster))
     }
 
     #[inline]
@@ -344,27 +342,31 @@ impl Dynamics for TreeSystem<'_> {
         }
     }
 
-    fn add_loop_impulse(&mut self, p: &[f64], out: &mut [f64]) {
+    fn add_loop_impulse(&mut self, out: &mut [f64]) {
         if let Some(loops) = &mut self.parts.loops {
-            loops.add_generalized_impulse(&each(p), out);
+            loops.add_generalized_impulse(&std::iter::empty(), out);
         }
     }
 
     #[inline]
-    fn close_end(&mut self, p: &[f64], q: &mut Configuration, v: &mut [f64]) -> f64 {
+    fn close_end(
+        &mut self,
+        lanes: bool,
+        p: &[f64],
+        q: &mut Configuration,
+        v: &mut [f64],
+    ) -> Option<f64> {
         let TreeScratch {
             loops,
             factor,
             q: lane,
             ..
         } = &mut *self.parts;
-        let Some(loops) = loops else {
-            return 0.0;
-        };
+        let loops = loops.as_mut().filter(|_| lanes)?;
         lane.set_lane(0, q);
         let gap = loops.end(self.model, factor, p, lane, v);
         lane.to_lane(0, q);
-        gap
+        Some(gap)
     }
 
     fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
@@ -412,21 +414,20 @@ impl Forces for TreeSystem<'_> {
         };
         let velocities = [start.v, v_mean];
         (parts.gyroscopic).solve(&of, step(options), velocities, impulse, y);
-        parts.factor.half_solve(model.mechanism(), y);
     }
 
     #[inline]
-    fn choose_branches(&mut self, start: Start<'_, Configuration>) {
+    fn choose_branches(&mut self, v: &[f64]) {
         let drives = &mut self.parts.drives;
         drives.set_lane(0, self.model.joints(), self.command);
         drives.finish_loading();
-        drives.choose_branches(self.model.mechanism(), start.v);
+        drives.choose_branches(self.model.mechanism(), v);
         if let Some(sand) = &mut self.parts.sand {
-            sand.start_from(start.v);
+            sand.start_from(v);
         }
     }
 
-    fn most_revisions(&self) -> usize {
+    fn most_revisions(&self, _: usize) -> usize {
         if self.parts.sand.is_some() {
             MOST_REVISIONS_IN_SAND
         } else {
@@ -434,17 +435,17 @@ impl Forces for TreeSystem<'_> {
         }
     }
 
-    fn is_settled(&mut self, v_end: &[f64]) -> bool {
+    fn unsettled(&mut self, lanes: bool, v_end: &[f64]) -> bool {
         let tried = self.parts.sand.clone();
         let is_new = (self.sand())
             .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
         self.parts.sand = tried;
-        !is_new
+        is_new && lanes
     }
 
-    fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
+    fn revise(&mut self, _: bool, v: &[f64], v_end: &[f64]) -> bool {
         let mechanism = self.model.mechanism();
-        let is_new = (self.parts.drives).revise(mechanism, true, start.v, v_end);
+        let is_new = (self.parts.drives).revise(mechanism, true, v, v_end);
         let is_new_in_sand = (self.sand())
             .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
         is_new | is_new_in_sand
@@ -490,17 +491,21 @@ impl Forces for TreeSystem<'_> {
         start: Start<'_, Configuration>,
         v_end: &[f64],
         displacement: &[f64],
-    ) -> f64 {
+    ) -> Option<f64> {
         let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
         let motion = [start.v, v_end, displacement];
         let applied = self.parts.applied.iter().zip(displacement);
         let of_wrenches = applied.map(|(force, way)| force * way).sum::<f64>();
-        of_wrenches
-            + (self.parts.drives).work_of_displacement(mechanism, step(options), places, motion)
+        let drives = &self.parts.drives;
+        let of_drives = drives.work_of_displacement(mechanism, step(options), places, motion);
+        Some(of_wrenches + of_drives)
     }
 
     #[inline]
-    fn accept(&mut self) {
+    fn accept(&mut self, lanes: bool, _: &[f64]) {
+        if !lanes {
+            return;
+        }
         let parts = &mut *self.parts;
         parts.drives.accept_part();
         if let Some(sand) = &mut parts.sand {
@@ -538,6 +543,8 @@ impl Forces for TreeSystem<'_> {
 }
 
 impl Contacting for TreeSystem<'_> {
+    const DIMENSION: Dimension = Dimension::Three;
+
     type Contact = Contact;
 
     fn clusters_of(&self, key: &ContactKey) -> [usize; 2] {
@@ -613,10 +620,8 @@ impl Contacting for TreeSystem<'_> {
     }
 
     #[inline]
-    fn compliant_mass(&self, cluster: usize) -> Option<f64> {
-        let model = &self.model;
-        let mass = || model.inertias().mass_of(model.mechanism(), cluster);
-        model.has_compliance().then(mass)
+    fn yields(&self) -> bool {
+        self.model.has_compliance()
     }
 
     fn compliance(&self, contact: &Contact, v: &[f64]) -> Option<Compliance> {

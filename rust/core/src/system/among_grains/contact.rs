@@ -55,6 +55,7 @@ pub enum CompositeKey {
 
 impl UnilateralContact for CompositeContact {
     type Key = CompositeKey;
+    type Local = [f64; 3];
 
     fn key(&self) -> CompositeKey {
         match self {

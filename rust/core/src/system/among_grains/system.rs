@@ -125,9 +125,8 @@ impl TreeAmongGrains<'_> {
 }
 
 impl Dynamics for TreeAmongGrains<'_> {
+    type T = f64;
     type Configuration = Both;
-
-    const DIMENSION: Dimension = Dimension::Three;
 
     fn nv(&self) -> usize {
         self.bed.nv() + self.tree.nv()
@@ -143,6 +142,12 @@ impl Dynamics for TreeAmongGrains<'_> {
         let (v_a, v_b) = self.halves(v);
         self.bed.advance(&mut q.0, v_a, h);
         self.tree.advance(&mut q.1, v_b, h);
+    }
+
+    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Both, to: &mut Both) {
+        if lanes(0) {
+            to.clone_from(from);
+        }
     }
 
     fn is_finite(&self, q: &Both) -> bool {
@@ -163,9 +168,9 @@ impl Dynamics for TreeAmongGrains<'_> {
         self.tree.place_end(&q.1);
     }
 
-    fn update_mass_matrix(&mut self, options: &StepOptions) {
-        self.bed.update_mass_matrix(options);
-        self.tree.update_mass_matrix(options);
+    fn update_mass_matrix(&mut self, options: &StepOptions, going: bool, is_first: bool) {
+        self.bed.update_mass_matrix(options, going, is_first);
+        self.tree.update_mass_matrix(options, going, is_first);
     }
 
     fn factorise(&mut self, options: &StepOptions) -> bool {
@@ -178,13 +183,17 @@ impl Dynamics for TreeAmongGrains<'_> {
         self.tree.multiply_mass(v_b, out_b);
     }
 
-    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64], _cluster: usize) -> bool {
-        let mut clusters = 0..self.tree.n_clusters();
-        clusters.any(|own| self.tree.is_gyroscopic(options, self.halves(v).1, own))
-    }
-
-    fn turning(&self, v: &[f64]) -> f64 {
-        self.tree.turning(self.halves(v).1)
+    fn turning(
+        &mut self,
+        options: &StepOptions,
+        v: &[f64],
+        is_gyroscopic: &mut [bool],
+    ) -> Option<f64> {
+        let mut of_trees = vec![false; self.tree.n_clusters()];
+        let (_, v) = v.split_at(self.bed.nv());
+        let turning = self.tree.turning(options, v, &mut of_trees);
+        is_gyroscopic[0] = of_trees.contains(&true);
+        turning
     }
 
     fn half_solve(&self, y: &mut [f64]) {
@@ -204,14 +213,18 @@ impl Dynamics for TreeAmongGrains<'_> {
         (self.tree).close_velocity(options, &v_begin[n..], &v[n..], &mut y[n..]);
     }
 
-    fn add_loop_impulse(&mut self, p: &[f64], out: &mut [f64]) {
-        let [_, p] = self.parts.split(p);
-        (self.tree).add_loop_impulse(p, &mut out[self.bed.nv()..]);
+    fn add_loop_impulse(&mut self, out: &mut [f64]) {
+        self.tree.add_loop_impulse(&mut out[self.bed.nv()..]);
     }
 
-    fn close_end(&mut self, p: &[f64], q: &mut Both, v: &mut [f64]) -> f64 {
+    fn close_end(&mut self, lanes: bool, p: &[f64], q: &mut Both, v: &mut [f64]) -> Option<f64> {
         let [_, p] = self.parts.split(p);
-        (self.tree).close_end(p, &mut q.1, &mut v[self.bed.nv()..])
+        (self.tree).close_end(lanes, p, &mut q.1, &mut v[self.bed.nv()..])
+    }
+
+    fn mass(&self, _cluster: usize) -> Option<f64> {
+        let clusters = 0..self.tree.n_clusters();
+        clusters.map(|own| self.tree.mass(own)).sum()
     }
 
     fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
@@ -251,26 +264,27 @@ impl Forces for TreeAmongGrains<'_> {
         (self.tree).load_gyroscopic(options, start_b, v_b, theirs, y_b);
     }
 
-    fn choose_branches(&mut self, start: Start<'_, Both>) {
-        let (start_a, start_b) = self.starts(start);
-        self.bed.choose_branches(start_a);
-        self.tree.choose_branches(start_b);
+    fn choose_branches(&mut self, v: &[f64]) {
+        let (v_a, v_b) = self.halves(v);
+        self.bed.choose_branches(v_a);
+        self.tree.choose_branches(v_b);
     }
 
-    fn most_revisions(&self) -> usize {
-        self.bed.most_revisions().max(self.tree.most_revisions())
+    fn most_revisions(&self, lane: usize) -> usize {
+        let (of_bed, of_tree) = (&self.bed, &self.tree);
+        of_bed
+            .most_revisions(lane)
+            .max(of_tree.most_revisions(lane))
     }
 
-    fn is_settled(&mut self, v_end: &[f64]) -> bool {
-        let (_, v_end) = self.halves(v_end);
-        self.tree.is_settled(v_end)
+    fn unsettled(&mut self, lanes: bool, v_end: &[f64]) -> bool {
+        self.tree.unsettled(lanes, &v_end[self.bed.nv()..])
     }
 
-    fn revise(&mut self, start: Start<'_, Both>, v_end: &[f64]) -> bool {
-        let (start_a, start_b) = self.starts(start);
-        let (end_a, end_b) = self.halves(v_end);
-        let has_struck = self.bed.revise(start_a, end_a);
-        self.tree.revise(start_b, end_b) || has_struck
+    fn revise(&mut self, lanes: bool, v: &[f64], v_end: &[f64]) -> bool {
+        let ((v_a, v_b), (end_a, end_b)) = (self.halves(v), self.halves(v_end));
+        let has_struck = self.bed.revise(lanes, v_a, end_a);
+        self.tree.revise(lanes, v_b, end_b) || has_struck
     }
 
     fn work(
@@ -288,8 +302,8 @@ impl Forces for TreeAmongGrains<'_> {
         out.fill(whole.unwrap_or_default());
     }
 
-    fn accept(&mut self) {
-        self.tree.accept();
+    fn accept(&mut self, lanes: bool, p: &[f64]) {
+        self.tree.accept(lanes, p);
     }
 
     fn begin_balance(&mut self, start: Start<'_, Both>) {
@@ -316,6 +330,8 @@ impl Forces for TreeAmongGrains<'_> {
 
 impl Contacting for TreeAmongGrains<'_> {
     type Contact = CompositeContact;
+
+    const DIMENSION: Dimension = Dimension::Three;
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<CompositeContact>) {
         let v = self.halves(v);
@@ -382,9 +398,8 @@ impl Contacting for TreeAmongGrains<'_> {
         own.is_some_and(|own| self.tree.is_immovable(own))
     }
 
-    fn compliant_mass(&self, _cluster: usize) -> Option<f64> {
-        let clusters = 0..self.tree.n_clusters();
-        clusters.map(|own| self.tree.compliant_mass(own)).sum()
+    fn yields(&self) -> bool {
+        self.tree.yields()
     }
 
     fn compliance(&self, contact: &CompositeContact, v: &[f64]) -> Option<Compliance> {

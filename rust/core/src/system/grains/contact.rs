@@ -63,6 +63,7 @@ impl<const D: usize> GrainContact<D> {
 
 impl<const D: usize> UnilateralContact for GrainContact<D> {
     type Key = GrainKey;
+    type Local = [f64; D];
 
     fn key(&self) -> GrainKey {
         self.key

@@ -42,7 +42,7 @@ impl<const D: usize> GrainScene<D> {
         }
         if let Some(machine) = &self.machine {
             let (pose, rate) = (self.machine_coordinates(q), self.machine_velocities(v));
-            let own = machine.energy(pose, rate, &gravity.xy());
+            let (own, _) = machine.energy(pose, rate, &gravity.xy());
             energy.kinetic += own.kinetic;
             energy.potential += own.potential;
         }

@@ -318,10 +318,10 @@ impl<const D: usize> Dynamics for GrainSystem<'_, D>
 where
     BodyPairs<D>: Swept<D>,
 {
+    type T = f64;
+
     /// [`COORDINATES`] of each grain, then the machine's, m and rad.
     type Configuration = Vec<f64>;
-
-    const DIMENSION: Dimension = dimension(D);
 
     fn nv(&self) -> usize {
         self.scene.nv()
@@ -342,6 +342,12 @@ where
         }
     }
 
+    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Vec<f64>, to: &mut Vec<f64>) {
+        if lanes(0) {
+            to.clone_from(from);
+        }
+    }
+
     fn is_finite(&self, q: &Vec<f64>) -> bool {
         q.iter().all(|x| x.is_finite())
     }
@@ -356,7 +362,7 @@ where
         self.place_machine(q, 1);
     }
 
-    fn update_mass_matrix(&mut self, _options: &StepOptions) {
+    fn update_mass_matrix(&mut self, _options: &StepOptions, _: bool, _: bool) {
         if let Some(machine) = self.scene.machine.as_deref() {
             let GrainParts {
                 machine_poses: [middle, _],
@@ -416,16 +422,16 @@ impl<const D: usize> Forces for GrainSystem<'_, D>
 where
     BodyPairs<D>: Swept<D>,
 {
-    fn choose_branches(&mut self, _start: Start<'_, Vec<f64>>) {
+    fn choose_branches(&mut self, _v: &[f64]) {
         self.parts.struck.clear();
     }
 
-    fn most_revisions(&self) -> usize {
+    fn most_revisions(&self, _: usize) -> usize {
         MOST_REPETITIONS
     }
 
-    fn revise(&mut self, start: Start<'_, Vec<f64>>, v_end: &[f64]) -> bool {
-        self.find_struck(start.v, v_end)
+    fn revise(&mut self, _: bool, v: &[f64], v_end: &[f64]) -> bool {
+        self.find_struck(v, v_end)
     }
 
     fn load(
@@ -468,6 +474,8 @@ where
     BodyPairs<D>: Swept<D>,
 {
     type Contact = GrainContact<D>;
+
+    const DIMENSION: Dimension = dimension(D);
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<GrainContact<D>>) {
         self.find_contacts(v, activation, out);

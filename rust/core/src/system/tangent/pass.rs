@@ -501,7 +501,7 @@ impl<T: Lane> Tangent<T> {
         }
     }
 
-    /// What the audit leaves of the velocity, see [`crate::integrator::energy_audit`].
+    /// What the audit leaves of the velocity, see [`crate::integrator::audit`].
     fn correct(&mut self, scene: &TangentScene<'_>) {
         let step = self.step(scene);
         let mechanism = scene.model.mechanism();

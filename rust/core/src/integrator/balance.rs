@@ -1,14 +1,16 @@
-//! The energy balance of a step, and its audit as [`crate::integrator::energy_audit`] does it.
+//! The energy balance of a step and its audit; see [`super::audit`].
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use crate::integrator::StepReport;
-use crate::integrator::energy_audit::GAIN;
-use crate::integrator::excess::Excess;
-use crate::integrator::work::{Ledger, Work};
-use crate::multibody::mechanism::TreeSpan;
+use super::excess::Excess;
+use super::report::StepReport;
+use super::work::{Ledger, Work};
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
+/// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
+pub(crate) const GAIN: f64 = 5e-10;
+
 /// What the energies of a step are judged by.
-pub(super) struct Conditions<T: Lane> {
+pub(crate) struct Conditions<T: Lane> {
     /// Mass, kg.
     pub mass: T,
     /// Speed of a body that falls for the step from rest, m/s.
@@ -19,8 +21,26 @@ pub(super) struct Conditions<T: Lane> {
     pub is_free: T::Mask,
 }
 
+/// Limits of an audit, as fractions of the kinetic energy.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// What may be gained, see [`GAIN`].
+    pub gain: f64,
+    /// What free flight may gain or lose: an error of the scheme's order that does not accumulate.
+    pub drift: f64,
+}
+
+impl Limits {
+    /// The limits of a whole step.
+    pub const USUAL: Self = Self {
+        gain: GAIN,
+        drift: 0.0,
+    };
+}
+
 /// Energies of the clusters over a step, J.
-pub(super) struct Energies<T: Lane> {
+#[derive(Clone, Debug)]
+pub(crate) struct Energies<T: Lane> {
     /// Kinetic and potential energy at the start and at the end of the step.
     pub before: Vec<[T; 2]>,
     pub after: Vec<[T; 2]>,
@@ -30,9 +50,8 @@ pub(super) struct Energies<T: Lane> {
     /// velocities are carried there.
     pub kinetic: Vec<T>,
     pub momentum: [Vec<T>; 3],
-    /// Work of the drives, of the sand and of wheels that yield.
+    /// Work of the own forces, and of contacts that yield.
     pub of_drives: Vec<Work<T>>,
-    pub of_sand: Vec<T>,
     pub released: Vec<T>,
     /// What wheels that yield hold before and after the step, and what they gave.
     pub elastic: [Vec<T>; 3],
@@ -57,7 +76,6 @@ impl<T: Lane> Default for Energies<T> {
             kinetic: Vec::new(),
             momentum: std::array::from_fn(|_| Vec::new()),
             of_drives: Vec::new(),
-            of_sand: Vec::new(),
             released: Vec::new(),
             elastic: std::array::from_fn(|_| Vec::new()),
             of_contacts: std::array::from_fn(|_| Vec::new()),
@@ -82,7 +100,6 @@ impl<T: Lane> Energies<T> {
             kinetic: zeros(),
             momentum: std::array::from_fn(|_| zeros()),
             of_drives: vec![Work::none(T::splat(token, 0.0)); n],
-            of_sand: zeros(),
             released: zeros(),
             elastic: std::array::from_fn(|_| zeros()),
             of_contacts: std::array::from_fn(|_| zeros()),
@@ -96,8 +113,8 @@ impl<T: Lane> Energies<T> {
 }
 
 /// Energies of a group over a step, J; 0 in the lanes of a cluster that does not lead it.
-#[derive(Clone)]
-pub(super) struct Balance<T: Lane> {
+#[derive(Clone, Debug)]
+pub(crate) struct Balance<T: Lane> {
     /// Kinetic and potential energy at the start and at the end of the step.
     pub before: [T; 2],
     pub after: [T; 2],
@@ -107,22 +124,23 @@ pub(super) struct Balance<T: Lane> {
     pub work: Work<T>,
     pub stored: T,
     /// By wheels that yield.
-    released: T,
+    pub released: T,
     /// Work of the contacts by their law.
     pub contact_work: T,
     /// Energy beyond what was supplied; what the audit removed of it; what is left of it, as a
     /// fraction of the kinetic energy.
-    excess: Option<Excess<T>>,
+    pub excess: Option<Excess<T>>,
     removed: T,
     gain: T,
-    /// Lanes whose velocity the audit corrects.
+    /// Lanes whose step must be taken otherwise, and those whose velocity the audit corrects.
+    pub is_lost: T::Mask,
     pub is_corrected: T::Mask,
 }
 
 /// How the audit corrects the velocity of a group: lanes, the share that is left of the motion, and
 /// the lanes in which it is left relative to a translation, m/s.
 #[derive(Clone, Copy)]
-pub(super) struct Correction<T: Lane> {
+pub(crate) struct Correction<T: Lane> {
     pub lanes: T::Mask,
     pub share: T,
     pub is_relative: T::Mask,
@@ -130,18 +148,14 @@ pub(super) struct Correction<T: Lane> {
 }
 
 impl<T: Lane> Correction<T> {
-    /// Corrects the velocity of a tree.
+    /// Corrects a velocity; `axis`: along which it translates its tree, if it does.
     #[inline(always)]
-    pub fn apply(&self, tree: &TreeSpan, v: &mut [T]) {
+    pub fn apply(&self, axis: Option<usize>, v: T) -> T {
         let zero = self.share.like(0.0);
-        for (k, v) in v[tree.velocities.clone()].iter_mut().enumerate() {
-            let common = if tree.is_free && k < 3 {
-                T::select(self.is_relative, self.translation[k], zero)
-            } else {
-                zero
-            };
-            *v = T::select(self.lanes, common + self.share * (*v - common), *v);
-        }
+        let common = axis.map_or(zero, |axis| {
+            T::select(self.is_relative, self.translation[axis], zero)
+        });
+        T::select(self.lanes, common + self.share * (v - common), v)
     }
 
     /// Takes over another's lane.
@@ -171,18 +185,28 @@ impl<T: Lane> Balance<T> {
             excess: None,
             removed: zero,
             gain: zero,
+            is_lost: T::mask(token, 0),
             is_corrected: T::mask(token, 0),
         }
     }
 
-    /// Measures the excess of energy. Returns the lanes whose step must be taken otherwise; of the
-    /// others, those with too much are [to be corrected](Self::correct).
+    /// Measures the excess of energy, and finds the lanes that are lost or corrected.
     ///
-    /// `released`: by wheels that yield, J.
+    /// `released`: by wheels that yield, J. `last`: lanes with no other way to take the step.
     #[inline(always)]
-    pub fn audit(&mut self, released: T, conditions: &Conditions<T>, going: T::Mask) -> T::Mask {
+    pub fn audit(
+        &mut self,
+        released: T,
+        conditions: &Conditions<T>,
+        limits: Limits,
+        [going, last]: [T::Mask; 2],
+    ) {
         let work = self.work.total();
-        let (zero, gain) = (work.like(0.0), work.like(GAIN));
+        let (zero, gain, drift) = (
+            work.like(0.0),
+            work.like(limits.gain),
+            work.like(limits.drift),
+        );
         let Conditions {
             mass,
             fall,
@@ -191,13 +215,12 @@ impl<T: Lane> Balance<T> {
         } = *conditions;
         self.released = released;
         let excess = Excess::new(self.before, self.after, [work, released], (mass, fall));
-        let is_balanced = excess.is_balanced(is_free, [gain, zero]);
-        let is_lost = excess.is_coarse(is_free, gain) & !is_balanced;
-        self.is_corrected = !is_balanced & going & !is_lost;
+        let is_balanced = excess.is_balanced(is_free, [gain, drift]);
+        self.is_lost = excess.is_coarse(is_free, gain) & !is_balanced & going & !last;
+        self.is_corrected = !is_balanced & going & !self.is_lost & excess.value.is_finite();
         self.excess = Some(excess);
         self.gain = T::select(self.is_corrected, zero, excess.relative());
         self.removed = T::select(self.is_corrected, excess.value.max(zero), zero);
-        is_lost
     }
 
     /// How the excess is removed from the velocity at the end of the step.
@@ -252,6 +275,6 @@ impl<T: Lane> Balance<T> {
 
 /// `yes` in the lanes of a mask, `no` elsewhere.
 #[inline(always)]
-pub(super) fn select_both<T: Lane>(lanes: T::Mask, yes: [T; 2], no: [T; 2]) -> [T; 2] {
+pub(crate) fn select_both<T: Lane>(lanes: T::Mask, yes: [T; 2], no: [T; 2]) -> [T; 2] {
     [0, 1].map(|k| T::select(lanes, yes[k], no[k]))
 }

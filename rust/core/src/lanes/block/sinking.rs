@@ -1,14 +1,15 @@
 //! The sand under the wheels in a step: [`crate::system::sand`].
 
 use super::Block;
-use crate::integrator::forces::MOST_REVISIONS;
+use super::system::LaneSystem;
+use crate::integrator::{MOST_REVISIONS, StepOptions};
 use crate::lanes::lane_rover::LaneRover;
 use crate::sand::RutMap;
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use crate::system::sand_patch::{Layers, SandScene};
 
-impl<T: Lane> Block<T> {
+impl<T: Lane> LaneSystem<T> {
     /// Takes over the sand of a rover, and its ruts.
     pub(super) fn load_sand(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
         let state = rover.sand.as_deref_mut();
@@ -35,24 +36,15 @@ impl<T: Lane> Block<T> {
         self.return_ruts(lane, rover);
     }
 
-    /// Gives a rover that is not [stored](Self::store_rover) its ruts back.
-    pub fn return_ruts(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
+    /// Gives a rover that is not stored its ruts back.
+    pub(super) fn return_ruts(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
         if let Some(state) = rover.sand.as_deref_mut() {
             std::mem::swap(&mut self.ruts[lane], &mut state.ruts);
         }
     }
 
-    /// Gives a rover its ruts back if the lane has them, after a panic.
-    pub fn recover_ruts(&mut self, lane: usize, ruts: &mut RutMap) {
-        // A rover whose ruts are here has a map without wheels in their place.
-        if let Some(own) = (self.ruts.get_mut(lane)).filter(|own| own.n_wheels() > ruts.n_wheels())
-        {
-            std::mem::swap(own, ruts);
-        }
-    }
-
     /// Most repetitions of a lane's step.
-    pub(super) fn most_revisions(&self, lane: usize) -> usize {
+    pub(super) fn most_revisions_of(&self, lane: usize) -> usize {
         let in_sand = (self.sand.as_ref()).is_some_and(|sand| sand.lanes().get(lane));
         if in_sand {
             MOST_REVISIONS_IN_SAND
@@ -61,50 +53,43 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    /// The sand's part of the mass matrix; `is_first`: its forces at the velocity before the step,
-    /// too.
-    pub(super) fn sink(&mut self, is_first: bool) {
-        let Some(mut sand) = self.sand.take() else {
-            return;
-        };
-        if is_first {
-            sand.start_from(&self.v);
-            let step = (self.options.time_step, self.options.theta);
-            sand.linearise(&self.sand_scene(), self.going, step, self.gravity);
+    /// The forces of the sand at the velocity before the step.
+    pub(super) fn sink(&mut self, options: &StepOptions, going: T::Mask) {
+        if let Some(mut sand) = self.sand.take() {
+            let step = (options.time_step, options.theta);
+            sand.linearise(&self.sand_scene(), going, step, self.gravity);
+            self.sand = Some(sand);
         }
-        sand.add_to_mass(&self.machine, &mut self.mass_matrix);
-        self.sand = Some(sand);
     }
 
     /// The lanes whose force of the sand is another at the end of the step.
-    pub(super) fn revise_sand(&mut self, lanes: T::Mask) -> T::Mask {
+    pub(super) fn revise_sand(&mut self, lanes: T::Mask, v_end: &[T]) -> T::Mask {
         let Some(mut sand) = self.sand.take() else {
             return T::mask(self.token, 0);
         };
-        let is_new = sand.revise(&self.sand_scene(), lanes, &self.factor, &self.v_end);
+        let is_new = sand.revise(&self.sand_scene(), lanes, &self.factor, v_end);
         self.sand = Some(sand);
         is_new
     }
 
     /// Work of the sand on each cluster over the step, J.
-    pub(super) fn weigh_sand(&mut self) {
-        let mut work = std::mem::take(&mut self.energies.of_sand);
+    pub(super) fn weigh_sand(&mut self, velocities: [&[T]; 2]) {
+        let mut work = std::mem::take(&mut self.of_sand);
         work.fill(self.number(0.0));
         if let Some(mut sand) = self.sand.take() {
-            let velocities = [&self.v[..], &self.v_end];
             sand.work(&self.machine, &self.layers(), velocities, &mut work);
             self.sand = Some(sand);
         }
-        self.energies.of_sand = work;
+        self.of_sand = work;
     }
 
     /// Notes where the wheels of the lanes are that are still going.
-    pub(super) fn note_ruts(&mut self) {
+    pub(super) fn note_ruts(&mut self, going: T::Mask) {
         let Some(mut sand) = self.sand.take() else {
             return;
         };
         let mut ruts = std::mem::take(&mut self.ruts);
-        sand.note(&self.layers(), self.going, &mut ruts);
+        sand.note(&self.layers(), going, &mut ruts);
         (self.sand, self.ruts) = (Some(sand), ruts);
     }
 
@@ -123,6 +108,22 @@ impl<T: Lane> Block<T> {
             poses: &self.poses_middle,
             layers: self.layers(),
             ruts: &self.ruts,
+        }
+    }
+}
+
+impl<T: Lane> Block<T> {
+    /// Gives a rover that is not [stored](Self::store_rover) its ruts back.
+    pub fn return_ruts(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
+        self.system.return_ruts(lane, rover);
+    }
+
+    /// Gives a rover its ruts back if the lane has them, after a panic.
+    pub fn recover_ruts(&mut self, lane: usize, ruts: &mut RutMap) {
+        // A rover whose ruts are here has a map without wheels in their place.
+        let own = self.system.ruts.get_mut(lane);
+        if let Some(own) = own.filter(|own| own.n_wheels() > ruts.n_wheels()) {
+            std::mem::swap(own, ruts);
         }
     }
 }

@@ -1,11 +1,12 @@
 //! Wrenches that act on the rovers of a block from outside.
 
-use super::Block;
-use crate::integrator::work::Work;
+use super::system::LaneSystem;
+use crate::integrator::Work;
+use crate::multibody::LaneConfiguration;
 use crate::scalar::{Lane, Vec3};
 use crate::system::command::add_wrench;
 
-impl<T: Lane> Block<T> {
+impl<T: Lane> LaneSystem<T> {
     /// Whether anything pushes a rover.
     #[inline(always)]
     fn is_pushed(&self) -> bool {
@@ -14,7 +15,7 @@ impl<T: Lane> Block<T> {
 
     /// `applied`: generalized force of the wrenches at the midpoint. The first wrenches of all
     /// lanes that are on one body are added at once, then the second ones.
-    pub(super) fn apply_wrenches(&mut self) {
+    pub(super) fn apply_wrenches(&mut self, middle: &LaneConfiguration<T>) {
         if !self.is_pushed() {
             return;
         }
@@ -37,7 +38,7 @@ impl<T: Lane> Block<T> {
                     }
                     own != body
                 });
-                let R = self.poses_middle.spun(&self.machine, &self.middle, body);
+                let R = self.poses_middle.spun(&self.machine, middle, body);
                 let placed = (&self.poses_middle, &R);
                 add_wrench(&self.machine, body, all, placed, &mut self.applied);
             }
@@ -56,24 +57,28 @@ impl<T: Lane> Block<T> {
 
     /// Adds the work of the wrenches on each cluster over the step, J.
     #[inline(always)]
-    pub(super) fn add_work_of_wrenches(&self, out: &mut [Work<T>]) {
+    pub(super) fn add_work_of_wrenches(
+        &self,
+        (h, theta): (T, T),
+        [v, v_end]: [&[T]; 2],
+        out: &mut [Work<T>],
+    ) {
         if !self.is_pushed() {
             return;
         }
-        let (h, theta) = self.time_step();
-        let velocities = self.v.iter().zip(&self.v_end);
-        let forces = self.applied.iter().zip(&self.cluster_of);
-        for ((force, cluster), (v, v_end)) in forces.zip(velocities) {
+        let velocities = v.iter().zip(v_end);
+        for (k, (force, (v, v_end))) in self.applied.iter().zip(velocities).enumerate() {
             let mean = theta * *v_end + (h.like(1.0) - theta) * *v;
-            out[*cluster].supplied += h * *force * mean;
+            let cluster = self.machine.cluster_of_velocity(k);
+            out[cluster].supplied += h * *force * mean;
         }
     }
 
-    /// Work of the wrenches over the displacement `y` of the projection, J.
-    pub(super) fn work_on_the_way(&self) -> T {
+    /// Work of the wrenches over a displacement (nv), J.
+    pub(super) fn work_on_the_way(&self, displacement: &[T]) -> T {
         let mut sum = self.number(0.0);
         if self.is_pushed() {
-            for (force, way) in self.applied.iter().zip(&self.y) {
+            for (force, way) in self.applied.iter().zip(displacement) {
                 sum += *force * *way;
             }
         }

@@ -1,0 +1,161 @@
+//! The velocity without contact impulses.
+//!
+//! If the spin or the energy audit ([`super::audit`]) requires it, the gyroscopic terms are
+//! implicit: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)`, where Δv includes the impulses of persistent
+//! contact. The scheme is then stable at any spin and any step.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+
+use super::data::DataOf;
+use super::dynamics::Dynamics;
+use super::forces::{Forces, Start};
+use super::systems::{MaskOf, Systems};
+use super::yielding::add_shifts;
+use crate::scalar::{Lane, LaneMask};
+
+/// Passes over the mean velocity at which implicit gyroscopic terms are frozen: the second makes
+/// the step second order.
+const GYROSCOPIC_PASSES: usize = 2;
+
+/// The free change of the velocity, `d.y` in factor coordinates, and the contacts' free velocity
+/// `d.u`: first with the forces at v, then with those at the mean velocity that follows from them
+/// and from the last step's impulses.
+pub(super) fn load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+    let persists = d.any(&d.persists);
+    let is_any = (persists & d.going).any();
+    S::run(
+        d.token,
+        #[inline(always)]
+        || push_and_drive(s, d, is_any, persists),
+    );
+    if d.is_any_implicit() {
+        load_implicitly(s, d, is_any);
+    }
+    if d.is_any_explicit() {
+        let start = Start::at(&d.start, &d.v[..]);
+        (s.machine_mut()).load(&d.options, start, &d.v, &mut d.y);
+        S::run(
+            d.token,
+            #[inline(always)]
+            || find_mean(s, d, is_any),
+        );
+        let start = Start::at(&d.start, &d.v[..]);
+        (s.machine_mut()).load(&d.options, start, &d.v_mean, &mut d.y);
+        s.machine().add_given(&d.options, &mut d.y);
+        S::run(
+            d.token,
+            #[inline(always)]
+            || correct_impulse(s, d, is_any),
+        );
+    }
+    S::run(
+        d.token,
+        #[inline(always)]
+        || finish_load(s, d),
+    );
+}
+
+#[inline(always)]
+fn push_and_drive<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool, persists: MaskOf<S>) {
+    if is_any {
+        s.generalized_impulse(persists, &d.p_last, &mut d.pushed);
+    }
+    let start = Start::at(&d.start, &d.v[..]);
+    s.machine_mut().begin_load(&d.options, start);
+}
+
+/// The mean velocity that follows from the forces at v and the impulses that persist.
+#[inline(always)]
+fn find_mean<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
+    let pushed = d.pushed.iter().zip(&d.cluster_of).filter(|_| is_any);
+    for (y, (pushed, cluster)) in d.y.iter_mut().zip(pushed) {
+        *y = S::T::select(d.persists[*cluster], *y + *pushed, *y);
+    }
+    close(s, d);
+    mean(s, d);
+}
+
+/// The impulse `d.y` in factor coordinates, so that the loops are closed.
+#[inline(always)]
+fn close<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+    s.machine().half_solve(&mut d.y);
+    (s.machine_mut()).close_velocity(&d.options, &d.v, &d.v, &mut d.y);
+}
+
+/// `d.v_mean` from the change `d.y` in factor coordinates.
+#[inline(always)]
+fn mean<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+    let share = d.number(1.0 - d.options.theta);
+    s.machine().half_solve_back(&mut d.y);
+    for ((mean, v), change) in d.v_mean.iter_mut().zip(&d.v).zip(&d.y) {
+        *mean = *v + share * *change;
+    }
+}
+
+/// Adds the deferred correction r to the impulse `d.y`, and turns it into factor coordinates.
+#[inline(always)]
+pub(super) fn correct_impulse<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
+    let share = d.number(1.0 - d.options.theta);
+    let pushed = d.pushed.iter().zip(&d.persistent).zip(&d.cluster_of);
+    for (y, ((pushed, before), cluster)) in d.y.iter_mut().zip(pushed).filter(|_| is_any) {
+        let persists = d.persists[*cluster];
+        *y = S::T::select(persists, *y + share * (*before - *pushed), *y);
+    }
+    s.machine().half_solve(&mut d.y);
+}
+
+/// The contacts' free velocity from the free change of the velocity.
+#[inline(always)]
+fn finish_load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+    if d.is_any_implicit() {
+        let implicit = d.y_implicit.iter().zip(&d.cluster_of);
+        for (y, (implicit, cluster)) in d.y.iter_mut().zip(implicit) {
+            *y = S::T::select(d.is_gyroscopic[*cluster], *implicit, *y);
+        }
+    }
+    (s.machine_mut()).close_velocity(&d.options, &d.v, &d.v, &mut d.y);
+    s.local(&d.y, &mut d.u);
+    add_shifts(s, d);
+}
+
+/// `d.y_implicit`: the free change of velocity with implicit gyroscopic terms. `is_any`: whether
+/// the contacts of any group persist.
+fn load_implicitly<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
+    let zero = d.number(0.0);
+    s.machine_mut().begin_gyroscopic(&d.options, &mut d.y);
+    d.foreseen.fill(zero);
+    let pushed = d.pushed.iter().zip(&d.cluster_of).filter(|_| is_any);
+    for (foreseen, (pushed, cluster)) in d.foreseen.iter_mut().zip(pushed) {
+        *foreseen = S::T::select(d.persists[*cluster], *pushed, zero);
+    }
+    d.v_mean.copy_from_slice(&d.v);
+    for pass in 0..GYROSCOPIC_PASSES {
+        let start = Start::at(&d.start, &d.v[..]);
+        let (v_mean, foreseen) = (&d.v_mean, &d.foreseen);
+        (s.machine_mut()).load_gyroscopic(&d.options, start, v_mean, foreseen, &mut d.y);
+        if pass + 1 < GYROSCOPIC_PASSES {
+            S::run(
+                d.token,
+                #[inline(always)]
+                || foresee(s, d),
+            );
+        }
+    }
+    S::run(
+        d.token,
+        #[inline(always)]
+        || correct_impulse(s, d, is_any),
+    );
+    d.y_implicit.copy_from_slice(&d.y);
+}
+
+/// The mean velocity that follows from the impulse `d.y` and the foreseen one, and the impulses of
+/// the loops that are foreseen with it.
+#[inline(always)]
+fn foresee<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+    for (y, foreseen) in d.y.iter_mut().zip(&d.foreseen) {
+        *y += *foreseen;
+    }
+    close(s, d);
+    s.machine_mut().add_loop_impulse(&mut d.foreseen);
+    mean(s, d);
+}

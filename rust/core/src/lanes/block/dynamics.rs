@@ -1,0 +1,263 @@
+//! The dynamics of the rovers of a block.
+
+use super::system::{Implicit, LaneSystem, time_step};
+use crate::integrator::{Dynamics, StepOptions};
+use crate::multibody::energy::energies;
+use crate::multibody::{LaneConfiguration, MassMatrix};
+use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::system::extent::{Turning, displacement, tolerated};
+use crate::system::gyroscopic::Gyroscopic;
+use crate::system::loops::Projector;
+
+impl<T: Lane> LaneSystem<T> {
+    /// Adds the implicit terms of motors, held joints, springs, dampers and sand to M.
+    fn add_implicit(&mut self, options: &StepOptions) {
+        let machine = &*self.machine;
+        let step = time_step::<T>(self.token, options);
+        let (drives, mass_matrix) = (&mut self.drives, &mut self.mass_matrix);
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                drives.add_implicit(machine, step, |k, a| {
+                    mass_matrix.add_to_diagonal(machine, k, a);
+                });
+            },
+        );
+        if let Some(sand) = &mut self.sand {
+            sand.add_to_mass(machine, mass_matrix);
+        }
+    }
+
+    /// Keeps M̂, which its factor replaces, for implicit gyroscopic terms.
+    fn keep_mass_matrix(&mut self) {
+        let (token, machine) = (self.token, &*self.machine);
+        let own = self.implicit.get_or_insert_with(|| {
+            Box::new(Implicit {
+                solver: Gyroscopic::new(token),
+                mass_matrix: MassMatrix::new(token, machine),
+                given: vec![T::splat(token, 0.0); machine.nv()],
+            })
+        });
+        own.mass_matrix.clone_from(&self.mass_matrix);
+    }
+}
+
+impl<T: Lane> Dynamics for LaneSystem<T> {
+    type T = T;
+    type Configuration = LaneConfiguration<T>;
+
+    fn nv(&self) -> usize {
+        self.machine.nv()
+    }
+
+    fn n_clusters(&self) -> usize {
+        self.machine.n_clusters()
+    }
+
+    fn cluster_of_velocity(&self, k: usize) -> usize {
+        self.machine.cluster_of_velocity(k)
+    }
+
+    fn translation_axis(&self, k: usize) -> Option<usize> {
+        let mut trees = self.machine.trees.iter();
+        let tree = trees.find(|tree| tree.velocities.contains(&k))?;
+        let axis = k - tree.velocities.start;
+        (tree.is_free && axis < 3).then_some(axis)
+    }
+
+    fn is_held(&self, cluster: usize) -> bool {
+        self.machine.is_held(cluster)
+    }
+
+    #[inline(always)]
+    fn set_moved(
+        &self,
+        from: &LaneConfiguration<T>,
+        v: &[T],
+        h: f64,
+        to: &mut LaneConfiguration<T>,
+    ) {
+        to.set_moved(&self.machine, from, v, h);
+    }
+
+    fn advance(&self, q: &mut LaneConfiguration<T>, v: &[T], h: f64) {
+        let from = q.clone();
+        self.set_moved(&from, v, h, q);
+    }
+
+    #[inline(always)]
+    fn take(
+        &self,
+        lanes: impl Fn(usize) -> T::Mask,
+        from: &LaneConfiguration<T>,
+        to: &mut LaneConfiguration<T>,
+    ) {
+        if self.machine.n_clusters() == 1 {
+            to.select_from(lanes(0), from);
+        } else {
+            to.select_clusters_from(&self.machine, lanes, from);
+        }
+    }
+
+    #[inline(always)]
+    fn is_finite(&self, q: &LaneConfiguration<T>) -> T::Mask {
+        q.is_finite()
+    }
+
+    #[inline(always)]
+    fn normalise(&self, q: &mut LaneConfiguration<T>) {
+        q.normalise();
+    }
+
+    fn place_middle(&mut self, q: &LaneConfiguration<T>) {
+        self.poses_middle.update(&self.machine, &self.inertias, q);
+        self.joints_middle.copy_from_slice(&q.joints);
+        self.apply_wrenches(q);
+    }
+
+    fn place_end(&mut self, q: &LaneConfiguration<T>) {
+        self.poses_end.update(&self.machine, &self.inertias, q);
+    }
+
+    fn update_mass_matrix(&mut self, options: &StepOptions, going: T::Mask, is_first: bool) {
+        self.mass_matrix
+            .update(&self.machine, &self.inertias, &self.poses_middle);
+        if is_first {
+            let (machine, mass_matrix, drives) =
+                (&*self.machine, &self.mass_matrix, &mut self.drives);
+            let step = time_step::<T>(self.token, options);
+            T::vectorize(
+                self.token,
+                #[inline(always)]
+                || drives.set_theta(machine, step, |k| mass_matrix.diagonal(machine, k)),
+            );
+            self.sink(options, going);
+        }
+    }
+
+    fn factorise(&mut self, options: &StepOptions) -> T::Mask {
+        self.add_implicit(options);
+        if self.turns {
+            self.keep_mass_matrix();
+        }
+        let is_definite = self
+            .mass_matrix
+            .factorise_in_place(&self.machine, &mut self.factor);
+        let (poses, joints) = (&self.poses_middle, &self.joints_middle);
+        self.rows
+            .begin_loops(&self.machine, poses, joints, &self.factor);
+        is_definite
+    }
+
+    fn multiply_mass(&self, v: &[T], out: &mut [T]) {
+        self.mass_matrix.times(&self.machine, v, out);
+    }
+
+    #[inline(always)]
+    fn turning(
+        &mut self,
+        options: &StepOptions,
+        v: &[T],
+        is_gyroscopic: &mut [T::Mask],
+    ) -> Option<T> {
+        let (h, _) = time_step::<T>(self.token, options);
+        let mut most = h.like(0.0);
+        self.turns = false;
+        for (cluster, own) in is_gyroscopic.iter_mut().enumerate() {
+            let turning = Turning::of_cluster(h.like(0.0), &self.machine, v, cluster);
+            *own = turning.is_gyroscopic(h);
+            self.turns |= own.any();
+            most = most.max(turning.of_frames());
+        }
+        Some(most)
+    }
+
+    #[inline(always)]
+    fn is_audited(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn energies(
+        &mut self,
+        _: &StepOptions,
+        q: &LaneConfiguration<T>,
+        v: &[T],
+        mut each: impl FnMut(usize, [T; 2], Vec3<T>),
+    ) {
+        let found = energies(
+            &self.machine,
+            &self.inertias,
+            q,
+            v,
+            self.gravity,
+            &mut self.energy_scratch,
+        );
+        for (cluster, own) in found.iter().enumerate() {
+            each(cluster, own.energy.kinetic_and_potential(), own.momentum);
+        }
+    }
+
+    #[inline(always)]
+    fn mass(&self, cluster: usize) -> Option<T> {
+        Some(self.inertias.mass_of(&self.machine, cluster))
+    }
+
+    #[inline(always)]
+    fn half_solve(&self, y: &mut [T]) {
+        self.factor.half_solve(&self.machine, y);
+    }
+
+    #[inline(always)]
+    fn close_velocity(&mut self, options: &StepOptions, v_begin: &[T], v: &[T], y: &mut [T]) {
+        if let Some(loops) = &mut self.rows.loops {
+            loops.close(options.theta, v_begin, v, y);
+        }
+    }
+
+    #[inline(always)]
+    fn add_loop_impulse(&mut self, out: &mut [T]) {
+        if let Some(loops) = &mut self.rows.loops {
+            loops.add_generalized_impulse(&std::iter::empty(), out);
+        }
+    }
+
+    fn close_end(
+        &mut self,
+        lanes: T::Mask,
+        _p: &[T],
+        q: &mut LaneConfiguration<T>,
+        v: &mut [T],
+    ) -> Option<T> {
+        let loops = self.rows.loops.as_mut()?;
+        let with = Projector {
+            mechanism: &self.machine,
+            inertias: &self.inertias,
+            factor: &self.factor,
+            lanes,
+        };
+        let gap = loops.project_position(&with, q);
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || loops.project_velocity(&with, v),
+        );
+        Some(gap)
+    }
+
+    #[inline(always)]
+    fn half_solve_back(&self, y: &mut [T]) {
+        self.factor.half_solve_back(&self.machine, y);
+    }
+
+    #[inline(always)]
+    fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
+        tolerated(options.penetration_tolerance, &self.machine, cluster)
+    }
+
+    #[inline(always)]
+    fn displacement(&self, y: &[T], cluster: usize) -> T {
+        displacement(self.number(0.0), &self.machine, y, cluster)
+    }
+}
