@@ -157,12 +157,12 @@ impl<T: Lane> Block<T> {
         }
         if last >= 2 {
             self.rows
-                .assemble(&self.machine, end, &self.factor, &self.contacts, v);
+                .assemble((&self.machine, &self.factor), end, &self.contacts, v, None);
         }
         if last >= 3 {
             let mu = vec![T::splat(self.token, 0.7); self.contacts.n_slots()];
             self.rows
-                .to_problems(&self.contacts, &self.q, &mu, &mut self.problems);
+                .to_problems(&self.contacts, (&self.q, &mu), &mut self.problems, None);
         }
         black_box(&mut self.problems);
     }

@@ -142,14 +142,14 @@ impl<T: Lane> Block<T> {
         let mut factor = Factor::new(token, machine);
         assert!(M.factorise(machine, &mut factor).all());
         self.rows
-            .assemble(machine, end, &factor, &self.contacts, &v);
+            .assemble((machine, &factor), end, &self.contacts, &v, None);
         let zero = T::splat(token, 0.0);
         let mut q = vec![[zero; 3]; self.contacts.n_slots()];
         let change = spread(token, rovers, |_| (0..v.len()).map(number).collect());
         T::vectorize(token, || self.rows.local(&self.contacts, &change, &mut q));
         let mu = vec![T::splat(token, MU); self.contacts.n_slots()];
         self.rows
-            .to_problems(&self.contacts, &q, &mu, &mut self.problems);
+            .to_problems(&self.contacts, (&q, &mu), &mut self.problems, None);
         for problem in &mut self.problems {
             for (k, p) in problem.p.iter_mut().enumerate() {
                 *p = number(k);
@@ -162,7 +162,7 @@ impl<T: Lane> Block<T> {
         T::vectorize(token, || {
             self.rows
                 .read(&self.contacts, &self.problems, Answer::Impulses, &mut p);
-            self.rows.add_impulses(&self.contacts, all, &p, &mut y);
+            (self.rows).add_impulses(&self.contacts, all, &p, &mut y, None);
             self.rows
                 .generalized_impulse(machine, &self.contacts, end, all, &p, &mut impulse);
         });

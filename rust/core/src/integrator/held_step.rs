@@ -35,6 +35,8 @@ pub(crate) struct HeldStep<C> {
     pub response: Vec<f64>,
     /// Whether each contact yields (n_c); empty if all are rigid.
     pub yields: Vec<bool>,
+    /// Whether nothing moves each contact along its normal (n_c).
+    pub immovable: Vec<bool>,
 }
 
 /// A projection of the position.
@@ -42,10 +44,6 @@ pub(crate) struct HeldStep<C> {
 pub(crate) struct Projection {
     pub law: HeldLaw,
     pub answer: Answer,
-    /// Whether each contact's gap counts as it is, or as 0 since it is separating (n_c).
-    pub counts: Vec<bool>,
-    /// Whether the group of each contact was moved (n_c).
-    pub moved: Vec<bool>,
 }
 
 /// Relative violation of the modes' equations up to which they count as those of the step.
@@ -82,6 +80,7 @@ impl<C: Clone + UnilateralContact> HeldStep<C> {
             W: W.to_vec(),
             response: response(system, size),
             yields: ws.data.laws.iter().map(Yielding::is_soft).collect(),
+            immovable: (0..n).map(|i| system.is_immovable(i)).collect(),
         })
     }
 }
@@ -101,7 +100,6 @@ impl Projection {
         let mut displacement: Vec<f64> = (W.chunks_exact(size.max(1)))
             .map(|row| row.iter().zip(&lambda).map(|(w, p)| w * p).sum())
             .collect();
-        let (mut counts, mut moved) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for (i, contact) in ws.list.contacts.iter().enumerate() {
             let (p, before) = (ws.problems.p[i][0], ws.list.u_before[i][0]);
             let (u, gap) = match ws.data.laws.get(i) {
@@ -117,9 +115,7 @@ impl Projection {
             let is_moved = ws.data.is_deep[ws.list.home_of(i)];
             let may_move = is_moved && !system.is_immovable(i);
             let is_counted = may_move && (gap >= 0.0 || gap + h * u < 0.0);
-            moved.push(is_moved);
             displacement[d * i] += if is_counted { gap } else { 0.0 };
-            counts.push(is_counted);
         }
         let weight: Vec<f64> = (0..n).map(|i| W[d * i * (size + 1)]).collect();
         let with =
@@ -130,12 +126,7 @@ impl Projection {
             .map(with);
         let law = laws.into_iter().find(|law| law.residual() <= SAME)?;
         let answer = law.answer(W, is_common);
-        Some(Self {
-            law,
-            answer,
-            counts,
-            moved,
-        })
+        Some(Self { law, answer })
     }
 }
 

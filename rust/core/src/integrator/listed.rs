@@ -354,7 +354,7 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
     fn pose(
         &mut self,
         options: &StepOptions,
-        q: &[Self::Local],
+        (q, _): (&[Self::Local], &[f64]),
         _: &[Self::Local],
         _: &[bool],
         _: bool,

@@ -292,7 +292,7 @@ fn iterate<S: MechanicalSystem>(
     let u = Local::flat_mut(&mut d.u);
     (s.system).add_local_of_velocity(&s.list.contacts, &d.v_end, u);
     add_shifts(s, d);
-    s.pose(options, &d.u, &d.p_last, &d.is_same, true, problems);
+    s.pose(options, (&d.u, &d.y), &d.p_last, &d.is_same, true, problems);
     s.solve(&d.v_end, (&d.y, &d.laws), problems);
     probe.end(Phase::Solve);
     s.read(problems, &mut d.p, &mut d.u);

@@ -39,7 +39,6 @@ use super::forces::Forces;
 use super::grouped::Grouped;
 use super::impacts::{find_impacts, weigh_contacts};
 use super::load::load;
-use super::local::Local;
 use super::options::Stabilisation;
 use super::probe::{Phase, Probe};
 use super::projection::{measure, project};
@@ -158,7 +157,14 @@ pub(crate) fn set_up<S: Systems>(
     probe.end(Phase::Delassus);
     load(s, d);
     let asked = d.asked(is_first);
-    s.pose(&d.options, &d.u, &d.p_last, &d.is_same, asked, problems);
+    s.pose(
+        &d.options,
+        (&d.u, &d.y),
+        &d.p_last,
+        &d.is_same,
+        asked,
+        problems,
+    );
     probe.end(Phase::Bias);
 }
 
@@ -321,7 +327,7 @@ fn accept<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     }
     let (h, _) = d.step();
     d.time = S::T::select(going, d.time + h, d.time);
-    s.machine_mut().accept(going, Local::flat(&d.p));
+    s.machine_mut().accept(going);
 }
 
 /// Keeps the generalized impulse of the contacts, and where they persisted.

@@ -4,7 +4,7 @@
 //! A step that ends at rest and still gained energy was stopped before its end: the machine jammed
 //! while the actuators' work was counted to the end, or a contact closed on its way up.
 
-use super::audit::{audit, correct, weigh, weigh_ends};
+use super::audit::{audit, correct, find_work, weigh, weigh_ends};
 use super::balance::Limits;
 use super::closing::close_end;
 use super::contacting::LocalOf;
@@ -35,10 +35,7 @@ pub(super) fn judge_at_last<S: MechanicalSystem>(
     limits: Limits,
 ) -> bool {
     if !s.system.is_audited() {
-        let start = Start::at(&d.start, &d.v[..]);
-        let work = &mut d.energies.of_drives;
-        work.fill(Work::default());
-        (s.system).work(s.options, start, &d.v_end, work);
+        find_work(s, d);
         return true;
     }
     weigh(s, d);

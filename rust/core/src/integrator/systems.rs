@@ -147,11 +147,12 @@ pub(crate) trait Systems {
         u: &mut [Self::Local],
     );
 
-    /// Poses the problems of some lanes: `q`, free velocity; `start`: impulses of the last step.
+    /// Poses the problems of some lanes: free velocity by place, and the free change of the
+    /// velocity in factor coordinates; `start`: impulses of the last step.
     fn pose(
         &mut self,
         options: &StepOptions,
-        q: &[Self::Local],
+        free: (&[Self::Local], &[Self::T]),
         start: &[Self::Local],
         is_same: &[MaskOf<Self>],
         lanes: MaskOf<Self>,

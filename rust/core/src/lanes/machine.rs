@@ -43,7 +43,7 @@ pub enum Unsupported {
 /// What a block of rovers has in common: a mechanism, and its wheels, boxes and stops.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
-    mechanism: Mechanism,
+    mechanism: Arc<Mechanism>,
     /// Wheels, in the model's order.
     pub wheels: Vec<WheelDisc>,
     /// Wheels as sand meets them, in the model's order.
@@ -135,7 +135,7 @@ impl Machine {
     pub fn of(model: &Model) -> Result<Self, Unsupported> {
         let touches_itself = model.trees().iter().any(|tree| tree.self_contact);
         let mut machine = Self {
-            mechanism: model.mechanism().clone(),
+            mechanism: Arc::new(model.mechanism().clone()),
             wheels: model.wheels().iter().map(WheelDisc::of).collect(),
             in_sand: (model.wheels().iter()).map(PlacedWheel::of).collect(),
             boxes: (Part::all(model).skip(model.wheels().len()))
@@ -163,6 +163,11 @@ impl Machine {
             return Err(Unsupported::TooManySlots(n));
         }
         Ok(machine)
+    }
+
+    /// What moves of it.
+    pub(super) fn mechanism(&self) -> &Arc<Mechanism> {
+        &self.mechanism
     }
 
     /// Number of contact problems of a rover.

@@ -15,7 +15,6 @@ use super::machine::Machine;
 use crate::contact::jacobian::{add_impulse, for_each_row};
 use crate::contact::rows::{Path, Place, add, add_scaled, product, square};
 use crate::contact::{Contact, rollers};
-use crate::multibody::loops::Placed;
 use crate::multibody::mechanism::{BASE, Mover};
 use crate::multibody::model::Loop;
 use crate::multibody::{Factor, Poses};
@@ -74,8 +73,6 @@ pub struct Rows<T: Lane> {
     /// it.
     pub(super) swept: Vec<T>,
     pub(super) swept_loops: Vec<T>,
-    /// The closed loops of the machine, which number the contacts by their slots.
-    pub(super) loops: Option<Box<Loops<T>>>,
     /// Z of each slot over all velocities without the motions that would open a loop
     /// (n_slots, nv), of a machine that loops tie to the world. Several contacts of one body on a
     /// stand are then dependent to the square of rounding, as W's entries are to rounding.
@@ -85,7 +82,6 @@ pub struct Rows<T: Lane> {
     immovable: Vec<T::Mask>,
     /// Largest entry on W's diagonal without the loops by slot, 1/kg; zero where nothing is held.
     closing: Vec<T>,
-    n_slots: usize,
     /// Local velocity `Hᵀ v` before the step by slot, m/s.
     pub u_before: Vec<Triple<T>>,
 }
@@ -131,7 +127,7 @@ impl<T: Lane> Rows<T> {
             n_blocks += block(*n, 0);
         }
         let zero = T::splat(token, 0.0);
-        let loops = Loops::new(token, machine, &machine.loops, 0);
+        let n_of_loops = machine.loops.iter().map(Loop::n_rows).sum();
         Self {
             token,
             bases: (bodies.iter())
@@ -159,8 +155,7 @@ impl<T: Lane> Rows<T> {
             softness: vec![[zero; 3]; n_slots],
             normal: vec![zero; n_slots],
             swept: vec![zero; machine.nv()],
-            swept_loops: vec![zero; loops.as_ref().map_or(0, |loops| loops.m())],
-            loops,
+            swept_loops: vec![zero; n_of_loops],
             spread: {
                 let is_held = machine.loops.iter().any(Loop::holds_the_world);
                 vec![[zero; 3]; usize::from(is_held) * n_slots * machine.nv()]
@@ -168,43 +163,24 @@ impl<T: Lane> Rows<T> {
             held: Vec::new(),
             immovable: vec![T::mask(token, 0); n_slots],
             closing: vec![zero; n_slots],
-            n_slots,
             u_before: vec![[zero; 3]; n_slots],
-        }
-    }
-
-    /// The loops at the midpoint of the step, where the joints have the coordinates `joints`.
-    /// [`Self::assemble`] follows.
-    pub fn begin_loops(
-        &mut self,
-        machine: &Machine,
-        middle: &Poses<T>,
-        joints: &[T],
-        factor: &Factor<T>,
-    ) {
-        if let Some(loops) = &mut self.loops {
-            let placed = Placed {
-                mechanism: machine,
-                poses: middle,
-                joints,
-            };
-            loops.begin(&placed, factor, self.n_slots);
         }
     }
 
     /// Builds Z, W and `u_before = Hᵀ v` at the end of the step.
     ///
-    /// `v`: velocity (nv) before the step.
+    /// `v`: velocity (nv) before the step. `loops`: those of the machine at the midpoint, which
+    /// number the contacts by their slots.
     ///
     /// # Panics
     /// If an argument is of another machine.
     pub fn assemble(
         &mut self,
-        machine: &Machine,
+        (machine, factor): (&Machine, &Factor<T>),
         end: &Poses<T>,
-        factor: &Factor<T>,
         contacts: &Contacts<T>,
         v: &[T],
+        mut loops: Option<&mut Loops<T>>,
     ) {
         T::vectorize(
             self.token,
@@ -219,10 +195,13 @@ impl<T: Lane> Rows<T> {
                         self.normal[slot] = square(self.normal[slot].like(0.0), rows)[4];
                     }
                 }
-                self.multiply_loops(contacts);
-                self.multiply(contacts);
+                if let Some(loops) = loops.as_deref_mut() {
+                    self.multiply_loops(contacts, loops);
+                }
+                let loops = loops.as_deref();
+                self.multiply(contacts, loops);
                 if contacts.factored() != 0 {
-                    self.multiply_diagonal(contacts);
+                    self.multiply_diagonal(contacts, loops);
                 }
             },
         );
@@ -292,10 +271,7 @@ impl<T: Lane> Rows<T> {
 
     /// Products of the loops with the contacts from Z.
     #[inline(always)]
-    fn multiply_loops(&mut self, contacts: &Contacts<T>) {
-        let Some(mut loops) = self.loops.take() else {
-            return;
-        };
+    fn multiply_loops(&mut self, contacts: &Contacts<T>, loops: &mut Loops<T>) {
         let none = [T::splat(self.token, 0.0); 3];
         for row in 0..loops.m() {
             for &slot in contacts.used() {
@@ -305,9 +281,8 @@ impl<T: Lane> Rows<T> {
         }
         self.held.clear();
         for &slot in contacts.used() {
-            self.hold(&mut loops, contacts, slot);
+            self.hold(loops, contacts, slot);
         }
-        self.loops = Some(loops);
     }
 
     /// Makes the rows of a slot zero where the loops let nothing move it. [`Self::close_held`]
@@ -445,15 +420,15 @@ impl<T: Lane> Rows<T> {
 
     /// Diagonal blocks of W from Z.
     #[inline(always)]
-    fn multiply_diagonal(&mut self, contacts: &Contacts<T>) {
+    fn multiply_diagonal(&mut self, contacts: &Contacts<T>, loops: Option<&Loops<T>>) {
         for slot in contacts.used_nearby() {
-            self.diagonal[slot] = self.own_block(contacts, slot);
+            self.diagonal[slot] = self.own_block(contacts, slot, loops);
         }
     }
 
     /// W from Z.
     #[inline(always)]
-    fn multiply(&mut self, contacts: &Contacts<T>) {
+    fn multiply(&mut self, contacts: &Contacts<T>, loops: Option<&Loops<T>>) {
         let (n_parts, zero) = (self.movers.len(), T::splat(self.token, 0.0));
         for cluster in 0..contacts.n_clusters() {
             let used = contacts.used_densely(cluster);
@@ -471,12 +446,12 @@ impl<T: Lane> Rows<T> {
                     let x = &self.Z[self.starts[row]..][..shared];
                     let y = &self.Z[self.starts[column]..][..shared];
                     self.W[at] = product(zero, x, y);
-                    if let Some(loops) = &self.loops {
+                    if let Some(loops) = loops {
                         loops.project_block([row, column], &mut self.W[at]);
                     }
                     at += 1;
                 }
-                self.W[at] = self.own_block(contacts, row);
+                self.W[at] = self.own_block(contacts, row, loops);
                 at += 1;
             }
         }
@@ -484,7 +459,7 @@ impl<T: Lane> Rows<T> {
 
     /// Block of W of a slot with itself.
     #[inline(always)]
-    fn own_block(&self, contacts: &Contacts<T>, slot: usize) -> [T; 9] {
+    fn own_block(&self, contacts: &Contacts<T>, slot: usize, loops: Option<&Loops<T>>) -> [T; 9] {
         let zero = T::splat(self.token, 0.0);
         let spread = self.spread_of([slot, slot]);
         let mut own = match spread {
@@ -498,7 +473,7 @@ impl<T: Lane> Rows<T> {
         } else if self.has_rollers {
             rollers::close(&mut own);
         }
-        if let (Some(loops), None) = (&self.loops, spread) {
+        if let (Some(loops), None) = (loops, spread) {
             loops.project_block([slot, slot], &mut own);
         }
         own
@@ -553,22 +528,14 @@ impl<T: Lane> Rows<T> {
         lanes: T::Mask,
         p: &[Triple<T>],
         y: &mut [T],
+        loops: Option<&Loops<T>>,
     ) {
         for &slot in contacts.used() {
             let (path, rows) = self.of(contacts, slot);
             path.push(contacts.slot(slot).active & lanes, rows, &p[slot], y);
         }
-        if let Some(loops) = &self.loops {
+        if let Some(loops) = loops {
             loops.answer(&in_slots(contacts, lanes, p), y);
-        }
-    }
-
-    /// Finds the impulses of the loops with those of the contacts by slot, N s, in the lanes of a
-    /// mask.
-    #[inline(always)]
-    pub fn find_loop_impulses(&mut self, contacts: &Contacts<T>, lanes: T::Mask, p: &[Triple<T>]) {
-        if let Some(loops) = &mut self.loops {
-            loops.find_impulses(&in_slots(contacts, lanes, p));
         }
     }
 
@@ -647,9 +614,9 @@ impl<T: Lane> Rows<T> {
     pub fn to_problems(
         &self,
         contacts: &Contacts<T>,
-        q: &[Triple<T>],
-        mu: &[T],
+        (q, mu): (&[Triple<T>], &[T]),
         problems: &mut [ContactProblem],
+        loops: Option<&Loops<T>>,
     ) {
         T::vectorize(
             self.token,
@@ -689,7 +656,7 @@ impl<T: Lane> Rows<T> {
                         },
                     );
                     if factored != 0 && contacts.near(slot) != 0 {
-                        self.write_factors(contacts, slot, problems);
+                        self.write_factors(contacts, slot, problems, loops);
                     }
                 }
                 for cluster in 0..contacts.n_clusters() {
@@ -756,7 +723,13 @@ impl<T: Lane> Rows<T> {
 
     /// Writes a slot's part of the factors.
     #[inline(always)]
-    fn write_factors(&self, contacts: &Contacts<T>, slot: usize, problems: &mut [ContactProblem]) {
+    fn write_factors(
+        &self,
+        contacts: &Contacts<T>,
+        slot: usize,
+        problems: &mut [ContactProblem],
+        loops: Option<&Loops<T>>,
+    ) {
         let (homes, places) = (contacts.homes(slot), contacts.places(slot));
         let near = T::mask(self.token, contacts.near(slot));
         let (path, rows) = self.of(contacts, slot);
@@ -817,8 +790,9 @@ impl<T: Lane> Rows<T> {
                 },
             );
         }
-        if self.loops.is_some() {
-            self.project_factors(contacts, slot, T::mask(self.token, whole), problems);
+        if let Some(loops) = loops {
+            let whole = T::mask(self.token, whole);
+            self.project_factors(contacts, (slot, loops), whole, problems);
         }
     }
 
@@ -860,13 +834,10 @@ impl<T: Lane> Rows<T> {
     fn project_factors(
         &self,
         contacts: &Contacts<T>,
-        slot: usize,
+        (slot, loops): (usize, &Loops<T>),
         whole: T::Mask,
         problems: &mut [ContactProblem],
     ) {
-        let Some(loops) = &self.loops else {
-            return;
-        };
         let zero = T::splat(self.token, 0.0);
         let (homes, places) = (contacts.homes(slot), contacts.places(slot));
         for (k, &[cluster, place]) in self.velocities.iter().enumerate() {
@@ -1015,7 +986,7 @@ fn write_guest<T: Lane>(
 
 /// Impulses of the slots in use, and where they have one among the lanes of a mask.
 #[inline(always)]
-fn in_slots<'a, T: Lane>(
+pub(super) fn in_slots<'a, T: Lane>(
     contacts: &'a Contacts<T>,
     lanes: T::Mask,
     p: &'a [Triple<T>],

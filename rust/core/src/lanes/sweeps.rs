@@ -10,6 +10,7 @@ use super::rows::Rows;
 use crate::contact::rows::{add_scaled, along};
 use crate::scalar::{Lane, LaneMask};
 use crate::solver::batch::problem::Triple;
+use crate::system::loops::Loops;
 
 /// Newton steps on the multiplier of a slide.
 const SLIDE_STEPS: usize = 2;
@@ -75,6 +76,7 @@ impl<T: Lane> Rows<T> {
         n: usize,
         (q, mu): (&[Triple<T>], &[T]),
         p: &mut [Triple<T>],
+        loops: Option<&Loops<T>>,
     ) {
         let zero = T::splat(contacts.token, 0.0);
         let mut motion = std::mem::take(&mut self.swept);
@@ -88,7 +90,7 @@ impl<T: Lane> Rows<T> {
             }
             let (path, rows) = self.of(contacts, slot);
             path.push(active, rows, &p[slot], &mut motion);
-            self.push_loops(slot, &p[slot], &mut of_loops);
+            push_loops(loops, slot, &p[slot], &mut of_loops);
         }
         for _ in 0..n {
             for slot in contacts.used_nearby() {
@@ -99,7 +101,7 @@ impl<T: Lane> Rows<T> {
                 }
                 u[0] += self.normal[slot] * p[slot][0];
                 let mut u = path.add_local(rows, &motion, u);
-                if let Some(loops) = &self.loops {
+                if let Some(loops) = loops {
                     for (row, z) in of_loops.iter().enumerate() {
                         add_scaled(&mut u, loops.product(row, slot), -*z);
                     }
@@ -112,20 +114,20 @@ impl<T: Lane> Rows<T> {
                     p[slot][k] += change[k];
                 }
                 path.push(active, rows, &change, &mut motion);
-                self.push_loops(slot, &change, &mut of_loops);
+                push_loops(loops, slot, &change, &mut of_loops);
             }
         }
         self.swept = motion;
         self.swept_loops = of_loops;
     }
+}
 
-    /// `z += B p` of a slot's impulse, which is zero in lanes without a contact there.
-    #[inline(always)]
-    fn push_loops(&self, slot: usize, p: &Triple<T>, z: &mut [T]) {
-        if let Some(loops) = &self.loops {
-            for (row, z) in z.iter_mut().enumerate() {
-                *z += along(loops.product(row, slot), p);
-            }
+/// `z += B p` of a slot's impulse, which is zero in lanes without a contact there.
+#[inline(always)]
+fn push_loops<T: Lane>(loops: Option<&Loops<T>>, slot: usize, p: &Triple<T>, z: &mut [T]) {
+    if let Some(loops) = loops {
+        for (row, z) in z.iter_mut().enumerate() {
+            *z += along(loops.product(row, slot), p);
         }
     }
 }

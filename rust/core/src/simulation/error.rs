@@ -185,8 +185,8 @@ pub enum LinearisationError {
     },
     /// The step is not one solution of the step's equations.
     #[error(
-        "the step was taken in parts, was not solved to its tolerance, was limited, or turns so \
-         fast that gyroscopic terms are implicit: it has no derivative with fixed contact modes"
+        "the step was taken in parts, was not solved to its tolerance or was limited: it has no \
+         derivative with fixed contact modes"
     )]
     NotHeld,
 }

@@ -235,7 +235,7 @@ fn add<T: Lane>(y: &mut [T], x: &[T], a: T) {
 
 /// The loops of a machine in a step.
 #[derive(Clone, Debug)]
-pub(crate) struct Loops<T: Lane> {
+pub struct Loops<T: Lane> {
     token: T::Token,
     closures: Vec<Loop>,
     /// At the midpoint of the step.

@@ -6,7 +6,7 @@
 //!   `momentum_balance`: the balance of the Newton variant; [`gyroscopic`]: when gyroscopic terms
 //!   are implicit, and how; [`loops`]: its closed loops; `sand`: its wheels in sand, also
 //!   several machines over lanes; `sand_patch`, `sand_wheel`, `sand_tangent`, `six`: one of them;
-//!   `tangent`: derivatives of a step;
+//!   `tree_lanes`: trees in the lanes of a scalar; `tangent`: derivatives of a step;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`grains`]: thousands of free disks or balls, and a planar machine among them;
 //! - [`among_grains`]: a tree among balls.
@@ -53,6 +53,7 @@ pub(crate) mod sand_wheel;
 mod six;
 pub(crate) mod tangent;
 pub mod tree;
+pub(crate) mod tree_lanes;
 pub mod tree_scratch;
 
 pub use among_grains::{

@@ -502,7 +502,7 @@ impl Forces for TreeSystem<'_> {
     }
 
     #[inline]
-    fn accept(&mut self, lanes: bool, _: &[f64]) {
+    fn accept(&mut self, lanes: bool) {
         if !lanes {
             return;
         }

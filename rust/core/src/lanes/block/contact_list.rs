@@ -25,20 +25,20 @@ impl<T: Lane> LaneSystem<T> {
     ) -> T::Mask {
         let (h, theta) = (options.time_step, options.theta);
         let measured = (1.0 - theta) * h;
-        let activation = Activation::of_step(self.gravity, h, options.forecast, measured);
+        let activation = Activation::of_step(self.tree.gravity, h, options.forecast, measured);
         let sight = Sight {
             machine: &self.machine,
-            models: &self.models,
+            models: &self.tree.models,
             going: going.bits(),
-            middle: &self.poses_middle,
-            end: &self.poses_end,
+            middle: &self.tree.poses_middle,
+            end: &self.tree.poses_end,
             v,
             needs_pieces: !options.materials.is_empty(),
             activation: &activation,
         };
         let mut refused = self.contacts.detect(&mut self.ground, &sight);
         if self.machine.joints_with_slots().next().is_some() {
-            let (machine, end) = (&*self.machine, &self.poses_end);
+            let (machine, end) = (&*self.machine, &self.tree.poses_end);
             let too_many = (self.contacts).detect_joints(machine, q, end, v, &activation);
             refused = refused | too_many;
         }
@@ -61,7 +61,7 @@ impl<T: Lane> LaneSystem<T> {
     #[cold]
     fn mix_materials(&mut self, materials: &Materials, lanes: T::Mask) {
         for lane in (0..T::LANES).filter(|&lane| lanes.get(lane)) {
-            let (Some(model), Some(terrain)) = (&self.models[lane], self.ground.terrain(lane))
+            let (Some(model), Some(terrain)) = (&self.tree.models[lane], self.ground.terrain(lane))
             else {
                 continue;
             };
@@ -88,7 +88,7 @@ impl<T: Lane> Block<T> {
         for (slot, contact) in own.contacts.all_of(&own.machine, lane) {
             let at = |x: &[Triple<T>]| x[slot].map(|x| x.get(lane));
             let tree = own.machine.tree_of_body(contact.body);
-            let origin = Vector3::from(own.poses_end.origin_of(tree).get(lane));
+            let origin = Vector3::from(own.tree.poses_end.origin_of(tree).get(lane));
             let position = (origin + contact.point).into();
             visit(contact, position, at(&data.p), at(&data.u));
         }

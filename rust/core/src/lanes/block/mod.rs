@@ -12,17 +12,12 @@
 //! A lane whose step cannot be taken falls back: its state stays as it was.
 //!
 //! `loading`: rovers come and go; `system`: the rovers and their contacts, as the scheme sees them,
-//! with `contact_list`, `problems` and `by_method`; `dynamics`; `forces`, with `pushing` and
-//! `sinking`.
+//! with `contact_list`, `problems` and `by_method`. What moves is [`crate::system::tree_lanes`].
 
 mod by_method;
 mod contact_list;
-mod dynamics;
-mod forces;
 mod loading;
 mod problems;
-mod pushing;
-mod sinking;
 mod system;
 
 use std::sync::Arc;
@@ -63,7 +58,7 @@ impl<T: Lane> Block<T> {
     pub fn new(token: T::Token, machine: &Arc<Machine>) -> Self {
         let system = LaneSystem::new(token, machine);
         let place = LaneConfiguration::new(token, machine);
-        let mut data = Data::new(token, &place, &system);
+        let mut data = Data::new(token, &place, &system.tree);
         data.fit_places(system.contacts.n_slots(), machine.yields());
         Self { system, data }
     }
@@ -101,7 +96,7 @@ impl<T: Lane> Block<T> {
     /// World positions of a lane's roots where the contacts of the last step were evaluated, m.
     pub fn origins(&self, lane: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
         let trees = 0..self.system.machine.trees.len();
-        trees.map(move |tree| self.system.poses_end.origin_of(tree).get(lane))
+        trees.map(move |tree| self.system.tree.poses_end.origin_of(tree).get(lane))
     }
 
     /// Number of the friction-contact problems of all lanes: one of each cluster in each lane.
@@ -155,6 +150,8 @@ impl<T: Lane> Block<T> {
     /// If there are fewer than [`Self::n_problems`].
     pub fn finish(&mut self, problems: Option<&mut [ContactProblem]>, probe: &mut dyn Probe) {
         scheme::finish(&mut self.system, &mut self.data, problems, probe);
-        self.system.note_ruts(self.data.going);
+        self.system
+            .find_loop_impulses(self.data.going, &self.data.p);
+        self.system.tree.note_ruts(self.data.going);
     }
 }

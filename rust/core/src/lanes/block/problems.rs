@@ -40,7 +40,9 @@ impl<T: Lane> LaneSystem<T> {
                 }
             }
         }
-        self.rows.to_problems(&self.contacts, q, &self.mu, problems);
+        let loops = self.tree.loops.as_deref();
+        let data = (q, &self.mu[..]);
+        (self.rows).to_problems(&self.contacts, data, problems, loops);
         for (index, problem) in problems[..n].iter_mut().enumerate() {
             problem.begins_least = is_same[index / T::LANES].get(index % T::LANES);
         }
@@ -75,8 +77,8 @@ impl<T: Lane> LaneSystem<T> {
             self.swept.fill([zero; 3]);
         }
         let data = (q, &self.mu[..]);
-        self.rows
-            .sweep(&self.contacts, SWEEPS, data, &mut self.swept);
+        let loops = self.tree.loops.as_deref();
+        (self.rows).sweep(&self.contacts, SWEEPS, data, &mut self.swept, loops);
         write_start(&self.contacts, lanes, &self.swept, problems);
     }
 
@@ -132,7 +134,7 @@ impl<T: Lane> LaneSystem<T> {
     /// Whether a lane's memory has a contact of a cluster.
     pub(super) fn knows(&self, lane: usize, memory: &WarmStart, cluster: usize) -> bool {
         let mut keys = memory.impulses.iter();
-        match &self.models[lane] {
+        match &self.tree.models[lane] {
             Some(model) => keys.any(|(key, _)| clusters_of(model, key).contains(&cluster)),
             None => !memory.impulses.is_empty(),
         }
@@ -174,7 +176,8 @@ impl<T: Lane> LaneSystem<T> {
         let swept = T::mask(self.token, all & self.contacts.factored());
         if swept.any() {
             let data = (gaps, &self.mu[..]);
-            (self.rows).sweep(&self.contacts, SWEEPS_OF_GAPS, data, pushes);
+            let loops = self.tree.loops.as_deref();
+            (self.rows).sweep(&self.contacts, SWEEPS_OF_GAPS, data, pushes, loops);
             write_start(&self.contacts, swept, pushes, problems);
         }
     }

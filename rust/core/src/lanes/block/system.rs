@@ -1,4 +1,4 @@
-//! The rovers of a block as systems of the scheme.
+//! The rovers of a block as the systems of the scheme: where their contacts are.
 
 use std::sync::Arc;
 
@@ -11,28 +11,19 @@ use crate::lanes::contacts::Contacts;
 use crate::lanes::ground::Ground;
 use crate::lanes::joint_slots::JointRow;
 use crate::lanes::machine::Machine;
-use crate::lanes::rows::{Answer, Rows};
+use crate::lanes::rows::{Answer, Rows, in_slots};
 use crate::lanes::yielding::spring;
 use crate::law::compliance::{Compliance, Yielding};
-use crate::multibody::bias::BiasScratch;
-use crate::multibody::{
-    EnergyScratch, Factor, Inertias, LaneConfiguration, MassMatrix, Model, Poses,
-};
-use crate::sand::RutMap;
-use crate::scalar::{Lane, MAX_LANES, Vec3};
+use crate::multibody::LaneConfiguration;
+use crate::scalar::{Lane, Vec3};
 use crate::solver::batch::problem::{ContactProblem, Triple};
-use crate::system::command::Wrench;
-use crate::system::drives::Drives;
-use crate::system::gyroscopic::Gyroscopic;
-use crate::system::sand::SandContact;
+use crate::system::tree_lanes::TreeLanes;
 
-/// Rovers of one machine: their descriptions, commands, and the matrices of a step.
+/// Rovers of one machine, with their contacts.
 pub(super) struct LaneSystem<T: Lane> {
     pub token: T::Token,
     pub machine: Arc<Machine>,
-    pub models: [Option<Arc<Model>>; MAX_LANES],
-    pub inertias: Inertias<T>,
-    pub gravity: Vec3<T>,
+    pub tree: TreeLanes<T>,
     /// Friction coefficient of contacts without a law of their materials, and of each slot.
     pub friction: T,
     pub mu: Vec<T>,
@@ -41,80 +32,30 @@ pub(super) struct LaneSystem<T: Lane> {
     /// Most dry friction of each joint that has it, N m or N.
     pub dry_friction: Vec<T>,
     pub ground: Ground<T>,
-    pub drives: Drives<T>,
-    /// The sand under the wheels, once a rover stands on soft ground, and the ruts of each lane's
-    /// rover.
-    pub sand: Option<Box<SandContact<T>>>,
-    pub ruts: Vec<RutMap>,
-    /// Work of the sand on each cluster, J.
-    pub of_sand: Vec<T>,
-    /// What pushes the rover of each lane, and its generalized force at the midpoint (nv).
-    pub wrenches: [Vec<Wrench>; MAX_LANES],
-    pub applied: Vec<T>,
-    pub poses_middle: Poses<T>,
-    pub poses_end: Poses<T>,
-    /// Coordinates of the joints at the midpoint.
-    pub joints_middle: Vec<T>,
-    pub mass_matrix: MassMatrix<T>,
-    pub factor: Factor<T>,
-    pub bias_scratch: BiasScratch<T>,
-    pub implicit: Option<Box<Implicit<T>>>,
-    /// Whether a rover may need them in the present step.
-    pub turns: bool,
     pub by_method: Option<Box<ByMethod>>,
-    pub energy_scratch: EnergyScratch<T>,
     pub contacts: Contacts<T>,
     pub rows: Rows<T>,
-    /// Torques' impulse over the step (nv).
-    pub torque: Vec<T>,
     /// Impulses that the sweeps start from and end with, by slot, N s.
     pub swept: Vec<Triple<T>>,
-}
-
-/// What steps with implicit gyroscopic terms need beside the others.
-pub(super) struct Implicit<T: Lane> {
-    pub solver: Gyroscopic<T>,
-    /// M̂.
-    pub mass_matrix: MassMatrix<T>,
-    /// Impulse of the forces but the gyroscopic ones (nv).
-    pub given: Vec<T>,
 }
 
 impl<T: Lane> LaneSystem<T> {
     /// Without rovers.
     pub fn new(token: T::Token, machine: &Arc<Machine>) -> Self {
         let zero = T::splat(token, 0.0);
-        let vector = || vec![zero; machine.nv()];
         let contacts = Contacts::new(token, machine);
         let n = contacts.n_slots();
+        let (mechanism, in_sand) = (machine.mechanism(), machine.in_sand.clone());
         Self {
             token,
-            models: [const { None }; MAX_LANES],
-            inertias: Inertias::new(token, machine),
-            gravity: Vec3::splat(token, [0.0; 3]),
+            tree: TreeLanes::new(token, mechanism, &machine.loops, in_sand, n),
             friction: zero,
             mu: vec![zero; n],
             restitution: vec![zero; n],
             dry_friction: vec![zero; machine.rubbing.len()],
             ground: Ground::new(token, machine.wheels.len(), machine.boxes.len()),
-            drives: Drives::new(token, machine),
-            sand: None,
-            ruts: vec![RutMap::default(); T::LANES],
-            of_sand: vec![zero; machine.n_clusters()],
-            wrenches: [const { Vec::new() }; MAX_LANES],
-            applied: vector(),
-            poses_middle: Poses::new(token, machine),
-            poses_end: Poses::new(token, machine),
-            joints_middle: vec![zero; machine.joints.len()],
-            mass_matrix: MassMatrix::new(token, machine),
-            factor: Factor::new(token, machine),
-            bias_scratch: BiasScratch::new(token, machine),
-            implicit: None,
-            turns: false,
             by_method: None,
-            energy_scratch: EnergyScratch::new(token, machine),
             rows: Rows::new(token, machine, n),
-            torque: vector(),
             swept: vec![[zero; 3]; n],
             contacts,
             machine: Arc::clone(machine),
@@ -131,6 +72,18 @@ impl<T: Lane> LaneSystem<T> {
         match self.contacts.joint_row(slot) {
             Some((joint, JointRow::Stop(_))) => self.machine.joints[joint].arm,
             _ => 1.0,
+        }
+    }
+
+    /// Finds the impulses of the loops with those of the contacts by slot, N s, in some lanes.
+    pub fn find_loop_impulses(&mut self, lanes: T::Mask, p: &[Triple<T>]) {
+        if let Some(loops) = &mut self.tree.loops {
+            let impulses = in_slots(&self.contacts, lanes, p);
+            T::vectorize(
+                self.token,
+                #[inline(always)]
+                || loops.find_impulses(&impulses),
+            );
         }
     }
 
@@ -158,19 +111,10 @@ impl<T: Lane> LaneSystem<T> {
     }
 }
 
-/// h and θ.
-#[inline(always)]
-pub(super) fn time_step<T: Lane>(token: T::Token, options: &StepOptions) -> (T, T) {
-    (
-        T::splat(token, options.time_step),
-        T::splat(token, options.theta),
-    )
-}
-
 impl<T: Lane> Systems for LaneSystem<T> {
     type T = T;
     type Configuration = LaneConfiguration<T>;
-    type Machine = Self;
+    type Machine = TreeLanes<T>;
     type Local = Triple<T>;
     type Key = ContactKey;
     type Contacts = Contacts<T>;
@@ -182,18 +126,18 @@ impl<T: Lane> Systems for LaneSystem<T> {
     }
 
     #[inline(always)]
-    fn machine(&self) -> &Self {
-        self
+    fn machine(&self) -> &TreeLanes<T> {
+        &self.tree
     }
 
     #[inline(always)]
-    fn machine_mut(&mut self) -> &mut Self {
-        self
+    fn machine_mut(&mut self) -> &mut TreeLanes<T> {
+        &mut self.tree
     }
 
     #[inline(always)]
     fn gravity(&self) -> Vec3<T> {
-        self.gravity
+        self.tree.gravity
     }
 
     #[inline(always)]
@@ -224,7 +168,7 @@ impl<T: Lane> Systems for LaneSystem<T> {
         problems: &mut [ContactProblem],
         is_same: &mut [T::Mask],
     ) {
-        let own = (lane, self.models[lane].as_ref());
+        let own = (lane, self.tree.models[lane].as_ref());
         self.contacts.recall(own, memory, problems, is_same);
     }
 
@@ -235,9 +179,14 @@ impl<T: Lane> Systems for LaneSystem<T> {
     }
 
     fn assemble(&mut self, v: &[T]) {
-        let (machine, end) = (&*self.machine, &self.poses_end);
-        self.rows
-            .assemble(machine, end, &self.factor, &self.contacts, v);
+        let TreeLanes {
+            loops,
+            factor,
+            poses_end,
+            ..
+        } = &mut self.tree;
+        let (of, loops) = ((&*self.machine, &*factor), loops.as_deref_mut());
+        self.rows.assemble(of, poses_end, &self.contacts, v, loops);
     }
 
     #[inline(always)]
@@ -260,7 +209,7 @@ impl<T: Lane> Systems for LaneSystem<T> {
 
     #[inline(always)]
     fn compliance(&self, slot: usize, v: &[T]) -> (Option<Compliance<T>>, T::Mask) {
-        let motion = (&self.poses_middle, v);
+        let motion = (&self.tree.poses_middle, v);
         spring((&self.machine, &self.contacts), motion, slot)
     }
 
@@ -298,12 +247,13 @@ impl<T: Lane> Systems for LaneSystem<T> {
 
     #[inline(always)]
     fn add_impulses(&self, lanes: T::Mask, p: &[Triple<T>], y: &mut [T]) {
-        self.rows.add_impulses(&self.contacts, lanes, p, y);
+        let loops = self.tree.loops.as_deref();
+        (self.rows).add_impulses(&self.contacts, lanes, p, y, loops);
     }
 
     #[inline(always)]
     fn generalized_impulse(&self, lanes: T::Mask, p: &[Triple<T>], out: &mut [T]) {
-        let (machine, end) = (&*self.machine, &self.poses_end);
+        let (machine, end) = (&*self.machine, &self.tree.poses_end);
         self.rows
             .generalized_impulse(machine, &self.contacts, end, lanes, p, out);
     }
@@ -326,7 +276,7 @@ impl<T: Lane> Systems for LaneSystem<T> {
     fn pose(
         &mut self,
         options: &StepOptions,
-        q: &[Triple<T>],
+        (q, _): (&[Triple<T>], &[T]),
         start: &[Triple<T>],
         is_same: &[T::Mask],
         lanes: T::Mask,

@@ -302,8 +302,8 @@ impl Forces for TreeAmongGrains<'_> {
         out.fill(whole.unwrap_or_default());
     }
 
-    fn accept(&mut self, lanes: bool, p: &[f64]) {
-        self.tree.accept(lanes, p);
+    fn accept(&mut self, lanes: bool) {
+        self.tree.accept(lanes);
     }
 
     fn begin_balance(&mut self, start: Start<'_, Both>) {

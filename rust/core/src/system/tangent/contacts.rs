@@ -2,33 +2,40 @@
 
 use nalgebra::Vector3;
 
-use super::held_tree::{HeldContact, TangentScene};
-use super::scratch::{Tangent, Varying};
+use super::held_places::Varying;
+use super::held_system::Held;
+use super::held_tree::HeldContact;
 use crate::contact::contact_slope::SlopeOfBody;
 use crate::contact::jacobian::sides;
 use crate::contact::limit;
 use crate::contact::rows::{Place, Triple, add_scaled};
-use crate::contact::{Contact, Part, clusters_of};
-use crate::law::compliance::{Compliance, Yielding};
-use crate::multibody::{Model, Poses};
+use crate::contact::{Contact, Part};
+use crate::law::compliance::Compliance;
+use crate::multibody::{LaneConfiguration, Model, Poses};
 use crate::scalar::{Dual, Lane, Vec3};
 
-impl<T: Lane> Tangent<T> {
-    /// Places all contacts at the predicted end of the step.
+impl<T: Lane> Held<'_, T> {
+    /// Places all contacts at the predicted end of the step, `q`.
     #[inline(always)]
-    pub(super) fn place_contacts(&mut self, scene: &TangentScene<'_>) {
-        self.contacts.clear();
-        let contacts = scene.held.step.contacts.iter();
-        for (contact, held) in contacts.zip(&scene.held.contacts) {
-            let varying = self.place(scene.model, contact, held);
-            self.contacts.push(varying);
+    pub(super) fn place_contacts(&mut self, q: &LaneConfiguration<Dual<T>>) {
+        let held = self.scene.held;
+        let mut all = std::mem::take(&mut self.own.places.varying);
+        all.clear();
+        for (contact, own) in held.step.contacts.iter().zip(&held.contacts) {
+            all.push(self.place(q, contact, own));
         }
+        self.own.places.varying = all;
     }
 
     #[inline(always)]
-    fn place(&self, model: &Model, contact: &Contact, held: &HeldContact) -> Varying<T> {
-        let token = self.token;
-        let poses = &self.poses_end;
+    fn place(
+        &self,
+        q: &LaneConfiguration<Dual<T>>,
+        contact: &Contact,
+        held: &HeldContact,
+    ) -> Varying<T> {
+        let (model, token) = (self.scene.model, self.own.tree.token);
+        let poses = &self.own.tree.poses_end;
         let mut slopes = [T::splat(token, 0.0); 13];
         if held.joint.is_none() {
             add_slopes(
@@ -47,7 +54,7 @@ impl<T: Lane> Tangent<T> {
         x.z.slope -= origin.z.slope;
         let mut gap = Dual::new(T::splat(token, contact.gap), slopes[12]);
         if let (Some(joint), Some((_, sign, 0))) = (held.joint, limit::joint_row(model, contact)) {
-            gap.slope = T::splat(token, sign) * self.end.joints[joint].slope;
+            gap.slope = T::splat(token, sign) * q.joints[joint].slope;
         }
         let [n, t, b] = contact.frame.rows();
         Varying {
@@ -63,22 +70,18 @@ impl<T: Lane> Tangent<T> {
 
     /// `Hᵀ x` of a contact, x (nv).
     #[inline(always)]
-    pub(super) fn local(
-        &self,
-        scene: &TangentScene<'_>,
-        i: usize,
-        x: &[Dual<T>],
-    ) -> Triple<Dual<T>> {
-        let contact = &scene.held.step.contacts[i];
-        let zero = Dual::splat(self.token, 0.0);
+    pub(super) fn along(&self, i: usize, x: &[Dual<T>]) -> Triple<Dual<T>> {
+        let model = self.scene.model;
+        let contact = &self.scene.held.step.contacts[i];
+        let zero = self.number(0.0);
         let mut sum = [zero; 3];
-        if let Some((k, sign, row)) = limit::joint_row(scene.model, contact) {
+        if let Some((k, sign, row)) = limit::joint_row(model, contact) {
             sum[row] = zero.like(sign) * x[k];
             return sum;
         }
-        let poses = &self.poses_end;
-        for (body, sign, path) in sides(scene.model.mechanism(), contact) {
-            let place = self.seen_from(scene.model, i, contact, body);
+        let poses = &self.own.tree.poses_end;
+        for (body, sign, path) in sides(model.mechanism(), contact) {
+            let place = self.seen_from(i, contact, body);
             let sign = zero.like(sign);
             path.for_each_row(
                 #[inline(always)]
@@ -93,76 +96,79 @@ impl<T: Lane> Tangent<T> {
 
     /// `y += H p` of a contact.
     #[inline(always)]
-    pub(super) fn push(&mut self, scene: &TangentScene<'_>, i: usize, p: [f64; 3]) {
-        let contact = &scene.held.step.contacts[i];
-        let number = |x: f64| Dual::splat(self.token, x);
-        if let Some((k, sign, row)) = limit::joint_row(scene.model, contact) {
-            self.y[k] += number(sign * p[row]);
+    pub(super) fn push(&self, i: usize, p: &Triple<Dual<T>>, y: &mut [Dual<T>]) {
+        let model = self.scene.model;
+        let contact = &self.scene.held.step.contacts[i];
+        let zero = self.number(0.0);
+        if let Some((k, sign, row)) = limit::joint_row(model, contact) {
+            y[k] += zero.like(sign) * p[row];
             return;
         }
-        for (body, sign, path) in sides(scene.model.mechanism(), contact) {
-            let place = self.seen_from(scene.model, i, contact, body);
-            let [force, moment] = place.wrench(p.map(|p| number(sign * p)));
+        for (body, sign, path) in sides(model.mechanism(), contact) {
+            let place = self.seen_from(i, contact, body);
+            let sign = zero.like(sign);
+            let [force, moment] = place.wrench([sign * p[0], sign * p[1], sign * p[2]]);
             if let Some(first) = path.base {
                 let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-                for (y, x) in self.y[first..].iter_mut().zip(both) {
+                for (y, x) in y[first..].iter_mut().zip(both) {
                     *y += x;
                 }
             }
             for mover in path.movers {
-                let power = self.poses_end.motions[mover.motion].power(force, moment);
-                self.y[mover.velocity] += power;
+                let power = self.own.tree.poses_end.motions[mover.motion].power(force, moment);
+                y[mover.velocity] += power;
             }
         }
     }
 
     /// The place of a contact relative to the origin of another body's tree.
     #[inline(always)]
-    fn seen_from(&self, model: &Model, i: usize, contact: &Contact, body: usize) -> Place<Dual<T>> {
-        let mut place = self.contacts[i].place;
-        let trees = [contact.body, body].map(|body| model.bodies()[body].tree);
+    fn seen_from(&self, i: usize, contact: &Contact, body: usize) -> Place<Dual<T>> {
+        let mut place = self.own.places.varying[i].place;
+        let trees = [contact.body, body].map(|body| self.scene.model.bodies()[body].tree);
         if trees[0] != trees[1] {
-            let [own, other] = trees.map(|tree| self.poses_end.origin_of(tree));
+            let [own, other] = trees.map(|tree| self.own.tree.poses_end.origin_of(tree));
             place.x += own - other;
         }
         place
     }
 
-    /// The law of a contact that yields.
+    /// Springs and damper of a contact that yields, at the velocity `v` (nv).
     #[inline(always)]
-    pub(super) fn yielding(&self, scene: &TangentScene<'_>, i: usize) -> Option<Yielding<Dual<T>>> {
-        let held = &scene.held.contacts[i];
-        if !held.is_soft {
+    pub(super) fn spring(&self, i: usize, v: &[Dual<T>]) -> Option<Compliance<Dual<T>>> {
+        if !self.scene.held.contacts[i].is_soft {
             return None;
         }
-        let options = scene.options;
-        let number = |x: f64| Dual::splat(self.token, x);
-        let h = number(options.time_step);
-        let zero = number(0.0);
-        let one = T::splat(self.token, 1.0);
-        let of = |part: Part| {
-            let (tread, wheel) = part.tread(scene.model)?;
-            let (mechanism, poses) = (scene.model.mechanism(), &self.poses_middle);
-            let n = self.contacts[i].place.n;
-            let own = tread.rolling(poses.rolling(mechanism, wheel, n, |k| self.v[k]));
-            Some(Compliance {
-                stiffness: own.stiffness * Dual::new(one, self.d_stiffness),
-                damping: own.damping * Dual::new(one, self.d_damping),
-                tangential: own.tangential * Dual::new(one, self.d_stiffness),
-                ..own
-            })
-        };
-        let contact = &scene.held.step.contacts[i];
-        let other = contact.other.and_then(|other| of(other.part));
-        let law = Compliance::in_series(of(contact.part), other)?;
-        // As the step without a memory takes it.
-        let mechanism = scene.model.mechanism();
-        let [cluster, _] = clusters_of(scene.model, &contact.key);
-        let weight = self.inertias.mass_of(mechanism, cluster) * number(options.gravity.norm()) * h;
-        let u_N = self.local(scene, i, &self.v)[0];
-        let step = (h, number(options.theta));
-        let unknown = (T::mask(self.token, u32::MAX >> (32 - T::LANES)), weight);
-        Some(law.over(step, self.contacts[i].gap, u_N, [zero; 3], unknown))
+        let contact = &self.scene.held.step.contacts[i];
+        let own = self.spring_of(contact.part, i, v);
+        match contact.other {
+            None => own,
+            Some(other) => Compliance::in_series(own, self.spring_of(other.part, i, v)),
+        }
+    }
+
+    /// Spring and damper of a part at a contact.
+    #[inline(always)]
+    fn spring_of(&self, part: Part, i: usize, v: &[Dual<T>]) -> Option<Compliance<Dual<T>>> {
+        let one = T::splat(self.own.tree.token, 1.0);
+        let stiffness = Dual::new(one, self.own.d_stiffness);
+        let (tread, wheel) = part.tread(self.scene.model)?;
+        let (mechanism, poses) = (self.scene.model.mechanism(), &self.own.tree.poses_middle);
+        let n = self.own.places.varying[i].place.n;
+        let motion = poses.rolling(
+            mechanism,
+            wheel,
+            n,
+            #[inline(always)]
+            |k| v[k],
+        );
+        let own = tread.rolling(motion);
+        Some(Compliance {
+            stiffness: own.stiffness * stiffness,
+            damping: own.damping * Dual::new(one, self.own.d_damping),
+            tangential: own.tangential * stiffness,
+            ..own
+        })
     }
 }
 

@@ -2,10 +2,8 @@
 
 use super::held_tree::TangentScene;
 use super::scratch::Tangent;
-use super::varying_sand::VaryingSand;
-use crate::multibody::LaneConfiguration;
 use crate::scalar::{Dual, Lane};
-use crate::system::sand_wheel::PlacedWheel;
+use crate::system::loops::Projector;
 
 /// A direction in which a step is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,18 +53,28 @@ impl<T: Lane> Tangent<T> {
     /// Sets what varies, one direction a lane.
     pub(super) fn seed(&mut self, scene: &TangentScene<'_>, directions: &[Direction]) {
         let mechanism = scene.model.mechanism();
-        let token = self.token;
+        let token = self.data.token;
         let zero = T::splat(token, 0.0);
-        for ((own, moved), v) in self.v.iter_mut().zip(&mut self.moved).zip(scene.start.v) {
+        for ((own, moved), v) in self
+            .data
+            .v
+            .iter_mut()
+            .zip(&mut self.moved)
+            .zip(scene.start.v)
+        {
             *own = Dual::splat(token, *v);
             *moved = Dual::constant(zero);
         }
         if std::mem::take(&mut self.varies_inertias) {
             self.reset_inertias(scene);
         }
-        self.drives.clone_from(&self.own_drives);
-        (self.d_mu, self.d_stiffness, self.d_damping) = (zero, zero, zero);
-        if let (Some(sand), Some(held)) = (&mut self.sand, &scene.held.sand) {
+        self.parts.tree.drives.clone_from(&self.own_drives);
+        (
+            self.parts.d_mu,
+            self.parts.d_stiffness,
+            self.parts.d_damping,
+        ) = (zero, zero, zero);
+        if let (Some(sand), Some(held)) = (&mut self.parts.sand, &scene.held.sand) {
             sand.reset(held);
         }
         for (lane, direction) in directions.iter().enumerate() {
@@ -78,36 +86,36 @@ impl<T: Lane> Tangent<T> {
                         self.moved[k].slope += unit::<T>(token, lane, rate);
                     }
                 }
-                Direction::Velocity(k) => self.v[k].slope += one,
+                Direction::Velocity(k) => self.data.v[k].slope += one,
                 Direction::Command(joint, sign) => {
                     let change = Dual::new(zero, unit(token, lane, sign));
-                    self.drives.add_command(joint, change);
+                    self.parts.tree.drives.add_command(joint, change);
                 }
                 Direction::SetPoint(joint) => {
                     if let Some(held) = &scene.command.held[joint]
                         && held.stiffness > 0.0
                     {
-                        let whole = self.drives.stiffness(joint);
+                        let whole = self.parts.tree.drives.stiffness(joint);
                         let share = Dual::splat(token, held.stiffness) / whole;
-                        self.drives.add_set_point(joint, share, varying);
+                        self.parts.tree.drives.add_set_point(joint, share, varying);
                     }
                 }
-                Direction::Friction => self.d_mu += one,
+                Direction::Friction => self.parts.d_mu += one,
                 Direction::Mass(body) => {
                     let factor = Dual::new(T::splat(token, 1.0), one);
-                    self.inertias.scale(mechanism, body, factor);
+                    self.parts.tree.inertias.scale(mechanism, body, factor);
                 }
                 Direction::AllMasses => {
                     let factor = Dual::new(T::splat(token, 1.0), one);
                     for body in 0..scene.model.bodies().len() {
-                        self.inertias.scale(mechanism, body, factor);
+                        self.parts.tree.inertias.scale(mechanism, body, factor);
                     }
                 }
-                Direction::Damping(joint) => self.drives.add_damping(joint, varying),
-                Direction::Stiffness => self.d_stiffness += one,
-                Direction::ContactDamping => self.d_damping += one,
+                Direction::Damping(joint) => self.parts.tree.drives.add_damping(joint, varying),
+                Direction::Stiffness => self.parts.d_stiffness += one,
+                Direction::ContactDamping => self.parts.d_damping += one,
                 Direction::Sand(wheel, entry) => {
-                    if let Some(sand) = &mut self.sand {
+                    if let Some(sand) = &mut self.parts.sand {
                         let wheel = &mut sand.wheels[wheel];
                         let own = wheel.memory.get_mut(entry).unwrap_or(&mut wheel.stored);
                         own.slope += one;
@@ -119,12 +127,12 @@ impl<T: Lane> Tangent<T> {
             }
             self.varies_inertias |= direction.is_of_inertias();
         }
-        (self.start).set_moved(mechanism, &self.base, &self.moved, 1.0);
+        (self.data.start).set_moved(mechanism, &self.base, &self.moved, 1.0);
         self.close_start(scene);
     }
 
     fn vary_soil(&mut self, scene: &TangentScene<'_>, (index, is_memory): (usize, bool), one: T) {
-        let (Some(sand), Some(held)) = (&mut self.sand, &scene.held.sand) else {
+        let (Some(sand), Some(held)) = (&mut self.parts.sand, &scene.held.sand) else {
             return;
         };
         for (wheel, held) in sand.wheels.iter_mut().zip(&held.wheels) {
@@ -140,28 +148,29 @@ impl<T: Lane> Tangent<T> {
     /// The inertias of the machine in all lanes.
     pub(super) fn reset_inertias(&mut self, scene: &TangentScene<'_>) {
         for lane in 0..T::LANES {
-            self.inertias.set_lane(lane, scene.model.inertias());
+            self.parts
+                .tree
+                .inertias
+                .set_lane(lane, scene.model.inertias());
         }
     }
 
-    /// The machine at the start of the step in all lanes, without anything that varies.
-    pub(super) fn load(&mut self, scene: &TangentScene<'_>) {
-        let of = |q: &mut LaneConfiguration<Dual<T>>| {
-            for lane in 0..T::LANES {
-                q.set_lane(lane, scene.start.configuration);
-            }
+    /// Closes the loops at the start of the step, where what varies would open them.
+    fn close_start(&mut self, scene: &TangentScene<'_>) {
+        let tree = &mut self.parts.tree;
+        let Some(loops) = &mut tree.loops else {
+            return;
         };
-        of(&mut self.base);
-        let token = self.token;
-        for lane in 0..T::LANES {
-            (self.own_drives).set_lane(lane, scene.model.joints(), scene.command);
-        }
-        self.own_drives.finish_loading();
-        if scene.held.sand.is_some() && self.sand.is_none() {
-            let wheels = scene.model.wheels().iter().map(PlacedWheel::of);
-            self.sand = Some(VaryingSand::new(token, scene.model.mechanism(), wheels));
-        }
-        self.reset_inertias(scene);
-        self.varies_inertias = false;
+        let (mechanism, inertias) = (scene.model.mechanism(), &tree.inertias);
+        (tree.poses_middle).update(mechanism, inertias, &self.data.start);
+        (tree.mass_matrix).update(mechanism, inertias, &tree.poses_middle);
+        tree.mass_matrix.factorise(mechanism, &mut tree.factor);
+        let with = Projector {
+            mechanism,
+            inertias,
+            factor: &tree.factor,
+            lanes: !Dual::<T>::mask(self.data.token, 0),
+        };
+        loops.project(&with, &mut self.data.start, &mut self.data.v);
     }
 }

@@ -8,7 +8,7 @@ use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::held_step::HeldStep;
 use crate::integrator::{Contacting, Dynamics, ScratchOf, Start, StepOptions};
-use crate::multibody::{Configuration, Factor, Model};
+use crate::multibody::{Configuration, Model};
 use crate::system::TreeSystem;
 use crate::system::command::Command;
 
@@ -18,7 +18,6 @@ pub(crate) struct HeldTree {
     pub(crate) step: HeldStep<Contact>,
     /// One a contact.
     pub(super) contacts: Vec<HeldContact>,
-    pub(super) factor: Factor<f64>,
     /// On soft ground.
     pub(crate) sand: Option<Arc<HeldSand>>,
 }
@@ -37,7 +36,7 @@ pub(super) struct HeldContact {
 /// A step with its machine, from its start to the velocity at its end.
 #[derive(Clone, Copy)]
 pub(crate) struct TangentScene<'a> {
-    pub model: &'a Model,
+    pub model: &'a Arc<Model>,
     pub command: &'a Command,
     pub options: &'a StepOptions,
     pub start: Start<'a, Configuration>,
@@ -80,7 +79,6 @@ impl TreeSystem<'_> {
         });
         Some(HeldTree {
             contacts: contacts.collect(),
-            factor: self.parts.factor.clone(),
             step,
             sand: sand.map(Arc::new),
         })

@@ -29,10 +29,8 @@ pub(super) struct VaryingSand<T: Lane> {
     pub wheels: Vec<VaryingWheel<T>>,
     /// Length over which the sand forgets, m.
     pub length: Dual<T>,
-    /// Changes of the wrenches by those of the velocity at the end (6 n), and of that velocity
-    /// (nv).
+    /// Changes of the wrenches by those of the velocity at the end (6 n).
     pub changes: Vec<T>,
-    pub dv: Vec<T>,
 }
 
 impl<T: Lane> VaryingSand<T> {
@@ -57,7 +55,6 @@ impl<T: Lane> VaryingSand<T> {
             wheels: wheels.collect(),
             length: zero,
             changes: Vec::new(),
-            dv: vec![zero.slope; mechanism.nv()],
         }
     }
 

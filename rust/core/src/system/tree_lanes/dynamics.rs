@@ -1,19 +1,19 @@
-//! The dynamics of the rovers of a block.
+//! The dynamics of trees in lanes.
 
-use super::system::{Implicit, LaneSystem, time_step};
+use super::{Implicit, TreeLanes};
 use crate::integrator::{Dynamics, StepOptions};
 use crate::multibody::energy::energies;
+use crate::multibody::loops::Placed;
 use crate::multibody::{LaneConfiguration, MassMatrix};
 use crate::scalar::{Lane, LaneMask, Vec3};
 use crate::system::extent::{Turning, displacement, tolerated};
 use crate::system::gyroscopic::Gyroscopic;
 use crate::system::loops::Projector;
 
-impl<T: Lane> LaneSystem<T> {
+impl<T: Lane> TreeLanes<T> {
     /// Adds the implicit terms of motors, held joints, springs, dampers and sand to M.
     fn add_implicit(&mut self, options: &StepOptions) {
-        let machine = &*self.machine;
-        let step = time_step::<T>(self.token, options);
+        let (machine, step) = (&*self.mechanism, self.step(options));
         let (drives, mass_matrix) = (&mut self.drives, &mut self.mass_matrix);
         T::vectorize(
             self.token,
@@ -31,7 +31,7 @@ impl<T: Lane> LaneSystem<T> {
 
     /// Keeps M̂, which its factor replaces, for implicit gyroscopic terms.
     fn keep_mass_matrix(&mut self) {
-        let (token, machine) = (self.token, &*self.machine);
+        let (token, machine) = (self.token, &*self.mechanism);
         let own = self.implicit.get_or_insert_with(|| {
             Box::new(Implicit {
                 solver: Gyroscopic::new(token),
@@ -43,31 +43,31 @@ impl<T: Lane> LaneSystem<T> {
     }
 }
 
-impl<T: Lane> Dynamics for LaneSystem<T> {
+impl<T: Lane> Dynamics for TreeLanes<T> {
     type T = T;
     type Configuration = LaneConfiguration<T>;
 
     fn nv(&self) -> usize {
-        self.machine.nv()
+        self.mechanism.nv()
     }
 
     fn n_clusters(&self) -> usize {
-        self.machine.n_clusters()
+        self.mechanism.n_clusters()
     }
 
     fn cluster_of_velocity(&self, k: usize) -> usize {
-        self.machine.cluster_of_velocity(k)
+        self.mechanism.cluster_of_velocity(k)
     }
 
     fn translation_axis(&self, k: usize) -> Option<usize> {
-        let mut trees = self.machine.trees.iter();
+        let mut trees = self.mechanism.trees.iter();
         let tree = trees.find(|tree| tree.velocities.contains(&k))?;
         let axis = k - tree.velocities.start;
         (tree.is_free && axis < 3).then_some(axis)
     }
 
     fn is_held(&self, cluster: usize) -> bool {
-        self.machine.is_held(cluster)
+        self.mechanism.is_held(cluster)
     }
 
     #[inline(always)]
@@ -78,7 +78,7 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
         h: f64,
         to: &mut LaneConfiguration<T>,
     ) {
-        to.set_moved(&self.machine, from, v, h);
+        to.set_moved(&self.mechanism, from, v, h);
     }
 
     fn advance(&self, q: &mut LaneConfiguration<T>, v: &[T], h: f64) {
@@ -93,10 +93,10 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
         from: &LaneConfiguration<T>,
         to: &mut LaneConfiguration<T>,
     ) {
-        if self.machine.n_clusters() == 1 {
+        if self.mechanism.n_clusters() == 1 {
             to.select_from(lanes(0), from);
         } else {
-            to.select_clusters_from(&self.machine, lanes, from);
+            to.select_clusters_from(&self.mechanism, lanes, from);
         }
     }
 
@@ -111,22 +111,21 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
     }
 
     fn place_middle(&mut self, q: &LaneConfiguration<T>) {
-        self.poses_middle.update(&self.machine, &self.inertias, q);
+        self.poses_middle.update(&self.mechanism, &self.inertias, q);
         self.joints_middle.copy_from_slice(&q.joints);
         self.apply_wrenches(q);
     }
 
     fn place_end(&mut self, q: &LaneConfiguration<T>) {
-        self.poses_end.update(&self.machine, &self.inertias, q);
+        self.poses_end.update(&self.mechanism, &self.inertias, q);
     }
 
     fn update_mass_matrix(&mut self, options: &StepOptions, going: T::Mask, is_first: bool) {
         self.mass_matrix
-            .update(&self.machine, &self.inertias, &self.poses_middle);
+            .update(&self.mechanism, &self.inertias, &self.poses_middle);
         if is_first {
-            let (machine, mass_matrix, drives) =
-                (&*self.machine, &self.mass_matrix, &mut self.drives);
-            let step = time_step::<T>(self.token, options);
+            let (machine, step) = (&*self.mechanism, self.step(options));
+            let (mass_matrix, drives) = (&self.mass_matrix, &mut self.drives);
             T::vectorize(
                 self.token,
                 #[inline(always)]
@@ -143,15 +142,20 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
         }
         let is_definite = self
             .mass_matrix
-            .factorise_in_place(&self.machine, &mut self.factor);
-        let (poses, joints) = (&self.poses_middle, &self.joints_middle);
-        self.rows
-            .begin_loops(&self.machine, poses, joints, &self.factor);
+            .factorise_in_place(&self.mechanism, &mut self.factor);
+        if let Some(loops) = &mut self.loops {
+            let placed = Placed {
+                mechanism: &self.mechanism,
+                poses: &self.poses_middle,
+                joints: &self.joints_middle,
+            };
+            loops.begin(&placed, &self.factor, self.n_places);
+        }
         is_definite
     }
 
     fn multiply_mass(&self, v: &[T], out: &mut [T]) {
-        self.mass_matrix.times(&self.machine, v, out);
+        self.mass_matrix.times(&self.mechanism, v, out);
     }
 
     #[inline(always)]
@@ -161,11 +165,11 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
         v: &[T],
         is_gyroscopic: &mut [T::Mask],
     ) -> Option<T> {
-        let (h, _) = time_step::<T>(self.token, options);
+        let (h, _) = self.step(options);
         let mut most = h.like(0.0);
         self.turns = false;
         for (cluster, own) in is_gyroscopic.iter_mut().enumerate() {
-            let turning = Turning::of_cluster(h.like(0.0), &self.machine, v, cluster);
+            let turning = Turning::of_cluster(h.like(0.0), &self.mechanism, v, cluster);
             *own = turning.is_gyroscopic(h);
             self.turns |= own.any();
             most = most.max(turning.of_frames());
@@ -175,7 +179,7 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
 
     #[inline(always)]
     fn is_audited(&self) -> bool {
-        true
+        self.is_audited
     }
 
     #[inline(always)]
@@ -187,7 +191,7 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
         mut each: impl FnMut(usize, [T; 2], Vec3<T>),
     ) {
         let found = energies(
-            &self.machine,
+            &self.mechanism,
             &self.inertias,
             q,
             v,
@@ -201,24 +205,24 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
 
     #[inline(always)]
     fn mass(&self, cluster: usize) -> Option<T> {
-        Some(self.inertias.mass_of(&self.machine, cluster))
+        Some(self.inertias.mass_of(&self.mechanism, cluster))
     }
 
     #[inline(always)]
     fn half_solve(&self, y: &mut [T]) {
-        self.factor.half_solve(&self.machine, y);
+        self.factor.half_solve(&self.mechanism, y);
     }
 
     #[inline(always)]
     fn close_velocity(&mut self, options: &StepOptions, v_begin: &[T], v: &[T], y: &mut [T]) {
-        if let Some(loops) = &mut self.rows.loops {
+        if let Some(loops) = &mut self.loops {
             loops.close(options.theta, v_begin, v, y);
         }
     }
 
     #[inline(always)]
     fn add_loop_impulse(&mut self, out: &mut [T]) {
-        if let Some(loops) = &mut self.rows.loops {
+        if let Some(loops) = &mut self.loops {
             loops.add_generalized_impulse(&std::iter::empty(), out);
         }
     }
@@ -230,9 +234,9 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
         q: &mut LaneConfiguration<T>,
         v: &mut [T],
     ) -> Option<T> {
-        let loops = self.rows.loops.as_mut()?;
+        let loops = self.loops.as_mut()?;
         let with = Projector {
-            mechanism: &self.machine,
+            mechanism: &self.mechanism,
             inertias: &self.inertias,
             factor: &self.factor,
             lanes,
@@ -248,16 +252,16 @@ impl<T: Lane> Dynamics for LaneSystem<T> {
 
     #[inline(always)]
     fn half_solve_back(&self, y: &mut [T]) {
-        self.factor.half_solve_back(&self.machine, y);
+        self.factor.half_solve_back(&self.mechanism, y);
     }
 
     #[inline(always)]
     fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
-        tolerated(options.penetration_tolerance, &self.machine, cluster)
+        tolerated(options.penetration_tolerance, &self.mechanism, cluster)
     }
 
     #[inline(always)]
     fn displacement(&self, y: &[T], cluster: usize) -> T {
-        displacement(self.number(0.0), &self.machine, y, cluster)
+        displacement(self.number(0.0), &self.mechanism, y, cluster)
     }
 }

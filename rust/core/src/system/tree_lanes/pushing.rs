@@ -1,12 +1,12 @@
-//! Wrenches that act on the rovers of a block from outside.
+//! Wrenches that act on trees in lanes from outside.
 
-use super::system::LaneSystem;
+use super::TreeLanes;
 use crate::integrator::Work;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Lane, Vec3};
 use crate::system::command::add_wrench;
 
-impl<T: Lane> LaneSystem<T> {
+impl<T: Lane> TreeLanes<T> {
     /// Whether anything pushes a rover.
     #[inline(always)]
     fn is_pushed(&self) -> bool {
@@ -38,9 +38,9 @@ impl<T: Lane> LaneSystem<T> {
                     }
                     own != body
                 });
-                let R = self.poses_middle.spun(&self.machine, middle, body);
+                let R = self.poses_middle.spun(&self.mechanism, middle, body);
                 let placed = (&self.poses_middle, &R);
-                add_wrench(&self.machine, body, all, placed, &mut self.applied);
+                add_wrench(&self.mechanism, body, all, placed, &mut self.applied);
             }
         }
     }
@@ -69,7 +69,7 @@ impl<T: Lane> LaneSystem<T> {
         let velocities = v.iter().zip(v_end);
         for (k, (force, (v, v_end))) in self.applied.iter().zip(velocities).enumerate() {
             let mean = theta * *v_end + (h.like(1.0) - theta) * *v;
-            let cluster = self.machine.cluster_of_velocity(k);
+            let cluster = self.mechanism.cluster_of_velocity(k);
             out[cluster].supplied += h * *force * mean;
         }
     }

@@ -1,17 +1,17 @@
-//! The forces on the rovers of a block, without those of their contacts.
+//! The forces on trees in lanes, without those of contacts.
 
-use super::system::{LaneSystem, time_step};
+use super::TreeLanes;
 use crate::integrator::{Forces, StartOf, StepOptions, Work};
 use crate::multibody::LaneConfiguration;
 use crate::multibody::bias::bias;
 use crate::scalar::Lane;
 use crate::system::gyroscopic::Turned;
 
-impl<T: Lane> LaneSystem<T> {
+impl<T: Lane> TreeLanes<T> {
     /// `y` = the bias at a velocity.
     fn weigh(&mut self, v: &[T], y: &mut [T]) {
         bias(
-            &self.machine,
+            &self.mechanism,
             &self.inertias,
             &self.poses_middle,
             v,
@@ -22,12 +22,12 @@ impl<T: Lane> LaneSystem<T> {
     }
 }
 
-impl<T: Lane> Forces for LaneSystem<T> {
+impl<T: Lane> Forces for TreeLanes<T> {
     #[inline(always)]
     fn begin_load(&mut self, options: &StepOptions, start: StartOf<'_, Self>) {
-        let step = time_step::<T>(self.token, options);
+        let step = self.step(options);
         self.torque.fill(step.0.like(0.0));
-        let (machine, torque) = (&*self.machine, &mut self.torque);
+        let (machine, torque) = (&*self.mechanism, &mut self.torque);
         let (places, v) = (&start.configuration.joints, start.v);
         (self.drives).add_impulse(machine, step, places, [v, v], torque);
         if let Some(sand) = &self.sand {
@@ -38,7 +38,7 @@ impl<T: Lane> Forces for LaneSystem<T> {
 
     fn load(&mut self, options: &StepOptions, _: StartOf<'_, Self>, v_mean: &[T], y: &mut [T]) {
         self.weigh(v_mean, y);
-        let (h, _) = time_step::<T>(self.token, options);
+        let (h, _) = self.step(options);
         T::vectorize(
             self.token,
             #[inline(always)]
@@ -50,11 +50,18 @@ impl<T: Lane> Forces for LaneSystem<T> {
         );
     }
 
+    #[inline(always)]
+    fn add_given(&self, _: &StepOptions, impulse: &mut [T]) {
+        for (impulse, given) in impulse.iter_mut().zip(&self.given) {
+            *impulse += *given;
+        }
+    }
+
     fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [T]) {
         let Some(mut own) = self.implicit.take() else {
             return;
         };
-        let (h, _) = time_step::<T>(self.token, options);
+        let (h, _) = self.step(options);
         scratch.fill(h.like(0.0));
         self.weigh(scratch, &mut own.given);
         for (given, torque) in own.given.iter_mut().zip(&self.torque) {
@@ -71,13 +78,13 @@ impl<T: Lane> Forces for LaneSystem<T> {
         impulse: &[T],
         y: &mut [T],
     ) {
-        let step = time_step::<T>(self.token, options);
+        let step = self.step(options);
         let Some(own) = &mut self.implicit else {
             return;
         };
         y.copy_from_slice(&own.given);
         let of = Turned {
-            mechanism: &self.machine,
+            mechanism: &self.mechanism,
             inertias: &self.inertias,
             poses: &self.poses_middle,
             mass_matrix: &own.mass_matrix,
@@ -87,7 +94,7 @@ impl<T: Lane> Forces for LaneSystem<T> {
 
     #[inline(always)]
     fn choose_branches(&mut self, v: &[T]) {
-        self.drives.choose_branches(&self.machine, v);
+        self.drives.choose_branches(&self.mechanism, v);
         if let Some(sand) = &mut self.sand {
             sand.start_from(v);
         }
@@ -99,7 +106,7 @@ impl<T: Lane> Forces for LaneSystem<T> {
     }
 
     fn revise(&mut self, lanes: T::Mask, v: &[T], v_end: &[T]) -> T::Mask {
-        let (drives, machine) = (&mut self.drives, &*self.machine);
+        let (drives, machine) = (&mut self.drives, &*self.mechanism);
         let retaken = T::vectorize(
             self.token,
             #[inline(always)]
@@ -125,13 +132,13 @@ impl<T: Lane> Forces for LaneSystem<T> {
     ) {
         let v = [start.v, v_end];
         self.weigh_sand(v);
-        let step = time_step::<T>(self.token, options);
+        let step = self.step(options);
         T::vectorize(
             self.token,
             #[inline(always)]
             || {
                 let places = &start.configuration.joints;
-                self.drives.work(&self.machine, step, places, v, out);
+                self.drives.work(&self.mechanism, step, places, v, out);
                 self.add_work_of_wrenches(step, v, out);
                 for (work, of_sand) in out.iter_mut().zip(&self.of_sand) {
                     work.damped -= *of_sand;
@@ -142,7 +149,7 @@ impl<T: Lane> Forces for LaneSystem<T> {
 
     #[inline(always)]
     fn stored(&self, q: &LaneConfiguration<T>, out: &mut [T]) {
-        (self.drives).stored(&self.machine, self.number(0.0), &q.joints, out);
+        (self.drives).stored(&self.mechanism, self.number(0.0), &q.joints, out);
     }
 
     fn work_of_displacement(
@@ -152,7 +159,7 @@ impl<T: Lane> Forces for LaneSystem<T> {
         v_end: &[T],
         displacement: &[T],
     ) -> Option<T> {
-        let (machine, step) = (&*self.machine, time_step::<T>(self.token, options));
+        let (machine, step) = (&*self.mechanism, self.step(options));
         let motion = [start.v, v_end, displacement];
         let places = &start.configuration.joints;
         let of_drives = (self.drives).work_of_displacement(machine, step, places, motion);
@@ -160,9 +167,7 @@ impl<T: Lane> Forces for LaneSystem<T> {
     }
 
     #[inline(always)]
-    fn accept(&mut self, lanes: T::Mask, p: &[T]) {
-        let p = p.as_chunks::<3>().0;
-        self.rows.find_loop_impulses(&self.contacts, lanes, p);
+    fn accept(&mut self, lanes: T::Mask) {
         self.drives.accept(lanes);
         if let Some(sand) = &mut self.sand {
             sand.accept(lanes);

@@ -1,45 +1,63 @@
 //! The sand under the wheels in a step: [`crate::system::sand`].
 
-use super::Block;
-use super::system::LaneSystem;
+use std::sync::Arc;
+
+use super::TreeLanes;
+use crate::geometry::Terrain;
 use crate::integrator::{MOST_REVISIONS, StepOptions};
-use crate::lanes::lane_rover::LaneRover;
-use crate::sand::RutMap;
+use crate::sand::{RutMap, SandState};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::system::sand::{MOST_REVISIONS_IN_SAND, SandContact};
 use crate::system::sand_patch::{Layers, SandScene};
 
-impl<T: Lane> LaneSystem<T> {
-    /// Takes over the sand of a rover, and its ruts.
-    pub(super) fn load_sand(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
-        let state = rover.sand.as_deref_mut();
-        let Some((layer, state)) = rover.terrain.soft().zip(state) else {
+impl<T: Lane> TreeLanes<T> {
+    /// Takes over the sand of a lane's tree, and its ruts.
+    pub fn load_sand(
+        &mut self,
+        lane: usize,
+        terrain: &Arc<dyn Terrain>,
+        state: Option<&mut SandState>,
+    ) {
+        let Some((layer, state)) = terrain.soft().zip(state) else {
+            self.soft[lane] = None;
             if let Some(sand) = &mut self.sand {
                 sand.load(lane, None);
             }
             return;
         };
-        let machine = &*self.machine;
         let sand = self.sand.get_or_insert_with(|| {
-            let wheels = machine.in_sand.iter().copied();
-            Box::new(SandContact::new(self.token, machine, wheels))
+            let wheels = self.in_sand.iter().copied();
+            Box::new(SandContact::new(self.token, &self.mechanism, wheels))
         });
         sand.load(lane, Some((layer, state)));
+        self.soft[lane] = Some(Arc::clone(terrain));
         std::mem::swap(&mut self.ruts[lane], &mut state.ruts);
     }
 
-    /// Gives a rover its sand and its ruts back.
-    pub(super) fn store_sand(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
-        if let (Some(sand), Some(state)) = (&self.sand, rover.sand.as_deref_mut()) {
+    /// Gives a tree its sand and its ruts back.
+    pub fn store_sand(&mut self, lane: usize, state: Option<&mut SandState>) {
+        let Some(state) = state else {
+            return;
+        };
+        if let Some(sand) = &self.sand {
             sand.store(lane, state);
         }
-        self.return_ruts(lane, rover);
+        self.return_ruts(lane, Some(state));
     }
 
-    /// Gives a rover that is not stored its ruts back.
-    pub(super) fn return_ruts(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
-        if let Some(state) = rover.sand.as_deref_mut() {
+    /// Gives a tree that is not stored its ruts back.
+    pub fn return_ruts(&mut self, lane: usize, state: Option<&mut SandState>) {
+        if let Some(state) = state {
             std::mem::swap(&mut self.ruts[lane], &mut state.ruts);
+        }
+    }
+
+    /// Gives a tree its ruts back if the lane has them, after a panic.
+    pub fn recover_ruts(&mut self, lane: usize, ruts: &mut RutMap) {
+        // A tree whose ruts are here has a map without wheels in their place.
+        let own = self.ruts.get_mut(lane);
+        if let Some(own) = own.filter(|own| own.n_wheels() > ruts.n_wheels()) {
+            std::mem::swap(own, ruts);
         }
     }
 
@@ -77,14 +95,14 @@ impl<T: Lane> LaneSystem<T> {
         let mut work = std::mem::take(&mut self.of_sand);
         work.fill(self.number(0.0));
         if let Some(mut sand) = self.sand.take() {
-            sand.work(&self.machine, &self.layers(), velocities, &mut work);
+            sand.work(&self.mechanism, &self.layers(), velocities, &mut work);
             self.sand = Some(sand);
         }
         self.of_sand = work;
     }
 
     /// Notes where the wheels of the lanes are that are still going.
-    pub(super) fn note_ruts(&mut self, going: T::Mask) {
+    pub fn note_ruts(&mut self, going: T::Mask) {
         let Some(mut sand) = self.sand.take() else {
             return;
         };
@@ -97,33 +115,17 @@ impl<T: Lane> LaneSystem<T> {
     fn layers(&self) -> Layers<'_> {
         let mut layers = [None; MAX_LANES];
         for (lane, layer) in layers.iter_mut().enumerate().take(T::LANES) {
-            *layer = self.ground.terrain(lane).and_then(|own| own.soft());
+            *layer = self.soft[lane].as_ref().and_then(|own| own.soft());
         }
         layers
     }
 
     fn sand_scene(&self) -> SandScene<'_, T> {
         SandScene {
-            mechanism: &self.machine,
+            mechanism: &self.mechanism,
             poses: &self.poses_middle,
             layers: self.layers(),
             ruts: &self.ruts,
-        }
-    }
-}
-
-impl<T: Lane> Block<T> {
-    /// Gives a rover that is not [stored](Self::store_rover) its ruts back.
-    pub fn return_ruts(&mut self, lane: usize, rover: &mut LaneRover<'_>) {
-        self.system.return_ruts(lane, rover);
-    }
-
-    /// Gives a rover its ruts back if the lane has them, after a panic.
-    pub fn recover_ruts(&mut self, lane: usize, ruts: &mut RutMap) {
-        // A rover whose ruts are here has a map without wheels in their place.
-        let own = self.system.ruts.get_mut(lane);
-        if let Some(own) = own.filter(|own| own.n_wheels() > ruts.n_wheels()) {
-            std::mem::swap(own, ruts);
         }
     }
 }

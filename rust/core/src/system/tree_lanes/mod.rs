@@ -1,0 +1,133 @@
+//! Trees of one mechanism in the lanes of a scalar: what moves, and the forces on it without those
+//! of contacts.
+//!
+//! [`TreeLanes`] has the [`Dynamics`](crate::integrator::Dynamics) of the tree (`dynamics`) and its
+//! [`Forces`](crate::integrator::Forces) (`forces`): drives, wrenches (`pushing`), sand (`sinking`)
+//! and closed loops. Whoever holds one adds the contacts: [`crate::lanes`], [`super::tangent`].
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+
+mod dynamics;
+mod forces;
+mod pushing;
+mod sinking;
+
+use std::sync::Arc;
+
+use super::command::Wrench;
+use super::drives::Drives;
+use super::gyroscopic::Gyroscopic;
+use super::loops::Loops;
+use super::sand::SandContact;
+use super::sand_wheel::PlacedWheel;
+use crate::geometry::Terrain;
+use crate::integrator::StepOptions;
+use crate::multibody::bias::BiasScratch;
+use crate::multibody::model::Loop;
+use crate::multibody::{EnergyScratch, Factor, Inertias, MassMatrix, Mechanism, Model, Poses};
+use crate::sand::RutMap;
+use crate::scalar::{Lane, MAX_LANES, Vec3};
+
+/// Trees of one mechanism: their descriptions, commands, and the matrices of a step.
+pub(crate) struct TreeLanes<T: Lane> {
+    pub token: T::Token,
+    pub mechanism: Arc<Mechanism>,
+    pub models: [Option<Arc<Model>>; MAX_LANES],
+    pub inertias: Inertias<T>,
+    /// m/s².
+    pub gravity: Vec3<T>,
+    pub drives: Drives<T>,
+    /// What pushes the tree of each lane, and its generalized force at the midpoint (nv).
+    pub wrenches: [Vec<Wrench>; MAX_LANES],
+    pub applied: Vec<T>,
+    /// Wheels as sand meets them; the sand, once a tree stands on soft ground, that ground in each
+    /// lane, and the ruts of each.
+    in_sand: Vec<PlacedWheel>,
+    sand: Option<Box<SandContact<T>>>,
+    soft: [Option<Arc<dyn Terrain>>; MAX_LANES],
+    ruts: Vec<RutMap>,
+    /// Work of the sand on each cluster, J.
+    of_sand: Vec<T>,
+    /// An impulse (nv) that does not depend on the velocity; empty if there is none.
+    pub given: Vec<T>,
+    /// Whether the energy is audited.
+    pub is_audited: bool,
+    pub poses_middle: Poses<T>,
+    pub poses_end: Poses<T>,
+    /// Coordinates of the joints at the midpoint.
+    joints_middle: Vec<T>,
+    pub mass_matrix: MassMatrix<T>,
+    pub factor: Factor<T>,
+    bias_scratch: BiasScratch<T>,
+    implicit: Option<Box<Implicit<T>>>,
+    /// Whether a tree may need them in the present step.
+    turns: bool,
+    energy_scratch: EnergyScratch<T>,
+    /// Closed loops, which number the contacts by their places, and how many there are.
+    pub loops: Option<Box<Loops<T>>>,
+    n_places: usize,
+    /// Impulse of torques, sand and wrenches over the step (nv).
+    torque: Vec<T>,
+}
+
+/// What steps with implicit gyroscopic terms need beside the others.
+struct Implicit<T: Lane> {
+    solver: Gyroscopic<T>,
+    /// M̂.
+    mass_matrix: MassMatrix<T>,
+    /// Impulse of the forces but the gyroscopic ones (nv).
+    given: Vec<T>,
+}
+
+impl<T: Lane> TreeLanes<T> {
+    /// Room for trees with these closed loops and wheels, and `n_places` for contacts.
+    pub fn new(
+        token: T::Token,
+        mechanism: &Arc<Mechanism>,
+        loops: &[Loop],
+        in_sand: Vec<PlacedWheel>,
+        n_places: usize,
+    ) -> Self {
+        let zero = T::splat(token, 0.0);
+        let vector = || vec![zero; mechanism.nv()];
+        Self {
+            token,
+            models: [const { None }; MAX_LANES],
+            inertias: Inertias::new(token, mechanism),
+            gravity: Vec3::splat(token, [0.0; 3]),
+            drives: Drives::new(token, mechanism),
+            wrenches: [const { Vec::new() }; MAX_LANES],
+            applied: vector(),
+            in_sand,
+            sand: None,
+            soft: [const { None }; MAX_LANES],
+            ruts: vec![RutMap::default(); T::LANES],
+            of_sand: vec![zero; mechanism.n_clusters()],
+            given: Vec::new(),
+            is_audited: true,
+            poses_middle: Poses::new(token, mechanism),
+            poses_end: Poses::new(token, mechanism),
+            joints_middle: vec![zero; mechanism.joints.len()],
+            mass_matrix: MassMatrix::new(token, mechanism),
+            factor: Factor::new(token, mechanism),
+            bias_scratch: BiasScratch::new(token, mechanism),
+            implicit: None,
+            turns: false,
+            energy_scratch: EnergyScratch::new(token, mechanism),
+            loops: Loops::new(token, mechanism, loops, 0),
+            n_places,
+            torque: vector(),
+            mechanism: Arc::clone(mechanism),
+        }
+    }
+
+    #[inline(always)]
+    fn number(&self, x: f64) -> T {
+        T::splat(self.token, x)
+    }
+
+    /// h and θ.
+    #[inline(always)]
+    fn step(&self, options: &StepOptions) -> (T, T) {
+        (self.number(options.time_step), self.number(options.theta))
+    }
+}
