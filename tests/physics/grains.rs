@@ -628,6 +628,30 @@ fn a_machine_that_is_a_disk_or_a_ball_moves_as_one() {
     machine_moves_as_a_grain::<3>();
 }
 
+/// Detection looks as far as the fastest ball goes. A light ball that a heavy one strikes leaves
+/// twice as fast, and met the third one only after the step, inside it.
+#[test]
+fn a_ball_that_is_thrown_within_a_step_does_not_end_inside_another() {
+    let speed = 20.0;
+    for share in [1.2, 1.5, 1.8] {
+        let way = share * speed * options().time_step;
+        let places = [0.0, 0.2, 0.4 + way];
+        let centres = places.map(|x| Vector3::new(x, 1.0, 0.0));
+        let mut heap = on_a_floor::<3>(&centres, 0.0);
+        heap.scene.grains = Grains::new(vec![0.1; 3], vec![200.0, 2.0, 2.0]).unwrap();
+        heap.options.restitution = 1.0;
+        heap.v[0] = speed;
+        let report = heap.step(1);
+        let overlap = heap.scene.penetration(&heap.q, heap.time);
+        assert!(
+            overlap < 1e-3 * 0.1,
+            "{share}: {overlap} {report:?} {:?}",
+            heap.v
+        );
+        assert!(report.retaken > 0, "{share}");
+    }
+}
+
 #[test]
 fn packings_in_space_do_not_overlap_and_stay_in_their_box() {
     let heap = bed(300);

@@ -198,6 +198,8 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
     type Contacts = List<S::Contact>;
     type Problems = Posed<Self::Local>;
 
+    const RELISTS: bool = true;
+
     fn machine(&self) -> &S {
         self.system
     }

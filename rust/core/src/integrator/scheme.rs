@@ -140,7 +140,7 @@ pub(crate) fn set_up<S: Systems>(
     d.fall_back(Obstacle::MassMatrix, !is_definite);
     probe.end(Phase::Factor);
     s.assemble(&d.v);
-    if is_first {
+    if is_first || S::RELISTS {
         S::run(
             d.token,
             #[inline(always)]
@@ -277,7 +277,12 @@ pub(super) fn retake<S: Systems>(
 ) {
     for lane in (0..S::T::LANES).filter(|&lane| d.retaken.get(lane)) {
         d.n_retaken[lane] += 1;
-        s.recall(lane, &d.memories[lane], problems, &mut d.is_same);
+        if !S::RELISTS {
+            s.recall(lane, &d.memories[lane], problems, &mut d.is_same);
+        }
+    }
+    if S::RELISTS {
+        detect(s, d, problems);
     }
     set_up(s, d, problems, false, probe);
 }

@@ -41,6 +41,9 @@ pub(crate) trait Systems {
     /// Friction-contact problems, as they are posed and answered.
     type Problems: ?Sized;
 
+    /// Whether a step that is taken again may have other contacts. By default it has the same.
+    const RELISTS: bool = false;
+
     /// Runs `f` with the instructions of the token where that pays.
     #[inline(always)]
     fn run<R>(_token: TokenOf<Self>, f: impl FnOnce() -> R) -> R {

@@ -68,28 +68,51 @@ impl<T: Lane> Held<'_, T> {
         }
     }
 
+    /// Writes the rows of Hᵀ of all contacts.
+    #[inline(always)]
+    pub(super) fn write_rows(&mut self) {
+        let mut rows = std::mem::take(&mut self.own.rows);
+        let mut starts = std::mem::take(&mut self.own.starts);
+        rows.clear();
+        starts.clear();
+        let (model, zero) = (self.scene.model, self.number(0.0));
+        let poses = &self.own.tree.poses_end;
+        for (i, contact) in self.scene.held.step.contacts.iter().enumerate() {
+            starts.push(rows.len());
+            if let Some((k, sign, row)) = limit::joint_row(model, contact) {
+                let mut own = [zero; 3];
+                own[row] = zero.like(sign);
+                rows.push((k, own));
+                continue;
+            }
+            for (body, sign, path) in sides(model.mechanism(), contact) {
+                let place = self.seen_from(i, contact, body);
+                let sign = zero.like(sign);
+                path.for_each_row(
+                    #[inline(always)]
+                    |m| poses.motions[m],
+                    &place,
+                    #[inline(always)]
+                    |k, row| rows.push((k, [sign * row[0], sign * row[1], sign * row[2]])),
+                );
+            }
+        }
+        starts.push(rows.len());
+        (self.own.rows, self.own.starts) = (rows, starts);
+    }
+
+    /// The rows of Hᵀ of a contact, each with its velocity.
+    #[inline(always)]
+    fn rows(&self, i: usize) -> &[(usize, Triple<Dual<T>>)] {
+        &self.own.rows[self.own.starts[i]..self.own.starts[i + 1]]
+    }
+
     /// `Hᵀ x` of a contact, x (nv).
     #[inline(always)]
     pub(super) fn along(&self, i: usize, x: &[Dual<T>]) -> Triple<Dual<T>> {
-        let model = self.scene.model;
-        let contact = &self.scene.held.step.contacts[i];
-        let zero = self.number(0.0);
-        let mut sum = [zero; 3];
-        if let Some((k, sign, row)) = limit::joint_row(model, contact) {
-            sum[row] = zero.like(sign) * x[k];
-            return sum;
-        }
-        let poses = &self.own.tree.poses_end;
-        for (body, sign, path) in sides(model.mechanism(), contact) {
-            let place = self.seen_from(i, contact, body);
-            let sign = zero.like(sign);
-            path.for_each_row(
-                #[inline(always)]
-                |m| poses.motions[m],
-                &place,
-                #[inline(always)]
-                |k, row| add_scaled(&mut sum, &row, sign * x[k]),
-            );
+        let mut sum = [self.number(0.0); 3];
+        for (k, row) in self.rows(i) {
+            add_scaled(&mut sum, row, x[*k]);
         }
         sum
     }
@@ -97,27 +120,8 @@ impl<T: Lane> Held<'_, T> {
     /// `y += H p` of a contact.
     #[inline(always)]
     pub(super) fn push(&self, i: usize, p: &Triple<Dual<T>>, y: &mut [Dual<T>]) {
-        let model = self.scene.model;
-        let contact = &self.scene.held.step.contacts[i];
-        let zero = self.number(0.0);
-        if let Some((k, sign, row)) = limit::joint_row(model, contact) {
-            y[k] += zero.like(sign) * p[row];
-            return;
-        }
-        for (body, sign, path) in sides(model.mechanism(), contact) {
-            let place = self.seen_from(i, contact, body);
-            let sign = zero.like(sign);
-            let [force, moment] = place.wrench([sign * p[0], sign * p[1], sign * p[2]]);
-            if let Some(first) = path.base {
-                let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-                for (y, x) in y[first..].iter_mut().zip(both) {
-                    *y += x;
-                }
-            }
-            for mover in path.movers {
-                let power = self.own.tree.poses_end.motions[mover.motion].power(force, moment);
-                y[mover.velocity] += power;
-            }
+        for (k, row) in self.rows(i) {
+            y[*k] += row[0] * p[0] + row[1] * p[1] + row[2] * p[2];
         }
     }
 

@@ -26,6 +26,9 @@ pub(super) struct HeldParts<T: Lane> {
     pub d_damping: T,
     /// Whether the pass has met what the step did not do.
     pub is_other: bool,
+    /// Rows of Hᵀ, each with its velocity, and where those of each contact begin.
+    pub rows: Vec<(usize, Triple<Dual<T>>)>,
+    pub starts: Vec<usize>,
     /// Velocity before the step (nv), and local velocities there.
     v: Vec<Dual<T>>,
     u_before: Vec<Triple<Dual<T>>>,
@@ -46,6 +49,8 @@ impl<T: Lane> HeldParts<T> {
             d_stiffness: zero,
             d_damping: zero,
             is_other: false,
+            rows: Vec::new(),
+            starts: Vec::new(),
             v: vec![Dual::constant(zero); nv],
             u_before: Vec::new(),
             softness: Vec::new(),
@@ -294,7 +299,10 @@ impl<T: Lane> Systems for Held<'_, T> {
         self.own.u_before = T::vectorize(
             self.own.tree.token,
             #[inline(always)]
-            || self.all_along(v),
+            || {
+                self.write_rows();
+                self.all_along(v)
+            },
         );
     }
 
