@@ -12,7 +12,7 @@
 //! screws, total linear and angular momentum change by the impulses alone: free flight conserves
 //! them to the tolerance of the iteration, at any step. For θ = ½ the scheme is symmetric and of
 //! order 2. The energy of free flight oscillates with the third power of the rotation per step and
-//! does not drift; the audit ([`super::audit`]) accepts this, since a correction would
+//! does not drift; the audit accepts this, since a correction would
 //! violate the momentum. The iteration matrix M̂(q_m) differs from the true Jacobian by O(h), which
 //! is also the convergence factor.
 //!

@@ -1,4 +1,4 @@
-//! A step of Moreau and Jean, written once for any [`Systems`].
+//! A step of Moreau and Jean, written once for any `Systems`.
 //!
 //! Forces are evaluated at `q_m = q ⊕ (1−θ) h v` (for θ = ½ the midpoint of Moreau 1988) and
 //! `v_m = v + (1−θ) Δv`, where Δv is the change due to the forces at (q_m, v) and the last step's
@@ -21,13 +21,11 @@
 //! ([`crate::system::fitted_theta`]), and stable at any gain and any step. The forecast
 //! `gap + γ h u_N ≤ 0`, measured from q_m, activates contacts.
 //!
-//! A step has three parts, between which others solve its problems: [`prepare`], [`conclude`],
-//! [`finish`]. The code branches on kinds, never on the state of a lane. A lane whose step cannot
-//! be taken in this way leaves the others before its state changes ([`Data::fall_back`]).
+//! A step has three parts, between which others solve its problems: `prepare`, `conclude`,
+//! `finish`. The code branches on kinds, never on the state of a lane. A lane whose step cannot
+//! be taken in this way leaves the others before its state changes (`Data::fall_back`).
 //!
 //! Source: Moreau 1988; Jean 1999; Acary and Brogliato 2008, ch. 10.
-//!
-//! [`Data::fall_back`]: super::data::Data::fall_back
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::audit::judge;
@@ -47,14 +45,14 @@ use super::systems::Systems;
 use super::yielding::{forget_bounces, remove_shifts, yield_under_load};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 
-/// What follows [`conclude`].
+/// What follows `conclude`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
     /// The problems of the lanes that are retaken are solved anew, and the step is concluded again.
     Retake,
-    /// Positions must be projected: [`super::projection::set_gaps`], then [`finish`].
+    /// Positions must be projected: `set_gaps`, then `finish`.
     Project,
-    /// [`finish`].
+    /// `finish`.
     Finish,
 }
 

@@ -7,7 +7,7 @@
 //! C is frozen, `C = C(q_m, v_m)`. Its skew part does no work and rotates the velocity by a Cayley
 //! transform, whatever the spin. Its symmetric part `½ Ṁ` can make the matrix singular if a frame
 //! rotates by radians in a step. It is then left out for the whole cluster of trees, and the audit
-//! ([`crate::integrator::audit`]) corrects the resulting change of the energy.
+//! (`crate::integrator::audit`) corrects the resulting change of the energy.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};

@@ -12,7 +12,7 @@
 //! A lane whose step cannot be taken falls back: its state stays as it was.
 //!
 //! `loading`: rovers come and go; `system`: the rovers and their contacts, as the scheme sees them,
-//! with `contact_list`, `problems` and `by_method`. What moves is [`crate::system::tree_lanes`].
+//! with `contact_list`, `problems` and `by_method`. What moves is `crate::system::tree_lanes`.
 
 mod by_method;
 mod contact_list;
