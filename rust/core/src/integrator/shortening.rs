@@ -238,7 +238,7 @@ fn relax<S: MechanicalSystem>(
         }
         d.next_memories[0].impulses[i].1 = relaxed;
     }
-    let known = d.memories[0].stored.clone();
+    let known = &d.memories[0].stored;
     for (cluster, stored) in d.next_memories[0].stored.iter_mut().enumerate() {
         if is_own[cluster] {
             let before = if cluster == leader { start } else { 0.0 };
