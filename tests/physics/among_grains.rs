@@ -387,14 +387,15 @@ fn is_that_of_the_impulses(own: &ModelDescription, touch_it: bool) {
     let bed = balls(&[place, above], 0.1, 4.0, false, &options);
     let mut parts = CompositeScratch::default();
     let (mut bed_parts, mut rover_parts) = (bed.scene().parts(), rover.scene().parts());
-    let (bed_memory, rover_memory) = (bed.scene().memory(), rover.scene().memory());
+    let (mut bed_memory, mut rover_memory) = (bed.scene().memory(), rover.scene().memory());
+    let (of_bed, of_rover) = (bed.command(), rover.command());
     let mut system = TreeAmongGrains {
-        bed: (bed.scene()).system(bed.command(), &bed_memory, &mut bed_parts),
-        tree: (rover.scene()).system(rover.command(), &rover_memory, &mut rover_parts),
+        bed: (bed.scene()).system(&options, of_bed, &mut bed_memory, &mut bed_parts),
+        tree: (rover.scene()).system(&options, of_rover, &mut rover_memory, &mut rover_parts),
         friction: ON_GRAINS,
         parts: &mut parts,
     };
-    let q = (bed.q().clone(), rover.q().clone());
+    let q = (bed.q().clone(), rover.scene().moved(rover.q()));
     system.place_middle(&q);
     system.place_end(&q);
     let (v, mut contacts) = (vec![0.0; system.nv()], Vec::new());

@@ -15,4 +15,4 @@ def test_make_vec_makes_the_vector_of_the_core(name: str) -> None:
     envs = gym.make_vec(name, 64).unwrapped
     assert isinstance(envs, RoverVectorEnv)
     assert envs.batch.episodes.threads == len(os.sched_getaffinity(0))
-    assert envs.prototype.simulation.fallback_reason is None
+    assert envs.prototype.simulation.settings["variant"] == "linearised"

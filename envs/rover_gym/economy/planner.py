@@ -280,13 +280,13 @@ def _steps(simulation: Simulation, kind: Kind) -> Decision:
         return Decision(
             "steps", "general, one rover at a time", "the planar image has its own step, one machine at a time"
         )
-    if (why := simulation.fallback_reason) is not None:
-        return Decision("steps", "general, one rover at a time", why)
+    if simulation.settings["variant"] == "newton":
+        return Decision("steps", "general, one rover at a time", 'variant is "newton"')
     register = "one rover to a register" if simulation.lanes == 1 else f"{simulation.lanes} rovers to a register"
     return Decision(
         "steps",
         f"fast: in lanes, {register} ({SimulationBatch([simulation]).instruction_set})",
-        "a machine on fixed ground; `report.fallbacks` counts steps that the general step took",
+        "a machine on fixed ground; `report.fallbacks` counts steps that take more effort, each alone",
     )
 
 

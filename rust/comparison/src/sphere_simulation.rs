@@ -39,6 +39,7 @@ impl LocatedContact for SphereContact {
 
 impl Scene for Bodies {
     type Configuration = Placement;
+    type Moved = Placement;
     type Contact = SphereContact;
     type Command = ();
     type Memory = ();
@@ -47,6 +48,10 @@ impl Scene for Bodies {
 
     fn nv(&self) -> usize {
         NV * self.count()
+    }
+
+    fn moved(&self, q: &Placement) -> Placement {
+        q.clone()
     }
 
     fn command(&self) {}
@@ -63,8 +68,9 @@ impl Scene for Bodies {
 
     fn system<'a>(
         &'a self,
+        _: &StepOptions,
         (): &'a (),
-        (): &'a (),
+        (): &'a mut (),
         parts: &'a mut SphereScratch,
     ) -> SphereSystem<'a> {
         SphereSystem {

@@ -16,12 +16,12 @@ use std::time::Instant;
 
 use exploring_scenes::{Ground, STEPS_A_COMMAND, drives};
 use rover_core::contact::Activation;
+use rover_core::contact::slots::contacts::{Contacts, Sight};
+use rover_core::contact::slots::ground::Ground as LaneGround;
+use rover_core::contact::slots::machine::Machine;
+use rover_core::contact::slots::rows::Rows;
 use rover_core::geometry::Terrain;
 use rover_core::integrator::StepOptions;
-use rover_core::lanes::contacts::{Contacts, Sight};
-use rover_core::lanes::ground::Ground as LaneGround;
-use rover_core::lanes::machine::Machine;
-use rover_core::lanes::rows::Rows;
 use rover_core::multibody::inertias::Inertias;
 use rover_core::multibody::lane_configuration::LaneConfiguration;
 use rover_core::multibody::poses::Poses;
@@ -85,7 +85,7 @@ struct Block<T: Lane> {
 
 impl<T: Lane> Block<T> {
     fn new(token: T::Token, model: &Model, records: &[Record]) -> Self {
-        let machine = Machine::of(model).expect("the rover has fast steps");
+        let machine = Machine::of(model);
         let mut inertias = Inertias::new(token, &machine);
         let mut ground = LaneGround::new(token, machine.wheels.len(), machine.boxes.len());
         for lane in 0..T::LANES {

@@ -28,7 +28,6 @@
 //! - [`integrator`]: one step of any mechanical system;
 //! - [`planar`]: grounds and machines in the plane; [`system`]: the mechanical systems that a step
 //!   moves, such as the multibody tree;
-//! - [`lanes`]: the fast step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene.
 #![forbid(unsafe_code)]
 // Same bits on every machine: sines and their like come from `scalar::elementary`.
@@ -41,7 +40,6 @@ pub use rover_ground::{geometry, sand, spatial};
 pub mod caught;
 pub mod contact;
 pub mod integrator;
-pub mod lanes;
 pub mod multibody;
 pub mod planar;
 pub mod simulation;

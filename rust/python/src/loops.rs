@@ -2,8 +2,8 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rover_core::contact::loops;
 use rover_core::multibody::{Configuration, Model, coordinates};
-use rover_core::system::loops;
 
 use crate::arrays::{Array, fresh};
 use crate::errors::Result;

@@ -56,10 +56,11 @@ pub struct StepReport {
     /// implicit gyroscopic terms, or if Newton's law of restitution had no solution.
     #[pyo3(get)]
     retaken: usize,
-    /// Number of steps that used the general step instead of the fast one.
+    /// Number of steps that took more than the usual effort.
     ///
-    /// Always 0 for planar machines and grains, which have no fast step.
-    /// `Simulation.fallback_reason` tells whether a simulation has fast steps.
+    /// Such a step is taken alone, with every means of solving its contacts, and in halves where
+    /// that fails. Always 0 for planar machines, for grains and for the variant "newton", whose
+    /// steps all are.
     #[pyo3(get)]
     fallbacks: usize,
     /// Largest energy gain of a step beyond the work done on it, relative to the kinetic energy.

@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::contact::Part;
+use rover_core::contact::loops::check_closed;
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, coordinates};
@@ -12,7 +13,6 @@ use rover_core::simulation::{
     TrajectoryBatch, state_size, with_sand,
 };
 use rover_core::solver::SolverOptions;
-use rover_core::system::loops::check_closed;
 use rover_task::draw::DrawnGround;
 use std::sync::{Arc, MutexGuard};
 
@@ -252,19 +252,11 @@ impl Simulation {
 
     /// Number of rovers that a batch steps together in one SIMD register of this computer.
     ///
-    /// Either 8, 4 or 1. Always 1 if the simulation uses the general step: see `fallback_reason`.
+    /// Either 8, 4 or 1; always 1 for the variant "newton". A step that takes more than the usual
+    /// effort is taken alone: `StepReport.fallbacks` counts them.
     #[getter]
     fn lanes(&self) -> Result<usize> {
         Ok(self.open()?.lanes())
-    }
-
-    /// Reason why this simulation always uses the general step; None if it uses the fast one.
-    ///
-    /// The fast step handles several rovers per SIMD register. Single steps may still need the
-    /// general step; `StepReport.fallbacks` counts them.
-    #[getter]
-    fn fallback_reason(&self) -> Result<Option<String>> {
-        Ok(self.open()?.fallback_reason().map(|why| why.to_string()))
     }
 
     /// Coordinates, (nq,), m and rad.

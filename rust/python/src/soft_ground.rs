@@ -16,8 +16,8 @@ use crate::terrain::Terrain;
 /// Sand, into which wheels sink. All other parts of a machine touch its surface as rigid ground.
 ///
 /// The ruts belong to a simulation and are part of its snapshots. For rocks on sand, use a `Union`
-/// of both. Beside firm ground other than spheres a simulation always uses the general step, see
-/// `Simulation.fallback_reason`.
+/// of both. Beside firm ground other than spheres, contacts are found one rover at a time, which is
+/// slower in a batch.
 ///
 /// Args:
 ///     surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.

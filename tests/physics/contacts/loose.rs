@@ -102,7 +102,7 @@ fn an_impulse_between_two_bodies_is_no_force_and_no_couple_on_both_together() {
             let mut push = vec![0.0; 12];
             generalized_impulse(
                 &model,
-                &kinematics,
+                kinematics.poses(),
                 &[contact],
                 &[1.0, 0.7, -0.4],
                 &mut push,

@@ -1,12 +1,12 @@
 //! Closed loops: linkages against their closed forms, and against the same machine as a tree.
 
+use rover_core::contact::loops::{closed, redundant_rows, widest_gap};
 use rover_core::integrator::Variant;
 use rover_core::multibody::error::ModelError;
 use rover_core::multibody::{
     Configuration, JointKind, LoopDescription, LoopKind, Model, ModelDescription, SolidDescription,
 };
 use rover_core::simulation::RoverSimulation;
-use rover_core::system::loops::{closed, redundant_rows, widest_gap};
 
 use super::machines::{energy, machine, options, simulation, solid};
 
@@ -149,7 +149,7 @@ fn a_free_four_bar_keeps_its_energy_and_stays_closed() {
         };
         let report = run.step(n).unwrap();
         assert!(report.is_converged() && report.loop_gap < 1e-12);
-        assert_eq!(report.fallbacks > n / 1000, variant == Variant::Newton);
+        assert!(report.fallbacks <= n / 1000);
         let (lost, kinetic) = (before - energy(&run), 7.0);
         assert!(lost.abs() < 1e-4 * kinetic, "{variant:?}: {lost} J");
     }

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use rover_core::contact::loops::check_closed;
 use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepReport;
@@ -13,7 +14,6 @@ use rover_core::integrator::moreau_jean::MoreauJean;
 use rover_core::multibody::{Configuration, LoopDescription, LoopKind, Model, ModelDescription};
 use rover_core::multibody::{coordinates, description::WheelDescription};
 use rover_core::simulation::RoverSimulation;
-use rover_core::system::loops::check_closed;
 
 use super::machines::options;
 

@@ -5,16 +5,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use rover_core::contact::slots::contacts::{Contacts, Sight};
+use rover_core::contact::slots::ground::Ground;
+use rover_core::contact::slots::machine::Machine;
+use rover_core::contact::slots::rows::{Answer, Rows};
 use rover_core::contact::{
     self, Activation, Contact, ContactKey, ContactSystem, PairSearch, Part, generalized_impulse,
     relocate,
 };
 use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
-use rover_core::integrator::WarmStart;
-use rover_core::lanes::contacts::{Contacts, Sight};
-use rover_core::lanes::ground::Ground;
-use rover_core::lanes::machine::Machine;
-use rover_core::lanes::rows::{Answer, Rows};
 use rover_core::multibody::description::SolidDescription;
 use rover_core::multibody::inertias::Inertias;
 use rover_core::multibody::lane_configuration::LaneConfiguration;
@@ -80,7 +79,7 @@ struct Block<T: Lane> {
 impl<T: Lane> Block<T> {
     fn new(token: T::Token, model: &Model, rovers: &[Rover]) -> Self {
         assert_eq!(rovers.len(), T::LANES);
-        let machine = Machine::of(model).unwrap();
+        let machine = Machine::of(model);
         let mut inertias = Inertias::new(token, &machine);
         let mut ground = Ground::new(token, machine.wheels.len(), machine.boxes.len());
         for (lane, rover) in rovers.iter().enumerate() {
@@ -283,8 +282,8 @@ fn expected(model: &Model, rover: &Rover, step: Step, found: &Found) -> Option<F
     M.update(mechanism, model.inertias(), middle.poses());
     let mut factor = Factor::new(token, mechanism);
     assert!(M.factorise(mechanism, &mut factor));
-    let mut system = ContactSystem::with_capacity(model, contacts.len());
-    system.assemble(model, &end, &factor, &contacts, &rover.v);
+    let at_end = (end.poses(), &rover.v[..]);
+    let system = ContactSystem::of(model, at_end, &factor, &contacts);
     let change: Vec<f64> = (0..model.nv()).map(number).collect();
     let n = contacts.len();
     let mut local = vec![0.0; 3 * n];
@@ -296,7 +295,7 @@ fn expected(model: &Model, rover: &Rover, step: Step, found: &Found) -> Option<F
     let mut y = change;
     system.add_impulses(model, &p, &mut y);
     let mut impulse = vec![0.0; model.nv()];
-    generalized_impulse(model, &end, &contacts, &p, &mut impulse);
+    generalized_impulse(model, end.poses(), &contacts, &p, &mut impulse);
     let mut found = Found {
         falls_back: false,
         u_before: system.u.clone(),
@@ -654,37 +653,4 @@ fn what_a_search_keeps_does_not_show() {
             assert_eq!(bits(&found), bits(&fresh));
         }
     }
-}
-
-#[test]
-fn impulses_are_remembered_by_contact() {
-    let model = Model::rover();
-    let terrain: Arc<dyn Terrain> = Arc::new(Plane::ground());
-    let mut rover = rover(&model, &terrain, &mut Random(4), 0.0, 0.0);
-    rover.q = Configuration::zero(&model);
-    rover.q.position.y = 0.3499;
-    rover.v.fill(0.0);
-    let here = std::slice::from_ref(&rover);
-    let mut block = Block::<f64>::new(Single::best(), &model, here);
-    let found = block.step(here, STEPS[0]);
-    assert_eq!(found[0].keys.len(), 6);
-    let p: Vec<f64> = (0..18).map(number).collect();
-    let mut memory = WarmStart::default();
-    let mut problems = vec![ContactProblem::default()];
-    problems[0].p[..18].copy_from_slice(&p);
-    block.contacts.remember(0, &problems, &mut memory);
-    problems[0].p.fill(f64::NAN);
-    let (own, mut is_same) = ((0, None), [false]);
-    (block.contacts).recall(own, &memory, &mut problems, &mut is_same);
-    assert_eq!(is_same, [true]);
-    assert_eq!(problems[0].p[..18], p[..]);
-    // The third was not there, the first two were in another order.
-    memory.impulses.remove(2);
-    memory.impulses.swap(0, 1);
-    (block.contacts).recall(own, &memory, &mut problems, &mut is_same);
-    assert_eq!(is_same, [false]);
-    let recalled = &problems[0].p[..18];
-    assert_eq!(recalled[..6], p[..6]);
-    assert_eq!(recalled[6..9], [0.0; 3]);
-    assert_eq!(recalled[9..], p[9..]);
 }

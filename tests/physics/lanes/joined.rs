@@ -118,10 +118,9 @@ impl Scene {
             v[first] = part.speed;
         }
         let q = coordinates::from_public(&model, &q).unwrap();
-        let q = rover_core::system::loops::closed(&model, &q, &mut v).unwrap();
+        let q = rover_core::contact::loops::closed(&model, &q, &mut v).unwrap();
         let ground = Arc::clone(&self.ground);
         let mut sim = RoverSimulation::new(model, ground, StepOptions::default()).unwrap();
-        assert_eq!(sim.fallback_reason(), None, "{}", self.name);
         sim.set_state(q, v);
         sim
     }

@@ -3,11 +3,9 @@
 
 use nalgebra::{DVector, Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
-use rover_core::lanes::machine::{Machine, Unsupported};
+
 use rover_core::multibody::bias::{BiasScratch, bias};
-use rover_core::multibody::description::{
-    CouplingDescription, JointKind, Limits, SolidDescription,
-};
+use rover_core::multibody::description::{CouplingDescription, JointKind, SolidDescription};
 use rover_core::multibody::energy::{EnergyScratch, energy};
 use rover_core::multibody::{
     Configuration, Factor, Inertias, LaneConfiguration, MassMatrix, Model, ModelDescription, Poses,
@@ -482,27 +480,4 @@ fn models_of_the_gallery_agree() {
         let description = ModelDescription::named(name).unwrap();
         check(&rovers(&description, seed as u64, 1.0));
     }
-}
-
-#[test]
-fn a_machine_without_a_fast_step_is_refused_with_its_reason() {
-    let reason = |change: fn(&mut ModelDescription)| {
-        let mut description = ModelDescription::rover();
-        change(&mut description);
-        Machine::of(&Model::from_description(description).unwrap())
-    };
-    assert!(reason(|_| {}).is_ok());
-    let with_stops = |rover: &mut ModelDescription| {
-        let template = rover.solids[1].clone();
-        rover.solids.extend((0..30).map(|i| SolidDescription {
-            name: format!("arm {i}"),
-            limits: Some(Limits {
-                lower: -1.0,
-                upper: 1.0,
-            }),
-            ..template.clone()
-        }));
-    };
-    assert_eq!(reason(with_stops), Err(Unsupported::TooManyContacts(36)));
-    assert!(reason(|rover| rover.self_contact = true).is_ok());
 }

@@ -1,6 +1,5 @@
 //! Width and rounding of a description.
 
-use rover_core::lanes::machine::Machine;
 use rover_core::multibody::{Model, ModelDescription};
 
 use super::wheel_scenes::wide_rover;
@@ -14,11 +13,4 @@ fn a_wide_wheel_is_written_and_read_and_tells_models_apart() {
     assert_ne!(wide.fingerprint(), Model::rover().fingerprint());
     let smaller = wide.with_contact_radius(0.2).unwrap();
     assert!((smaller.wheels()[0].width - 0.2).abs() < 1e-15);
-}
-
-#[test]
-fn wheels_of_any_width_have_a_fast_step() {
-    for (width, rounding) in [(0.0, 0.0), (0.2, 0.05), (0.15, 0.075)] {
-        assert!(Machine::of(&wide_rover(width, rounding)).is_ok());
-    }
 }

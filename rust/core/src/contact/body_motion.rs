@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::multibody::Motion;
 use crate::multibody::mechanism::Mechanism;
-use crate::multibody::{Kinematics, Model};
+use crate::multibody::{Motion, Poses};
+use crate::scalar::{Lane, Vec3};
 
 /// A machine at one instant, as its contacts need it.
 pub(crate) trait BodyMotion {
@@ -32,37 +32,58 @@ pub(crate) trait BodyMotion {
     }
 }
 
-/// A machine by its kinematics and its velocity (nv).
+/// A machine in a lane, by the poses and the velocity (nv) of all lanes.
 #[derive(Clone, Copy)]
-pub(crate) struct Still<'a> {
-    pub model: &'a Model,
-    pub kinematics: &'a Kinematics,
-    pub v: &'a [f64],
+pub(crate) struct Still<'a, T: Lane = f64> {
+    pub mechanism: &'a Mechanism,
+    pub poses: &'a Poses<T>,
+    pub v: &'a [T],
+    pub lane: usize,
 }
 
-impl BodyMotion for Still<'_> {
+impl<'a> Still<'a> {
+    /// The machine of the only lane.
+    pub(crate) fn new(mechanism: &'a Mechanism, poses: &'a Poses<f64>, v: &'a [f64]) -> Self {
+        Self {
+            mechanism,
+            poses,
+            v,
+            lane: 0,
+        }
+    }
+}
+
+impl<T: Lane> BodyMotion for Still<'_, T> {
     #[inline]
     fn mechanism(&self) -> &Mechanism {
-        self.model.mechanism()
+        self.mechanism
     }
 
     #[inline]
     fn origin(&self, body: usize) -> Vector3<f64> {
-        *self.kinematics.origin(body)
+        let tree = self.mechanism.tree_of_body(body);
+        self.poses.origin_of(tree).get(self.lane).into()
     }
 
     #[inline]
     fn pose(&self, body: usize) -> (Matrix3<f64>, Vector3<f64>) {
-        (self.kinematics.R(body), self.kinematics.r(body))
+        let own = &self.poses.bodies[body];
+        let columns = own.R.columns().map(|x| Vector3::from(x.get(self.lane)));
+        (Matrix3::from_columns(&columns), own.r.get(self.lane).into())
     }
 
     #[inline]
     fn motion(&self, motion: usize) -> Motion<f64> {
-        self.kinematics.poses().motions[motion]
+        let own = &self.poses.motions[motion];
+        let vector = |x: Vec3<T>| Vec3::from(Vector3::from(x.get(self.lane)));
+        Motion {
+            axis: vector(own.axis),
+            swing: vector(own.swing),
+        }
     }
 
     #[inline]
     fn velocity(&self, k: usize) -> f64 {
-        self.v[k]
+        self.v[k].get(self.lane)
     }
 }

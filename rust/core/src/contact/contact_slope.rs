@@ -13,7 +13,7 @@ use super::pair::Contact;
 use super::relocation::relocate_to;
 use crate::geometry::Terrain;
 use crate::multibody::mechanism::Mechanism;
-use crate::multibody::{Kinematics, Model, Motion};
+use crate::multibody::{Model, Motion};
 use crate::scalar::elementary::sin_cos;
 
 /// Point relative to a fixed origin (m), normal, rolling direction, binormal and gap (m) of a
@@ -44,17 +44,17 @@ const SMOOTH: f64 = 1e-5;
 const NOTHING: f64 = 1e-3;
 
 impl ContactSlope {
-    /// Derivatives of a contact that is placed at the poses of `kinematics`.
+    /// Derivatives of a contact that is placed at the poses of `still`.
     pub(crate) fn of(
         model: &Model,
-        kinematics: &Kinematics,
+        still: Still<'_>,
         terrain: &dyn Terrain,
         contact: &Contact,
     ) -> Self {
         let slope = |body: usize| {
             [0, 1, 2, 3, 4, 5].map(|k| {
                 let at = |amount: f64| {
-                    let moved = Moved::new((model, kinematics), body, k, amount);
+                    let moved = Moved::new(still, body, k, amount);
                     let mut contact = *contact;
                     relocate_to(model, &moved, terrain, &mut contact);
                     numbers(&contact)
@@ -109,17 +109,7 @@ struct Moved<'a> {
 
 impl<'a> Moved<'a> {
     /// With a body moved along (0 to 2) or turned about (3 to 5) a world axis by an amount.
-    fn new(
-        (model, kinematics): (&'a Model, &'a Kinematics),
-        body: usize,
-        axis: usize,
-        amount: f64,
-    ) -> Self {
-        let still = Still {
-            model,
-            kinematics,
-            v: &[],
-        };
+    fn new(still: Still<'a>, body: usize, axis: usize, amount: f64) -> Self {
         let (mut R, mut r) = still.pose(body);
         if axis < 3 {
             r[axis] += amount;

@@ -41,15 +41,10 @@ pub fn detect(
     out: &mut Vec<Contact>,
 ) -> Option<[f64; 2]> {
     out.clear();
-    let at = |kinematics, v| Still {
-        model,
-        kinematics,
-        v,
-    };
     let machine = Moving {
         model,
-        middle: &at(kinematics, v),
-        end: &at(end, v),
+        middle: &Still::new(model.mechanism(), kinematics.poses(), v),
+        end: &Still::new(model.mechanism(), end.poses(), v),
     };
     detect_parts(Part::all(model), &machine, terrain, activation, out)
 }

@@ -11,7 +11,7 @@ use super::limit;
 use super::pair::Contact;
 use super::rows::{Path, Place, Triple};
 use crate::multibody::mechanism::Mechanism;
-use crate::multibody::{Kinematics, Model};
+use crate::multibody::{Model, Poses};
 use crate::scalar::Vec3;
 
 /// The contact point relative to the origin of a body's tree, and the contact's frame.
@@ -33,19 +33,6 @@ pub(crate) fn relative_velocity(motion: &impl BodyMotion, contact: &Contact) -> 
     };
     let x = contact.point + (motion.origin(contact.body) - motion.origin(other.body));
     velocity - motion.point_velocity(other.body, &x)
-}
-
-/// Rows of Hᵀ of a contact without another body, along the path of its own, and `Hᵀ v`.
-#[inline]
-pub(super) fn write_rows(
-    motion: &impl BodyMotion,
-    contact: &Contact,
-    v: &[f64],
-    rows: &mut [Triple<f64>],
-) -> Triple<f64> {
-    let place = place_at(motion, contact, contact.body);
-    let path = Path::of(motion.mechanism(), contact.body);
-    path.write(|m| motion.motion(m), &place, v, rows)
 }
 
 /// Calls `act` with each velocity that moves a contact and its entries of the rows of Hᵀ. One that
@@ -84,16 +71,12 @@ pub(crate) fn sides<'a>(
 /// contacts.
 pub fn generalized_impulse(
     model: &Model,
-    kinematics: &Kinematics,
+    poses: &Poses<f64>,
     contacts: &[Contact],
     p: &[f64],
     out: &mut [f64],
 ) {
-    let motion = Still {
-        model,
-        kinematics,
-        v: &[],
-    };
+    let motion = Still::new(model.mechanism(), poses, &[]);
     out.fill(0.0);
     for (contact, p) in contacts.iter().zip(p.as_chunks().0) {
         match limit::joint_row(model, contact) {

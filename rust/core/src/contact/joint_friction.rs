@@ -11,12 +11,11 @@
 //! above. The row b is zero, too, and its diagonal that of t.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use nalgebra::Vector3;
-
-use super::frame::ContactFrame;
+use super::body_motion::Still;
+use super::limit;
 use super::pair::{Contact, ContactKey, Opposite};
 use super::part::Part;
-use crate::multibody::{JointModel, Kinematics, Model};
+use crate::multibody::Model;
 
 impl ContactKey {
     /// Key of a joint's dry friction.
@@ -31,9 +30,9 @@ impl ContactKey {
 }
 
 /// Adds to `out` the friction of all joints that have it.
-pub fn list_friction(model: &Model, kinematics: &Kinematics, out: &mut Vec<Contact>) {
+pub(crate) fn list_friction(model: &Model, motion: &Still<'_>, out: &mut Vec<Contact>) {
     let joints = model.rubbing_joints().iter();
-    out.extend(joints.map(|&joint| contact(model, kinematics, joint)));
+    out.extend(joints.map(|&joint| limit::of_joint(model, motion, joint, 1.0)));
 }
 
 /// Index of the joint, if the contact is the friction of one.
@@ -42,25 +41,6 @@ pub(crate) fn joint_of(contact: &Contact) -> Option<usize> {
     match contact.part {
         Part::Friction(joint) => Some(joint),
         _ => None,
-    }
-}
-
-/// Dry friction of a joint as a contact: its point is the origin of the body that the joint
-/// carries, its normal the joint's axis.
-fn contact(model: &Model, kinematics: &Kinematics, joint: usize) -> Contact {
-    let body = model.joints()[joint].body;
-    let motion = &kinematics.motions()[model.bodies()[body].motion];
-    let axis: Vector3<f64> = model.bodies()[body].joint.direction(motion).into();
-    let part = Part::Friction(joint);
-    Contact {
-        key: ContactKey::of_friction(joint),
-        part,
-        body,
-        other: None,
-        point: kinematics.r(body),
-        frame: ContactFrame::of_normal(&axis),
-        gap: 0.0,
-        excess: 0.0,
     }
 }
 

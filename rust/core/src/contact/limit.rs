@@ -9,10 +9,11 @@
 use nalgebra::Vector3;
 
 use super::activation::Activation;
+use super::body_motion::Still;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, Opposite};
 use super::part::{Part, Side};
-use crate::multibody::{JointModel, Kinematics, Model};
+use crate::multibody::{JointModel, Model};
 
 impl Side {
     /// Gap rate per unit of the joint's velocity.
@@ -54,13 +55,11 @@ pub(crate) fn joint_row(model: &Model, contact: &Contact) -> Option<(usize, f64,
 
 /// Adds to `out` the stops that a step must consider.
 ///
-/// `joints`: coordinates of all joints (n_joints) at the poses of `kinematics`, rad or m; `v`:
-/// velocity (nv).
-pub fn detect_limits(
+/// `joints`: coordinates of all joints (n_joints) at the poses of `motion`, rad or m.
+pub(crate) fn detect_limits(
     model: &Model,
-    kinematics: &Kinematics,
+    motion: &Still<'_>,
     joints: &[f64],
-    v: &[f64],
     activation: &Activation,
     out: &mut Vec<Contact>,
 ) {
@@ -68,20 +67,25 @@ pub fn detect_limits(
         let arm = model.mechanism().joints[joint].arm;
         for side in [Side::Lower, Side::Upper] {
             let gap = gap(model, joints, joint, side);
-            let rate = || arm * side.sign() * v[model.joint_velocity(joint)];
+            let rate = || arm * side.sign() * motion.v[model.joint_velocity(joint)];
             if activation.admits(arm * gap, rate) {
-                out.push(contact(model, kinematics, joint, side, gap));
+                out.push(contact(model, motion, joint, side, gap));
             }
         }
     }
 }
 
 /// Updates point, frame and gap of a joint's stop to another configuration. `joints`: coordinates
-/// of all joints (n_joints) at the poses of `kinematics`, rad or m.
-pub fn relocate_limit(model: &Model, kinematics: &Kinematics, joints: &[f64], stop: &mut Contact) {
+/// of all joints (n_joints) at the poses of `motion`, rad or m.
+pub(crate) fn relocate_limit(
+    model: &Model,
+    motion: &Still<'_>,
+    joints: &[f64],
+    stop: &mut Contact,
+) {
     if let Part::Limit(joint, side) = stop.part {
         let gap = gap(model, joints, joint, side);
-        *stop = contact(model, kinematics, joint, side, gap);
+        *stop = contact(model, motion, joint, side, gap);
     }
 }
 
@@ -95,20 +99,31 @@ fn gap(model: &Model, joints: &[f64], joint: usize, side: Side) -> f64 {
     }
 }
 
-/// A stop as a contact: its point is the origin of the body that the joint carries, its normal the
-/// direction of the axis that opens the gap.
-fn contact(model: &Model, kinematics: &Kinematics, joint: usize, side: Side, gap: f64) -> Contact {
-    let body = model.joints()[joint].body;
-    let motion = &kinematics.motions()[model.bodies()[body].motion];
-    let axis: Vector3<f64> = model.bodies()[body].joint.direction(motion).into();
+/// A stop as a contact: its normal opens the gap.
+fn contact(model: &Model, motion: &Still<'_>, joint: usize, side: Side, gap: f64) -> Contact {
+    let contact = of_joint(model, motion, joint, side.sign());
     Contact {
         key: ContactKey::at_limit(joint, side),
         part: Part::Limit(joint, side),
+        gap,
+        ..contact
+    }
+}
+
+/// A joint's friction as a contact, or with another key a stop: its point is the origin of the body
+/// that the joint carries, its normal the direction of its axis, times a sign.
+pub(super) fn of_joint(model: &Model, motion: &Still<'_>, joint: usize, sign: f64) -> Contact {
+    let body = model.joints()[joint].body;
+    let moved = &motion.poses.motions[model.bodies()[body].motion];
+    let axis: Vector3<f64> = model.bodies()[body].joint.direction(moved).into();
+    Contact {
+        key: ContactKey::of_friction(joint),
+        part: Part::Friction(joint),
         body,
         other: None,
-        point: kinematics.r(body),
-        frame: ContactFrame::of_normal(&(axis * side.sign())),
-        gap,
+        point: motion.poses.bodies[body].r.into(),
+        frame: ContactFrame::of_normal(&(axis * sign)),
+        gap: 0.0,
         excess: 0.0,
     }
 }

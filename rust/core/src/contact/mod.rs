@@ -12,7 +12,11 @@
 //! [`placement`] puts a rover on its wheels.
 //! [`relocation`] re-evaluates them in another configuration; `contact_slope` has their
 //! derivatives by the poses. `rows` has the rows of the contact
-//! Jacobian and the products with them, [`jacobian`] and [`delassus`] assemble the matrices.
+//! Jacobian and the products with them, [`jacobian`] and [`delassus`] assemble the matrices, and
+//! [`loops`] restricts them to what the closed loops of a machine let move.
+//!
+//! These are the contacts of one machine, in a list. [`slots`] has those of machines in the lanes of
+//! a register, and asks this page for what is rare. `placed_wheel` is a wheel as sand meets it.
 //!
 //! # One call
 //!
@@ -34,7 +38,8 @@
 //!
 //! # May use
 //!
-//! [`crate::scalar`], [`crate::multibody`], [`crate::geometry`], [`crate::law`].
+//! [`crate::scalar`], [`crate::spatial`], [`crate::law`], [`crate::solver`], [`crate::multibody`],
+//! [`crate::sand`], [`crate::geometry`].
 
 pub mod activation;
 pub(crate) mod body_motion;
@@ -46,13 +51,16 @@ pub mod frame;
 pub mod jacobian;
 pub mod joint_friction;
 pub mod limit;
+pub mod loops;
 pub mod pair;
 pub mod pair_detection;
 pub mod part;
+pub(crate) mod placed_wheel;
 pub mod placement;
 pub mod relocation;
 pub(crate) mod rollers;
 pub(crate) mod rows;
+pub mod slots;
 pub(crate) mod ways_out;
 pub mod wheel_gaps;
 
@@ -61,8 +69,8 @@ pub use delassus::ContactSystem;
 pub use detection::detect;
 pub use frame::ContactFrame;
 pub use jacobian::generalized_impulse;
-pub use joint_friction::list_friction;
-pub use limit::{detect_limits, relocate_limit};
+pub(crate) use joint_friction::list_friction;
+pub(crate) use limit::{detect_limits, relocate_limit};
 pub(crate) use pair::clusters_of;
 pub use pair::{Contact, ContactKey, Opposite, OtherSide};
 pub use pair_detection::{PairSearch, detect_pairs};

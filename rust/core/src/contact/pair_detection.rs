@@ -59,11 +59,7 @@ pub fn detect_pairs(
     search: &mut PairSearch,
     out: &mut Vec<Contact>,
 ) {
-    let machine = Still {
-        model,
-        kinematics,
-        v,
-    };
+    let machine = Still::new(model.mechanism(), kinematics.poses(), v);
     detect_pairs_of(model, &machine, activation, search, out);
 }
 

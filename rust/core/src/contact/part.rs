@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::body_motion::BodyMotion;
 use crate::geometry::{Disc, Ellipsoid, Hull, OrientedBox, PlacedShape, Roller, Sphere};
 use crate::law::compliance::Tread;
 use crate::multibody::{Collider, ColliderForm, Kinematics, Model, Wheel};
@@ -180,6 +181,12 @@ impl Part {
     pub fn place<'a>(self, model: &'a Model, kinematics: &Kinematics) -> PlacedShape<'a> {
         let body = self.body(model);
         self.place_at(model, (&kinematics.R(body), &kinematics.r(body)))
+    }
+
+    /// Shape of the part at the poses of `motion`, relative to the origin of its tree.
+    pub(crate) fn placed<'a>(self, model: &'a Model, motion: &impl BodyMotion) -> PlacedShape<'a> {
+        let (R, r) = motion.pose(self.body(model));
+        self.place_at(model, (&R, &r))
     }
 
     /// Shape of the part, given the attitude and the origin (m) of its body.

@@ -20,12 +20,7 @@ pub fn relocate(
     terrain: &dyn Terrain,
     contact: &mut Contact,
 ) {
-    let v = &[];
-    let machine = Still {
-        model,
-        kinematics,
-        v,
-    };
+    let machine = Still::new(model.mechanism(), kinematics.poses(), &[]);
     relocate_to(model, &machine, terrain, contact);
 }
 

@@ -7,7 +7,7 @@
 //!
 //! Rows are stored by velocity: three numbers, along n, t and b. The general step keeps them of one
 //! contact after another ([`super::delassus`]), a block of rovers of one slot after another
-//! (`crate::lanes::rows`).
+//! (`crate::contact::slots::rows`).
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::multibody::Motion;

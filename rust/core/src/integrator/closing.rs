@@ -3,8 +3,8 @@
 use super::data::{DataOf, Obstacle};
 use super::dynamics::Dynamics;
 use super::local::Local;
-use super::report::MOST_OPEN;
 use super::systems::{MaskOf, Systems};
+use crate::contact::loops::MOST_OPEN;
 use crate::scalar::{Lane, LaneMask};
 
 /// Makes the end of the step obey the closed loops in some lanes. One whose loops stay open falls

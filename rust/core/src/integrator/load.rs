@@ -140,6 +140,7 @@ fn load_implicitly<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
             );
         }
     }
+    s.machine().add_given(&d.options, &mut d.y);
     S::run(
         d.token,
         #[inline(always)]

@@ -1,5 +1,6 @@
 //! Report of a step.
 
+use crate::contact::loops::MOST_OPEN;
 use crate::solver::{SolveReport, SolveStatus};
 
 /// Whether the equations of the step were solved to their tolerance.
@@ -12,9 +13,6 @@ pub enum StepStatus {
     /// the force of the sand is not that at the solution; the state is the best one found.
     NotConverged,
 }
-
-/// Gap of a closed loop at the end of a step above which the step has not converged, m or rad.
-pub(crate) const MOST_OPEN: f64 = 1e-6;
 
 /// Report of a step, or of the worst of several.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

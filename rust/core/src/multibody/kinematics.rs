@@ -70,12 +70,6 @@ impl Kinematics {
         }
     }
 
-    /// `R_WB` of body `b` with its own rotation, after [`Self::update_for_step`].
-    #[must_use]
-    pub(crate) fn spun(&self, model: &Model, b: usize) -> Matrix3<f64> {
-        self.poses.spun(model.mechanism(), &self.q, b).into()
-    }
-
     /// The poses as the sources of the dynamics read them.
     #[inline]
     #[must_use]
@@ -117,11 +111,6 @@ impl Kinematics {
     #[must_use]
     pub fn origin(&self, b: usize) -> &Vector3<f64> {
         &self.origins[self.tree_of[b]]
-    }
-
-    /// Sets the reference origin of a tree, m.
-    pub(crate) fn set_origin(&mut self, tree: usize, origin: Vector3<f64>) {
-        self.origins[tree] = origin;
     }
 
     /// A point given in the frame of body `b`, relative to its tree's origin, world axes.

@@ -10,7 +10,7 @@ use crate::scalar::{Dual, Lane, Vec3};
 use crate::spatial::quaternion::normalised;
 
 /// A configuration a lane.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct LaneConfiguration<T: Lane> {
     /// Origin of the first body, world, m; zero where that body is not free.
     pub position: Vec3<T>,
@@ -23,6 +23,38 @@ pub struct LaneConfiguration<T: Lane> {
     pub rotations: Vec<[T; 4]>,
     /// Positions and attitudes of the free bodies other than the first.
     others: Vec<(Vec3<T>, [T; 4])>,
+}
+
+impl<T: Lane> Clone for LaneConfiguration<T> {
+    fn clone(&self) -> Self {
+        Self {
+            position: self.position,
+            attitude: self.attitude,
+            joints: self.joints.clone(),
+            rotations: self.rotations.clone(),
+            others: self.others.clone(),
+        }
+    }
+
+    /// Does not allocate if the sizes agree.
+    fn clone_from(&mut self, other: &Self) {
+        (self.position, self.attitude) = (other.position, other.attitude);
+        self.joints.clone_from(&other.joints);
+        self.rotations.clone_from(&other.rotations);
+        self.others.clone_from(&other.others);
+    }
+}
+
+impl PartialEq for LaneConfiguration<f64> {
+    fn eq(&self, other: &Self) -> bool {
+        let place = |x: &Vec3<f64>| [x.x, x.y, x.z];
+        let others = (self.others.iter()).map(|(position, attitude)| (place(position), attitude));
+        place(&self.position) == place(&other.position)
+            && self.attitude == other.attitude
+            && self.joints == other.joints
+            && self.rotations == other.rotations
+            && others.eq((other.others.iter()).map(|(position, own)| (place(position), own)))
+    }
 }
 
 impl<T: Lane> LaneConfiguration<T> {

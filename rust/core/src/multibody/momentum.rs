@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::joint::{Joint, Motion, free};
 use super::kinematics::Kinematics;
 use super::model::Model;
+use super::poses::Poses;
 
 /// Linear (kg m/s) and angular momentum (kg m²/s, about a point chosen by the caller).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,7 +21,7 @@ pub struct Momentum {
 /// `about`: the origin of each tree's places relative to that point, m. `out`: one entry a body.
 pub fn body_momenta(
     model: &Model,
-    kinematics: &Kinematics,
+    poses: &Poses<f64>,
     v: &[f64],
     about: impl Fn(usize) -> Vector3<f64>,
     out: &mut [Momentum],
@@ -36,7 +37,7 @@ pub fn body_momenta(
             let Motion { axis, swing } = free::velocity(v);
             (own.linear, own.angular) = (swing.into(), axis.into());
         }
-        for (motion, v) in kinematics.motions()[body.motions()].iter().zip(v) {
+        for (motion, v) in poses.motions[body.motions()].iter().zip(v) {
             own.linear += Vector3::from(motion.swing) * *v;
             own.angular += Vector3::from(motion.axis) * *v;
         }
@@ -45,10 +46,11 @@ pub fn body_momenta(
     for (t, tree) in model.trees().iter().enumerate() {
         let about = about(t);
         for b in tree.bodies.clone() {
-            let (body, c) = (&model.bodies()[b], kinematics.c(b));
+            let (body, pose) = (&model.bodies()[b], &poses.bodies[b]);
+            let c = Vector3::from(pose.c);
             let omega = out[b].angular;
             let p = (out[b].linear + omega.cross(&c)) * body.mass;
-            let A = body.principal_attitude(kinematics.R(b));
+            let A = body.principal_attitude(pose.R.into());
             let spin = body.principal_inertia.component_mul(&A.tr_mul(&omega));
             out[b] = Momentum {
                 linear: p,
@@ -76,7 +78,7 @@ pub fn centre_of_mass(model: &Model, kinematics: &Kinematics) -> Vector3<f64> {
 pub fn momentum(model: &Model, kinematics: &Kinematics, v: &[f64]) -> Momentum {
     let mut momenta = vec![Momentum::default(); model.bodies().len()];
     let about = |tree: usize| *kinematics.origin(model.trees()[tree].bodies.start);
-    body_momenta(model, kinematics, v, about, &mut momenta);
+    body_momenta(model, kinematics.poses(), v, about, &mut momenta);
     Momentum {
         linear: momenta.iter().map(|m| m.linear).sum(),
         angular: momenta.iter().map(|m| m.angular).sum(),

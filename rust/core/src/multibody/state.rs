@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::joint::joint_model::{JointCoordinates, JointModel, advanced};
-use super::joint::{Free, Joint, Pose};
+use super::joint::{Free, Pose};
 use super::model::Model;
 use crate::scalar::Vec3;
 
@@ -58,34 +58,6 @@ impl Configuration {
             joints: vec![0.0; model.n_joints()],
             others: vec![Pose::default(); model.n_poses() - 1],
             rotations: vec![UnitQuaternion::identity(); model.n_rotations()],
-        }
-    }
-
-    /// Takes the coordinates of some clusters from another configuration of the same model.
-    pub(crate) fn take_clusters(
-        &mut self,
-        model: &Model,
-        from: &Self,
-        is_taken: impl Fn(usize) -> bool,
-    ) {
-        let mechanism = model.mechanism();
-        let joints = self.joints.iter_mut().zip(&from.joints);
-        for ((own, other), joint) in joints.zip(&mechanism.joints) {
-            if is_taken(joint.cluster) {
-                *own = *other;
-            }
-        }
-        for (joint, k) in &mechanism.rotating {
-            if !is_taken(mechanism.cluster_of_velocity(*k)) {
-                continue;
-            }
-            match joint {
-                Joint::Free(free) => self.set_pose(*free, from.pose(*free)),
-                Joint::Spherical(own) => {
-                    self.rotations[own.rotation] = from.rotations[own.rotation];
-                }
-                _ => {}
-            }
         }
     }
 

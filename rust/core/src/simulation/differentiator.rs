@@ -16,8 +16,9 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::error::LinearisationError;
 use super::rover::{RoverScene, RoverSimulation};
 use super::rover_command::RoverCommand;
-use super::scene::{Scene, SceneKey};
+use super::scene::{Scene, SceneKey, Usual};
 use super::step_parameter::StepParameter;
+use crate::contact::loops::check_closed;
 use crate::integrator::held_step::{is_projected, law_of_last};
 use crate::integrator::{NoProbe, Start, StepReport, UnilateralContact, Variant};
 use crate::law::mode::ContactMode;
@@ -25,7 +26,6 @@ use crate::multibody::{Configuration, Model, coordinates};
 use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Instructions, Single};
 use crate::system::TreeSystem;
-use crate::system::loops::check_closed;
 use crate::system::tangent::{Direction, HeldSand, HeldTree, OF_WHEEL, Tangent, TangentScene};
 
 /// Cosine of the pitch below which the coordinates count as singular.
@@ -188,14 +188,15 @@ impl Differentiator {
         }
         let command = self.sim.command.clone();
         let sim = &mut self.sim;
-        if !sim.model().has_compliance() && sim.quick_step(&mut NoProbe)?.is_some() {
+        let is_rigid = !sim.model().has_compliance();
+        if is_rigid && matches!(sim.usual_step(&mut NoProbe)?, Usual::Taken(_)) {
             let mut found = sim.warm_start.clone();
             found.persistent.clear();
             self.set(state)?;
             self.sim.command = command;
             self.sim.warm_start = found;
         }
-        self.report = (self.sim).general_step(&Variant::Linearised, &mut NoProbe)?;
+        self.report = (self.sim).step_with_all_effort(&Variant::Linearised, &mut NoProbe)?;
         Ok(self.state_of(&self.sim))
     }
 
@@ -230,8 +231,10 @@ impl Differentiator {
         }
         let end = self.step(&changed)?;
         let sim = &mut self.sim;
-        let system = sim.scene.system(&sim.command, &sim.memory, &mut sim.parts);
+        let (command, memory) = (&sim.command, &mut sim.memory);
+        let system = (sim.scene).system(&sim.options, command, memory, &mut sim.parts);
         let law = law_of_last(&system, &sim.scratch);
+        drop(system);
         let modes = law.map(|law| self.modes_of(law.modes.into_iter()));
         Ok((end, modes))
     }
@@ -328,8 +331,10 @@ impl Differentiator {
             configuration: &begin,
             v: &v,
         };
-        let mut system = sim.scene.system(&sim.command, &sim.memory, &mut sim.parts);
+        let (command, memory) = (&sim.command, &mut sim.memory);
+        let mut system = (sim.scene).system(&sim.options, command, memory, &mut sim.parts);
         let held = system.hold(&sim.options, start, &sim.scratch, &numbers);
+        drop(system);
         let held = held.ok_or(LinearisationError::NotHeld)?;
         self.sand.clone_from(&held.sand);
         let scene = TangentScene {

@@ -114,6 +114,7 @@ where
 {
     /// [`COORDINATES`] of each grain, then the machine's, m and rad.
     type Configuration = Vec<f64>;
+    type Moved = Vec<f64>;
     type Contact = GrainContact<D>;
     type Command = BedCommand<D>;
     type Memory = BedMemory;
@@ -122,6 +123,10 @@ where
 
     fn nv(&self) -> usize {
         self.soil.nv()
+    }
+
+    fn moved(&self, q: &Vec<f64>) -> Vec<f64> {
+        q.clone()
     }
 
     fn command(&self) -> BedCommand<D> {
@@ -151,8 +156,9 @@ where
 
     fn system<'a>(
         &'a self,
+        _: &StepOptions,
         command: &'a BedCommand<D>,
-        memory: &'a BedMemory,
+        memory: &'a mut BedMemory,
         parts: &'a mut GrainParts<D>,
     ) -> GrainSystem<'a, D> {
         parts.wall_time = memory.elapsed;

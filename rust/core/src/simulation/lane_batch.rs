@@ -1,20 +1,20 @@
 //! Rovers that one thread steps together, several to a register.
 //!
-//! Rovers of one machine with alike options fill the lanes of blocks ([`crate::lanes`]). The
+//! Rovers of one machine with alike options fill the lanes of blocks ([`crate::system::block`]). The
 //! contact problems of all blocks wait in one queue; a block goes on to its next step as soon as
-//! its own are solved, whatever the others do. A lane that has no fast step is taken by the general
-//! step, alone, and comes back. Every rover moves as it would alone, to the last bit.
+//! its own are solved, whatever the others do. A lane whose step takes more than the usual
+//! effort is taken alone, and comes back. Every rover moves as it would alone, to the last bit.
 
 use std::sync::Arc;
 
 use super::rover::RoverSimulation;
 use crate::caught::caught;
+use crate::contact::slots::machine::Machine;
 use crate::integrator::{NoProbe, StepError, StepOptions, StepReport};
-use crate::lanes::block::{Block, Next, are_alike};
-use crate::lanes::machine::Machine;
 use crate::scalar::{Instructions, Lane};
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;
+use crate::system::block::{Block, Next, are_alike};
 
 /// Rovers that together cost less alone than as a block, as a fraction of its lanes.
 const FEW: f64 = 0.4;
@@ -94,8 +94,8 @@ struct Slot {
     /// Report of the steps after which the rover itself has its state.
     kept: StepReport,
     has_failed: bool,
-    /// Whether the rover's last step was a general one.
-    is_general: bool,
+    /// Whether the rover took its last step alone.
+    was_alone: bool,
 }
 
 struct Lanes<T: Lane> {
@@ -204,7 +204,7 @@ impl<T: Lane> Lanes<T> {
             for (lane, slot) in slots.enumerate() {
                 if let Some(slot) = slot.as_mut().filter(|slot| !slot.has_failed) {
                     let rover = &mut *rovers[slot.index].rover;
-                    if slot.is_general {
+                    if slot.was_alone {
                         rover.leave(block, lane);
                         rover.list_active();
                     } else {
@@ -238,7 +238,7 @@ impl<T: Lane> Lanes<T> {
                     report: StepReport::default(),
                     kept: StepReport::default(),
                     has_failed: false,
-                    is_general: false,
+                    was_alone: false,
                 }));
             }
         }
@@ -340,7 +340,7 @@ impl<T: Lane> Lanes<T> {
         false
     }
 
-    /// Notes the reports of a block's step; rovers that need the general step take it alone.
+    /// Notes the reports of a block's step; rovers whose step takes more effort take it alone.
     fn settle(&mut self, b: usize, rovers: &mut [BatchRover<'_>]) {
         let block = &mut self.blocks[b];
         let slots = &mut self.slots[b * T::LANES..][..T::LANES];
@@ -351,7 +351,7 @@ impl<T: Lane> Lanes<T> {
             };
             if block.fallback(lane).is_none() {
                 slot.report.merge(block.report(lane));
-                slot.is_general = false;
+                slot.was_alone = false;
                 continue;
             }
             let BatchRover { rover, error } = &mut rovers[slot.index];
@@ -361,13 +361,13 @@ impl<T: Lane> Lanes<T> {
                 rover.store(block, lane);
             }
             slot.kept = slot.report;
-            match rover.step_generally() {
+            match rover.step_alone() {
                 Ok(report) => {
                     slot.report.merge(&StepReport {
                         fallbacks: 1,
                         ..report
                     });
-                    slot.is_general = true;
+                    slot.was_alone = true;
                     slot.kept = slot.report;
                     rover.load(block, lane);
                 }

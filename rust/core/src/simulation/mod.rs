@@ -5,7 +5,7 @@
 //! - [`state`], [`active_contact`]: its state, its contacts; [`any_snapshot`]: what files keep,
 //!   [`sealed`] with a checksum;
 //! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
-//!   [controls](rover_controls), its [contacts](rover_contacts), its [fast steps](fallback), its
+//!   [controls](rover_controls), its [contacts](rover_contacts), its own block of lanes (`own_block`, `rover_lanes`), its
 //!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step by a [`differentiator`],
 //!   with `steps_in_sand` whose forces are exact;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
@@ -20,8 +20,8 @@
 //! Simulation::step(n)
 //!    │
 //!    ├─ Scene::begin_call
-//!    └─ n times ─┬─ Scene::quick_step         a rover on firm ground: crate::lanes
-//!                └─ general_step              Scene::system ──► Integrator::step
+//!    └─ n times ─┬─ Scene::usual_step         a rover, in its block
+//!                └─ step_with_all_effort      Scene::system ──► Integrator::step
 //!                      │
 //!                      ▼
 //!                   State, WarmStart, ActiveContact
@@ -37,8 +37,7 @@
 //! [`crate::caught`], [`crate::pool`], [`crate::quantity`], [`crate::scalar`], [`crate::spatial`],
 //! [`crate::multibody`],
 //! [`crate::sand`], [`crate::geometry`], [`crate::contact`], [`crate::problem`],
-//! [`crate::law`], [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`],
-//! [`crate::lanes`].
+//! [`crate::law`], [`crate::solver`], [`crate::integrator`], [`crate::planar`], [`crate::system`].
 // Registers of other processors hold one rover: nothing there uses blocks of lanes.
 #![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 
@@ -47,20 +46,19 @@ pub mod any_snapshot;
 pub mod batch;
 pub mod differentiator;
 pub mod error;
-pub mod fallback;
 pub mod grains;
 pub mod lane_batch;
 pub mod linearisation;
+mod own_block;
 pub mod planar;
 pub mod profile;
-mod quick;
 pub mod reading;
 pub mod rover;
 pub mod rover_command;
 pub mod rover_contacts;
 pub mod rover_controls;
 pub mod rover_in_grains;
-mod rover_quick;
+mod rover_lanes;
 pub mod rover_rays;
 mod rover_sand;
 pub mod scene;
@@ -87,7 +85,9 @@ pub use reading::{ReadingLayout, ReadingRequest, ReadingScratch, seen_from};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use rover_in_grains::{RoverInGrains, TogetherError};
-pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
+pub use scene::{
+    DenseOperator, Scene, SceneKey, SceneScratch, Snapshot, StepTaken, Usual, UsualStep,
+};
 pub use state::State;
 pub use step_parameter::StepParameter;
 pub use stepping::Simulation;

@@ -46,6 +46,7 @@ impl LocatedContact for PlanarContact {
 
 impl Scene for PlanarScene {
     type Configuration = Vec<f64>;
+    type Moved = Vec<f64>;
     type Contact = PlanarContact;
     /// Torques, N m, positive forward.
     type Command = Vec<f64>;
@@ -55,6 +56,10 @@ impl Scene for PlanarScene {
 
     fn nv(&self) -> usize {
         self.machine.nv()
+    }
+
+    fn moved(&self, q: &Vec<f64>) -> Vec<f64> {
+        q.clone()
     }
 
     fn command(&self) -> Vec<f64> {
@@ -73,8 +78,9 @@ impl Scene for PlanarScene {
 
     fn system<'a>(
         &'a self,
+        _: &StepOptions,
         command: &'a Vec<f64>,
-        (): &'a (),
+        (): &'a mut (),
         parts: &'a mut PlanarScratch,
     ) -> PlanarSystem<'a> {
         PlanarSystem {

@@ -7,18 +7,23 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::active_contact::LocatedContact;
-use super::quick::Quick;
+use super::own_block::OwnBlock;
 use super::rover_command::RoverCommand;
-use super::scene::{DenseOperator, QuickStep, Scene, SceneScratch, Snapshot, StepTaken};
+use super::scene::{DenseOperator, Scene, SceneScratch, Snapshot, StepTaken, Usual, UsualStep};
 use super::state::State;
 use super::stepping::Simulation;
+use crate::contact::loops;
+use crate::contact::slots::machine::Machine;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
-use crate::lanes::machine::{Machine, Unsupported};
-use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
+use crate::multibody::{
+    Configuration, Energy, Kinematics, LaneConfiguration, Model, Momentum, momentum,
+};
 use crate::sand::SandState;
-use crate::system::{TreeScratch, TreeSystem, loops};
+use crate::scalar::Single;
+use crate::system::tree::TreeScene;
+use crate::system::{TreeScratch, TreeSystem};
 
 /// A machine on a terrain, both shared.
 #[derive(Clone)]
@@ -27,15 +32,15 @@ pub struct RoverScene {
     pub model: Arc<Model>,
     /// The ground.
     pub terrain: Arc<dyn Terrain>,
-    /// The machine of its fast steps, or why it has none.
-    pub(super) machine: Result<Arc<Machine>, Unsupported>,
+    /// What rovers in a block have in common.
+    pub(super) machine: Arc<Machine>,
 }
 
 impl RoverScene {
     /// A machine on a terrain.
     #[must_use]
     pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>) -> Self {
-        let machine = Machine::of(&model).map(Arc::new);
+        let machine = Arc::new(Machine::of(&model));
         Self {
             model,
             terrain,
@@ -90,7 +95,7 @@ pub struct Placement {
 #[derive(Clone, Debug)]
 pub struct RoverParts {
     pub(super) tree: TreeScratch,
-    pub(super) quick: Quick,
+    pub(super) own: OwnBlock,
     /// Work of each joint's drive in the last call, J.
     pub(super) drive_work: Vec<f64>,
     /// Gap of each wheel to the nearest grain after the last call, m; empty without grains.
@@ -99,7 +104,7 @@ pub struct RoverParts {
 
 impl DenseOperator for RoverParts {
     fn operator(&self) -> &[f64] {
-        self.quick.operator().unwrap_or(self.tree.operator())
+        self.own.operator().unwrap_or(self.tree.operator())
     }
 }
 
@@ -126,16 +131,21 @@ pub struct RoverMemory {
 
 impl Scene for RoverScene {
     type Configuration = Configuration;
+    type Moved = LaneConfiguration<f64>;
     type Contact = Contact;
     type Command = RoverCommand;
     type Memory = RoverMemory;
     type Parts = RoverParts;
     type System<'a> = TreeSystem<'a>;
 
-    const HAS_FAST_STEP: bool = true;
-
     fn nv(&self) -> usize {
         self.model.nv()
+    }
+
+    fn moved(&self, q: &Configuration) -> LaneConfiguration<f64> {
+        let mut moved = LaneConfiguration::new(Single::best(), self.model.mechanism());
+        moved.set_lane(0, q);
+        moved
     }
 
     fn command(&self) -> RoverCommand {
@@ -153,7 +163,7 @@ impl Scene for RoverScene {
     fn parts(&self) -> RoverParts {
         RoverParts {
             tree: TreeScratch::new(&self.model, self.contact_capacity()),
-            quick: Quick::default(),
+            own: OwnBlock::default(),
             drive_work: vec![0.0; self.model.n_joints()],
             gaps_to_grains: Vec::new(),
         }
@@ -172,26 +182,31 @@ impl Scene for RoverScene {
     #[inline]
     fn system<'a>(
         &'a self,
+        options: &StepOptions,
         command: &'a RoverCommand,
-        memory: &'a RoverMemory,
+        memory: &'a mut RoverMemory,
         parts: &'a mut RoverParts,
     ) -> TreeSystem<'a> {
-        parts.quick.set_last(false);
-        parts.tree.begin_step(&parts.drive_work);
-        let (ground, sand) = (self.terrain.soft(), memory.sand.as_ref());
-        parts.tree.begin_sand(&self.model, ground, sand);
-        TreeSystem {
+        parts.own.set_last(false);
+        let scene = TreeScene {
             model: &self.model,
-            terrain: &*self.terrain,
+            terrain: &self.terrain,
             command: &command.actuators,
-            ruts: memory.sand.as_ref().map(|sand| &sand.ruts),
-            parts: &mut parts.tree,
-        }
+            gravity: options.gravity.into(),
+            drive_work: &parts.drive_work,
+            sand: memory.sand.as_mut(),
+        };
+        TreeSystem::new(scene, &mut parts.tree)
     }
 
     #[inline]
     fn position(&self, parts: &RoverParts, contact: &Contact) -> [f64; 3] {
-        (parts.tree.origin_of_contacts(contact.body) + contact.point).into()
+        let tree = self.model.bodies()[contact.body].tree;
+        let origin = match parts.own.last() {
+            Some((block, _)) => block.origin(0, tree),
+            None => parts.tree.origin(tree),
+        };
+        (Vector3::from(origin) + contact.point).into()
     }
 
     fn begin_call(&self, parts: &mut RoverParts) {
@@ -200,7 +215,7 @@ impl Scene for RoverScene {
     }
 
     fn recover(&self, parts: &mut RoverParts, memory: &mut RoverMemory) {
-        if let (Some(block), Some(sand)) = (&mut parts.quick.block, &mut memory.sand) {
+        if let (Some(block), Some(sand)) = (&mut parts.own.block, &mut memory.sand) {
             block.recover_ruts(0, &mut sand.ruts);
         }
         *parts = RoverParts {
@@ -218,22 +233,15 @@ impl Scene for RoverScene {
             let impulse = wheel.joint.map_or(0.0, |j| drives.impulse(0, j));
             *torque = wheel.drive_sign * impulse * wheel.share / taken.options.time_step;
         }
-        let ground = self.terrain.soft();
-        taken.parts.tree.end_sand(ground, sand.as_mut());
+        taken.parts.tree.end_sand(sand.as_mut());
     }
 
-    fn quick_step(
-        &self,
-        step: &mut QuickStep<'_, Self>,
-        probe: &mut dyn Probe,
-    ) -> Option<StepReport> {
-        self.take_fast_step(step, probe)
+    fn usual_step(&self, step: &mut UsualStep<'_, Self>, probe: &mut dyn Probe) -> Usual {
+        self.take_usual_step(step, probe)
     }
 
-    fn publish(&self, parts: &mut RoverParts, scratch: &mut SceneScratch<Self>) {
-        let RoverParts { tree, quick, .. } = parts;
-        if let Some((block, problems)) = quick.last() {
-            tree.show(block.origins(0));
+    fn show_last(&self, parts: &mut RoverParts, scratch: &mut SceneScratch<Self>) {
+        if let Some((block, problems)) = parts.own.last() {
             scratch.show(
                 |show| {
                     block.visit_contacts(0, |contact, _, p, u| show(contact, p, u));

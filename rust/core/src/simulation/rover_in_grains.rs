@@ -9,6 +9,7 @@ use super::active_contact::ActiveContact;
 use super::grains::GrainSimulation;
 use super::rover::RoverSimulation;
 use super::scene::{Scene, StepTaken};
+use super::state::Moved;
 use crate::caught::caught;
 use crate::contact::Part;
 use crate::geometry::query::dispatch;
@@ -16,14 +17,14 @@ use crate::geometry::{PlacedShape, Sphere, SupportMap};
 use crate::integrator::{
     Integrator, NoProbe, Scratch, StateMut, StepError, StepOptions, StepReport, WarmStart,
 };
-use crate::multibody::{Configuration, Kinematics};
+use crate::multibody::{Kinematics, LaneConfiguration};
 use crate::system::grains::{self, GrainContact, GrainError, Grid, Mover, OVERLAP};
 use crate::system::{
     CompositeContact, CompositeKey, CompositeScratch, GrainTouch, TreeAmongGrains,
 };
 use nalgebra::Vector3;
 
-type Both = (Vec<f64>, Configuration);
+type Both = (Vec<f64>, LaneConfiguration<f64>);
 
 /// A rover and a bed that cannot be stepped together.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
@@ -98,7 +99,7 @@ impl RoverInGrains {
     }
 
     fn with_friction(friction: f64, rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Self {
-        let q = (bed.q().clone(), rover.q().clone());
+        let q = (bed.q().clone(), rover.scene.moved(rover.q()));
         let room = bed.scene.contact_capacity() + rover.scene.contact_capacity();
         Self {
             friction,
@@ -189,13 +190,18 @@ impl RoverInGrains {
     ) -> Result<StepReport, StepError> {
         let n_bed = bed.scene.nv();
         let own = std::mem::take(&mut bed.state.configuration);
-        let mut q = (own, rover.state.configuration.clone());
+        let mut q = (own, rover.scene.moved(rover.q()));
         let mut v = [&bed.state.v[..], &rover.state.v[..]].concat();
         let mut time = bed.state.time;
         self.join_warm_starts(rover, bed);
         let mut system = TreeAmongGrains {
-            bed: (bed.scene).system(&bed.command, &bed.memory, &mut bed.parts),
-            tree: (rover.scene).system(&rover.command, &rover.memory, &mut rover.parts),
+            bed: (bed.scene).system(&bed.options, &bed.command, &mut bed.memory, &mut bed.parts),
+            tree: (rover.scene).system(
+                &rover.options,
+                &rover.command,
+                &mut rover.memory,
+                &mut rover.parts,
+            ),
             friction: self.friction,
             parts: &mut self.parts,
         };
@@ -213,7 +219,9 @@ impl RoverInGrains {
                 &mut NoProbe,
             )
         });
-        (bed.state.configuration, rover.state.configuration) = q;
+        drop(system);
+        bed.state.configuration = q.0;
+        Moved::write(&q.1, &mut rover.state.configuration);
         let report = match taken {
             Ok(taken) => taken?,
             Err(fault) => {

@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::active_contact::{ActiveContact, LocatedContact};
-use super::state::State;
+use super::state::{Moved, State};
 use crate::integrator::{
     MechanicalSystem, Probe, Scratch, StepOptions, StepReport, UnilateralContact, WarmStart,
 };
@@ -18,12 +18,14 @@ use crate::multibody::Energy;
 pub type SceneKey<S> = <<S as Scene>::Contact as UnilateralContact>::Key;
 
 /// Scratch of a scene's steps.
-pub type SceneScratch<S> = Scratch<<S as Scene>::Configuration, <S as Scene>::Contact>;
+pub type SceneScratch<S> = Scratch<<S as Scene>::Moved, <S as Scene>::Contact>;
 
 /// A system that can be simulated.
 pub trait Scene: Clone {
     /// A point of the configuration space.
     type Configuration: Clone + PartialEq;
+    /// A configuration in the form that steps move.
+    type Moved: Moved<Self::Configuration> + Clone + PartialEq;
     /// A contact of a step.
     type Contact: LocatedContact;
     /// Command, which holds until the next one: torques, held joints.
@@ -33,12 +35,15 @@ pub trait Scene: Clone {
     /// Scratch of its matrices. It holds no state: a fresh one gives the same bits.
     type Parts: Clone;
     /// The scene as a step sees it.
-    type System<'a>: MechanicalSystem<Configuration = Self::Configuration, Contact = Self::Contact>
+    type System<'a>: MechanicalSystem<Configuration = Self::Moved, Contact = Self::Contact>
     where
         Self: 'a;
 
     /// Number of velocities.
     fn nv(&self) -> usize;
+
+    /// A configuration in the form that steps move.
+    fn moved(&self, q: &Self::Configuration) -> Self::Moved;
 
     /// The command of a new simulation.
     fn command(&self) -> Self::Command;
@@ -52,11 +57,13 @@ pub trait Scene: Clone {
     /// Usual upper bound of the number of contacts, for which memory is reserved.
     fn contact_capacity(&self) -> usize;
 
-    /// The system at the start of a step.
+    /// The system at the start of a step. What it takes from the memory it gives back when it is
+    /// dropped.
     fn system<'a>(
         &'a self,
+        options: &StepOptions,
         command: &'a Self::Command,
-        memory: &'a Self::Memory,
+        memory: &'a mut Self::Memory,
         parts: &'a mut Self::Parts,
     ) -> Self::System<'a>;
 
@@ -77,26 +84,18 @@ pub trait Scene: Clone {
         *parts = self.parts();
     }
 
-    /// Whether [`Self::quick_step`] takes any.
-    const HAS_FAST_STEP: bool = false;
-
     /// Called after each accepted step. By default it does nothing.
     fn after_step(&self, _taken: StepTaken<'_, Self>) {}
 
-    /// Takes a step in the scene's own, faster way, by the law of the options' variant. None if
-    /// there is no such way or the step does not suit it; nothing has changed then. By default
-    /// there is none.
-    fn quick_step(
-        &self,
-        _step: &mut QuickStep<'_, Self>,
-        _probe: &mut dyn Probe,
-    ) -> Option<StepReport> {
-        None
+    /// Takes a step with the usual effort, by the law of the options' variant. By default all steps
+    /// are taken with all effort.
+    fn usual_step(&self, _step: &mut UsualStep<'_, Self>, _probe: &mut dyn Probe) -> Usual {
+        Usual::None
     }
 
-    /// Called at the end of a call: makes `parts` and `scratch` those of the last step, whichever
-    /// way it was taken. By default they are.
-    fn publish(&self, _parts: &mut Self::Parts, _scratch: &mut SceneScratch<Self>) {}
+    /// Called at the end of a call: makes `scratch` that of the last step, whichever way it was
+    /// taken. By default it is.
+    fn show_last(&self, _parts: &mut Self::Parts, _scratch: &mut SceneScratch<Self>) {}
 
     /// Kinetic and potential energy of a state under a command, J.
     fn energy(
@@ -173,8 +172,19 @@ impl<S: Scene> Snapshot<S> {
     }
 }
 
-/// A step that a scene may take in its own way.
-pub struct QuickStep<'a, S: Scene> {
+/// What came of a step with the usual effort.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Usual {
+    /// There is no such step.
+    None,
+    /// It takes more effort; nothing has changed.
+    Refused,
+    /// It was taken.
+    Taken(StepReport),
+}
+
+/// A step that a scene may take with the usual effort.
+pub struct UsualStep<'a, S: Scene> {
     /// The step's options.
     pub options: &'a StepOptions,
     /// Configuration, velocity and time.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::StateMut;
+use crate::multibody::{Configuration, LaneConfiguration};
 
 /// State of a scene: small, cloneable, without scratch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,14 +25,33 @@ impl<Q> State<Q> {
             time: 0.0,
         }
     }
+}
 
-    /// The view that a step advances.
-    #[inline]
-    pub(super) fn as_mut(&mut self) -> StateMut<'_, Q> {
-        StateMut {
-            configuration: &mut self.configuration,
-            v: &mut self.v,
-            time: &mut self.time,
-        }
+/// A configuration in the form that steps move.
+pub trait Moved<Q> {
+    /// Takes over a configuration.
+    fn read(&mut self, q: &Q);
+
+    /// Writes it back.
+    fn write(&self, q: &mut Q);
+}
+
+impl<Q: Clone> Moved<Q> for Q {
+    fn read(&mut self, q: &Q) {
+        self.clone_from(q);
+    }
+
+    fn write(&self, q: &mut Q) {
+        q.clone_from(self);
+    }
+}
+
+impl Moved<Configuration> for LaneConfiguration<f64> {
+    fn read(&mut self, q: &Configuration) {
+        self.set_lane(0, q);
+    }
+
+    fn write(&self, q: &mut Configuration) {
+        self.to_lane(0, q);
     }
 }

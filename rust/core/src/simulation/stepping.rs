@@ -3,12 +3,14 @@
 use super::active_contact::ActiveContact;
 use super::error::SnapshotError;
 use super::profile::Stopwatch;
-use super::scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, Snapshot, StepTaken};
-use super::state::State;
+use super::scene::{
+    DenseOperator, Scene, SceneKey, SceneScratch, Snapshot, StepTaken, Usual, UsualStep,
+};
+use super::state::{Moved, State};
 use crate::caught::caught;
 use crate::integrator::{
-    Integrator, Local, NoProbe, OptionsError, Probe, Scratch, StepError, StepOptions, StepReport,
-    UnilateralContact, WarmStart,
+    Integrator, Local, NoProbe, OptionsError, Probe, Scratch, StateMut, StepError, StepOptions,
+    StepReport, UnilateralContact, WarmStart,
 };
 use crate::multibody::Energy;
 use crate::problem::{Dimension, FrictionContactProblem, undetermined_loads};
@@ -23,6 +25,7 @@ pub struct Simulation<S: Scene> {
     pub(super) scene: S,
     pub(super) options: StepOptions,
     pub(super) state: State<S::Configuration>,
+    moved: S::Moved,
     pub(super) command: S::Command,
     pub(super) memory: S::Memory,
     pub(super) warm_start: WarmStart<SceneKey<S>>,
@@ -52,7 +55,8 @@ impl<S: Scene> Simulation<S> {
             command: scene.command(),
             memory: scene.memory(),
             parts: scene.parts(),
-            scratch: Scratch::new(&configuration, n),
+            scratch: Scratch::new(&scene.moved(&configuration), n),
+            moved: scene.moved(&configuration),
             state: State::at_rest(configuration, nv),
             warm_start: WarmStart::with_capacity(n, nv),
             active: Vec::with_capacity(n),
@@ -226,12 +230,12 @@ impl<S: Scene> Simulation<S> {
         self.call(&variant, true, n, &mut || true, probe)
     }
 
-    /// One call: its report is kept. `may_be_quick`: whether steps that the scene takes in its own
-    /// way are the integrator's.
+    /// One call: its report is kept. `may_be_usual`: whether the scene's steps with the usual
+    /// effort are the integrator's.
     fn call<I>(
         &mut self,
         integrator: &I,
-        may_be_quick: bool,
+        may_be_usual: bool,
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
@@ -240,7 +244,7 @@ impl<S: Scene> Simulation<S> {
         I: for<'a> Integrator<S::System<'a>>,
     {
         self.begin_call();
-        let result = self.steps(integrator, may_be_quick, n, go_on, probe);
+        let result = self.steps(integrator, may_be_usual, n, go_on, probe);
         self.end_call(result.clone().unwrap_or_default());
         result.map(|_| self.last_report)
     }
@@ -266,7 +270,7 @@ impl<S: Scene> Simulation<S> {
     fn steps<I>(
         &mut self,
         integrator: &I,
-        may_be_quick: bool,
+        may_be_usual: bool,
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
@@ -276,16 +280,16 @@ impl<S: Scene> Simulation<S> {
     {
         let mut total = StepReport::default();
         for _ in 0..n {
-            let quick = if may_be_quick {
-                self.quick_step(probe)?
+            let usual = if may_be_usual {
+                self.usual_step(probe)?
             } else {
-                None
+                Usual::None
             };
-            let report = match quick {
-                Some(report) => report,
-                None => StepReport {
-                    fallbacks: usize::from(may_be_quick && S::HAS_FAST_STEP),
-                    ..self.general_step(integrator, probe)?
+            let report = match usual {
+                Usual::Taken(report) => report,
+                Usual::None | Usual::Refused => StepReport {
+                    fallbacks: usize::from(usual == Usual::Refused),
+                    ..self.step_with_all_effort(integrator, probe)?
                 },
             };
             total.merge(&report);
@@ -294,7 +298,7 @@ impl<S: Scene> Simulation<S> {
             }
         }
         if total.steps > 0 {
-            self.scene.publish(&mut self.parts, &mut self.scratch);
+            self.scene.show_last(&mut self.parts, &mut self.scratch);
             self.list_active();
         }
         Ok(total)
@@ -329,66 +333,64 @@ impl<S: Scene> Simulation<S> {
         caught(|| step(self)).map_err(|fault| {
             self.scene.recover(&mut self.parts, &mut self.memory);
             let n = self.scene.contact_capacity();
-            self.scratch = Scratch::new(&self.state.configuration, n);
+            self.scratch = Scratch::new(&self.moved, n);
             StepError::Internal { time, fault }
         })
     }
 
-    /// The scene's own way to take a step, if it has one.
-    pub(super) fn quick_step(
-        &mut self,
-        probe: &mut dyn Probe,
-    ) -> Result<Option<StepReport>, StepError> {
-        if !S::HAS_FAST_STEP {
-            return Ok(None);
-        }
-        self.guard(|own| own.quick_step_of_scene(probe))
+    /// A step with the usual effort.
+    pub(super) fn usual_step(&mut self, probe: &mut dyn Probe) -> Result<Usual, StepError> {
+        self.guard(|own| {
+            let mut step = UsualStep {
+                options: &own.options,
+                state: &mut own.state,
+                command: &own.command,
+                memory: &mut own.memory,
+                parts: &mut own.parts,
+                warm_start: &mut own.warm_start,
+            };
+            own.scene.usual_step(&mut step, probe)
+        })
     }
 
-    fn quick_step_of_scene(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
-        let mut step = QuickStep {
-            options: &self.options,
-            state: &mut self.state,
-            command: &self.command,
-            memory: &mut self.memory,
-            parts: &mut self.parts,
-            warm_start: &mut self.warm_start,
+    /// A step of any scene and integrator, with all effort.
+    pub(super) fn step_with_all_effort<I>(
+        &mut self,
+        integrator: &I,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        self.guard(|own| own.take_with_all_effort(integrator, probe))?
+    }
+
+    fn take_with_all_effort<I>(
+        &mut self,
+        integrator: &I,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        self.moved.read(&self.state.configuration);
+        let (command, memory) = (&self.command, &mut self.memory);
+        let mut system = (self.scene).system(&self.options, command, memory, &mut self.parts);
+        let state = StateMut {
+            configuration: &mut self.moved,
+            v: &mut self.state.v[..],
+            time: &mut self.state.time,
         };
-        self.scene.quick_step(&mut step, probe)
-    }
-
-    /// A step of any scene and integrator.
-    pub(super) fn general_step<I>(
-        &mut self,
-        integrator: &I,
-        probe: &mut dyn Probe,
-    ) -> Result<StepReport, StepError>
-    where
-        I: for<'a> Integrator<S::System<'a>>,
-    {
-        self.guard(|own| own.general_step_of_scene(integrator, probe))?
-    }
-
-    fn general_step_of_scene<I>(
-        &mut self,
-        integrator: &I,
-        probe: &mut dyn Probe,
-    ) -> Result<StepReport, StepError>
-    where
-        I: for<'a> Integrator<S::System<'a>>,
-    {
-        let mut system = self
-            .scene
-            .system(&self.command, &self.memory, &mut self.parts);
         let report = integrator.step(
             &mut system,
             &self.options,
-            self.state.as_mut(),
+            state,
             &mut self.warm_start,
             &mut self.scratch,
             probe,
         )?;
         drop(system);
+        self.moved.write(&mut self.state.configuration);
         self.scene.after_step(StepTaken {
             options: &self.options,
             state: &mut self.state,

@@ -89,11 +89,12 @@ impl Differentiator {
             self.sim.command.clone_from(&command);
             self.sim.warm_start = found;
             self.sim.parts.tree.give_sand(Some(&forces));
-            self.report = (self.sim).general_step(&Variant::Linearised, &mut NoProbe)?;
+            self.report = (self.sim).step_with_all_effort(&Variant::Linearised, &mut NoProbe)?;
             let end = self.state_of(&self.sim);
             self.set_sand(entries);
             let sim = &mut self.sim;
-            let mut system = sim.scene.system(&sim.command, &sim.memory, &mut sim.parts);
+            let (command, memory) = (&sim.command, &mut sim.memory);
+            let system = (sim.scene).system(&sim.options, command, memory, &mut sim.parts);
             let errors = system.sand_errors();
             let error = largest(&errors, &forces);
             last = error;
@@ -141,10 +142,11 @@ impl Differentiator {
     /// The forces of the sand in the step of a simulation.
     fn guess_forces(&mut self) -> Result<Forces, LinearisationError> {
         let sim = &mut self.sim;
-        let (model, ground) = (&sim.scene.model, sim.scene.terrain.soft());
-        (sim.parts.tree).begin_sand(model, ground, sim.memory.sand.as_ref());
+        // The scratch has sand from its first step on.
+        let (command, memory) = (&sim.command, &mut sim.memory);
+        drop((sim.scene).system(&sim.options, command, memory, &mut sim.parts));
         sim.parts.tree.give_sand(None);
-        sim.general_step(&Variant::Linearised, &mut NoProbe)?;
+        sim.step_with_all_effort(&Variant::Linearised, &mut NoProbe)?;
         let modes = sim.parts.tree.modes_of_sand();
         let wheels = sim.memory.sand.iter().flat_map(|sand| &sand.wheels);
         let forces = wheels.zip(modes).map(|(wheel, [is_touching, _])| {

@@ -4,9 +4,10 @@
 //!   [scratch](tree_scratch); [`drives`]: torques, motors, held joints, springs and dampers,
 //!   implicit with [`fitted_theta`]; `extent`: how far a step turns and displaces it;
 //!   `momentum_balance`: the balance of the Newton variant; [`gyroscopic`]: when gyroscopic terms
-//!   are implicit, and how; [`loops`]: its closed loops; `sand`: its wheels in sand, also
-//!   several machines over lanes; `sand_patch`, `sand_wheel`, `sand_tangent`, `six`: one of them;
-//!   `tree_lanes`: trees in the lanes of a scalar; `tangent`: derivatives of a step;
+//!   are implicit, and how; `sand`: its wheels in sand; `sand_patch`, `sand_wheel`,
+//!   `sand_tangent`, `six`: one of them; `tree_lanes`: what moves, in the lanes of a scalar;
+//! - [`block`]: rovers in the lanes of a register, with their contacts;
+//! - `tangent`: derivatives of a tree's step;
 //! - [`planar`]: a planar machine on a ground, with its matrices;
 //! - [`grains`]: thousands of free disks or balls, and a planar machine among them;
 //! - [`among_grains`]: a tree among balls.
@@ -17,13 +18,13 @@
 //!
 //! ```text
 //! integrator                    TreeSystem                      asks
-//! place_middle, place_end   ──► TreeScratch                     multibody::Kinematics
+//! place_middle, place_end   ──► TreeLanes                       multibody::Poses
 //! detect, relocate          ──► TreeSystem                      contact
-//! update_mass_matrix        ──► mass matrix, Drives θ_j         multibody::MassMatrix; sand
+//! update_mass_matrix        ──► TreeLanes: Drives θ_j, sand     multibody::MassMatrix
 //! factorise                 ──► M̂ with Drives and sand          multibody::Factor
-//! close_velocity, close_end ──► Loops                           multibody::loops
+//! close_velocity, close_end ──► Loops                           contact::loops
 //! load                      ──► bias, Drives, sand              multibody::bias
-//! load_gyroscopic           ──► GyroscopicScratch               multibody::coriolis
+//! load_gyroscopic           ──► Gyroscopic                      multibody::coriolis
 //! assemble, local, ...      ──► ContactSystem                   contact
 //! balance                   ──► MomentumBalance                 multibody::momentum
 //! revise, work, accept      ──► Drives, sand
@@ -36,13 +37,13 @@
 //! [`crate::problem`], [`crate::solver`], [`crate::integrator`], [`crate::planar`].
 
 pub mod among_grains;
+pub mod block;
 pub mod command;
 pub mod drives;
 pub(crate) mod extent;
 pub mod fitted_theta;
 pub mod grains;
 pub mod gyroscopic;
-pub mod loops;
 mod momentum_balance;
 pub mod planar;
 mod planar_matrices;

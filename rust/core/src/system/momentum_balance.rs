@@ -4,8 +4,9 @@
 use nalgebra::Vector3;
 
 use crate::integrator::Start;
+use crate::multibody::joint::joint_model::JointCoordinates;
 use crate::multibody::momentum::body_momenta;
-use crate::multibody::{Configuration, Joint, Kinematics, Model, Momentum, Tree};
+use crate::multibody::{Joint, LaneConfiguration, Model, Momentum, Poses, Tree};
 
 /// Momenta of all bodies at both ends of a step: scratch.
 #[derive(Clone, Debug)]
@@ -21,7 +22,7 @@ pub(super) struct MomentumBalance {
 pub(super) struct BalanceScene<'a> {
     pub(super) model: &'a Model,
     /// At the midpoint of the step, and at its end.
-    pub(super) kinematics: [&'a Kinematics; 2],
+    pub(super) poses: [&'a Poses<f64>; 2],
     /// m/s².
     pub(super) gravity: &'a Vector3<f64>,
     /// Time step and weight of its end.
@@ -41,13 +42,13 @@ impl MomentumBalance {
         }
     }
 
-    /// Notes the start of a step; `kinematics` there.
-    pub(super) fn begin(&mut self, model: &Model, kinematics: &Kinematics, v: &[f64]) {
-        for (b, c) in self.c_start.iter_mut().enumerate() {
-            *c = kinematics.c(b);
+    /// Notes the start of a step; `poses` there.
+    pub(super) fn begin(&mut self, model: &Model, poses: &Poses<f64>, v: &[f64]) {
+        for (c, pose) in self.c_start.iter_mut().zip(&poses.bodies) {
+            *c = pose.c.into();
         }
         let about = |_| Vector3::zeros();
-        body_momenta(model, kinematics, v, about, &mut self.start);
+        body_momenta(model, poses, v, about, &mut self.start);
     }
 
     /// `y = −(left-hand side)` at the iterate `v_end`, without the forces of joints, sand and
@@ -55,22 +56,26 @@ impl MomentumBalance {
     pub(super) fn residual(
         &mut self,
         scene: &BalanceScene<'_>,
-        start: Start<'_, Configuration>,
+        start: Start<'_, LaneConfiguration<f64>>,
         v_end: &[f64],
         y: &mut [f64],
     ) {
         let BalanceScene {
             model,
-            kinematics: [middle, end],
+            poses: [middle, end],
             gravity,
             h,
             theta,
         } = *scene;
         let origin_of = |tree: &Tree| match model.bodies()[tree.bodies.start].joint {
-            Joint::Free(free) => start.configuration.pose(free).position,
+            Joint::Free(free) => (start.configuration.pose_at(free.pose).0).into(),
             _ => Vector3::zeros(),
         };
-        let end_of = |tree: &Tree| end.origin(tree.bodies.start) - origin_of(tree);
+        let from_start = |poses: &Poses<f64>, tree: &Tree| {
+            let number = model.bodies()[tree.bodies.start].tree;
+            Vector3::from(poses.origin_of(number)) - origin_of(tree)
+        };
+        let end_of = |tree: &Tree| from_start(end, tree);
         let about = |tree: usize| end_of(&model.trees()[tree]);
         body_momenta(model, end, v_end, about, &mut self.end);
         self.sums.copy_from_slice(&self.end);
@@ -81,13 +86,13 @@ impl MomentumBalance {
                 let weight = gravity * (model.bodies()[b].mass * h);
                 // Both mass centres relative to the reference point: the tree's origin at the start
                 // of the step.
-                let centre = (end.c(b) + end_origin) * theta + self.c_start[b] * (1.0 - theta);
+                let centre = (Vector3::from(end.bodies[b].c) + end_origin) * theta
+                    + self.c_start[b] * (1.0 - theta);
                 sum.linear -= begin.linear + weight;
                 sum.angular -= begin.angular + centre.cross(&weight);
             }
         }
-        let middle_of = |tree: &Tree| middle.origin(tree.bodies.start) - origin_of(tree);
-        self.project(model, middle, middle_of, y);
+        self.project(model, middle, |tree| from_start(middle, tree), y);
         for &(k, inertia) in model.armatures() {
             y[k] -= inertia * (v_end[k] - start.v[k]);
         }
@@ -99,7 +104,7 @@ impl MomentumBalance {
     fn project(
         &mut self,
         model: &Model,
-        middle: &Kinematics,
+        middle: &Poses<f64>,
         middle_of: impl Fn(&Tree) -> Vector3<f64>,
         y: &mut [f64],
     ) {
@@ -117,7 +122,7 @@ impl MomentumBalance {
                     }
                 } else {
                     for (y, m) in y[body.velocity..].iter_mut().zip(body.motions()) {
-                        *y -= middle.power(m, &P, &about_middle);
+                        *y -= middle.motions[m].power(P.into(), about_middle.into());
                     }
                 }
                 if let Some(parent) = body.parent {

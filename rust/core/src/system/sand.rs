@@ -28,8 +28,9 @@ use std::sync::Arc;
 use nalgebra::{Vector3, Vector6};
 
 use super::sand_patch::{Layers, Patch, SandScene, SandStep, depth, each};
-use super::sand_wheel::{LaneWheel, PlacedWheel};
+use super::sand_wheel::LaneWheel;
 use super::six::{self, Six};
+use crate::contact::placed_wheel::PlacedWheel;
 use crate::geometry::SoftLayer;
 use crate::multibody::{Factor, MassMatrix, Mechanism};
 use crate::sand::memory::after_step;
@@ -218,7 +219,7 @@ impl<T: Lane> SandContact<T> {
     }
 
     /// Whether the forces are given.
-    pub(super) fn is_given(&self) -> bool {
+    pub(crate) fn is_given(&self) -> bool {
         self.is_given
     }
 

@@ -8,8 +8,9 @@ use std::sync::Arc;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::sand_tangent::{Evaluated, LaneEvaluated, TangentForce, TwistMap};
-use super::sand_wheel::{LanePose, LaneWheel, PlacedWheel};
+use super::sand_wheel::{LanePose, LaneWheel};
 use super::six::{self, SIX, Six, minus, scaled, size};
+use crate::contact::placed_wheel::PlacedWheel;
 use crate::geometry::{SoftLayer, Tangent};
 use crate::multibody::{Factor, Mechanism, Poses};
 use crate::sand::memory::after_step;

@@ -9,8 +9,9 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::sand_wheel::{LanePose, PlacedWheel};
+use super::sand_wheel::LanePose;
 use super::six::{self, SIX, Six, Square, dot, minus, plus, scaled, times};
+use crate::contact::placed_wheel::PlacedWheel;
 use crate::multibody::{MassMatrix, Mechanism, Poses};
 use crate::scalar::{Lane, LaneMask, Vec3};
 

@@ -1,33 +1,32 @@
-//! A multibody tree on a terrain as a mechanical system: the rover.
+//! A multibody tree on a terrain as a mechanical system: a rover whose step is taken with all
+//! effort, or among grains.
 //!
-//! The forces of its joints are implicit ([`super::drives`]). `M̂ = Lᵀ D L` along the tree; the
-//! contact system stores `Z` along each contact's path.
+//! What moves is [`super::tree_lanes`], in the only lane of `f64`; its contacts are a list.
+
+use std::sync::Arc;
 
 use super::command::Command;
-use super::extent::{Turning, displacement, tolerated};
-use super::gyroscopic::Turned;
-use super::loops::{each, placed};
 use super::momentum_balance::BalanceScene;
-use super::sand::{MOST_REVISIONS_IN_SAND, SandContact};
-use super::sand_patch::SandScene;
 use super::tree_scratch::TreeScratch;
+use crate::contact::body_motion::Still;
+use crate::contact::detection::{Moving, detect_parts};
+use crate::contact::loops::each;
+use crate::contact::pair_detection::detect_pairs_of;
+use crate::contact::relocation::relocate_to;
 use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{
-    Activation, Contact, ContactKey, Opposite, Part, clusters_of, detect, detect_limits,
-    detect_pairs, generalized_impulse, joint_friction, list_friction, relocate, relocate_limit,
+    Activation, Contact, ContactKey, Opposite, Part, clusters_of, detect_limits,
+    generalized_impulse, joint_friction, list_friction, relocate_limit,
 };
 use crate::geometry::Terrain;
-use crate::integrator::forces::MOST_REVISIONS;
 use crate::integrator::{
     Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
-use crate::multibody::bias::bias;
-use crate::multibody::energy::energies;
-use crate::multibody::{Configuration, Factor, Model};
+use crate::multibody::{LaneConfiguration, Model};
 use crate::problem::{Dimension, FrictionContactProblem};
-use crate::sand::RutMap;
+use crate::sand::SandState;
 use crate::scalar::Vec3;
 
 impl UnilateralContact for Contact {
@@ -49,245 +48,188 @@ impl UnilateralContact for Contact {
     }
 }
 
-/// A model on a terrain, with its actuator command.
+/// A model on a terrain under a command, in a step.
 pub struct TreeSystem<'a> {
     /// The machine.
-    pub model: &'a Model,
+    pub model: &'a Arc<Model>,
     /// The ground.
-    pub terrain: &'a dyn Terrain,
-    /// Actuator torques and held joints.
-    pub command: &'a Command,
-    /// Where wheels have been in soft ground.
-    pub ruts: Option<&'a RutMap>,
+    pub terrain: &'a Arc<dyn Terrain>,
+    /// What the sand under the machine remembers, but for its ruts: they are with the system.
+    sand: Option<&'a mut SandState>,
     /// Scratch of the system.
     pub parts: &'a mut TreeScratch,
 }
 
-impl TreeSystem<'_> {
+/// What a [`TreeSystem`] is made of.
+pub(crate) struct TreeScene<'a> {
+    pub model: &'a Arc<Model>,
+    pub terrain: &'a Arc<dyn Terrain>,
+    pub command: &'a Command,
+    /// m/s².
+    pub gravity: [f64; 3],
+    /// Work of each drive since the call began (n_joints), J.
+    pub drive_work: &'a [f64],
+    pub sand: Option<&'a mut SandState>,
+}
+
+impl Drop for TreeSystem<'_> {
+    /// Gives the ruts back.
+    fn drop(&mut self) {
+        self.parts.tree.return_ruts(0, self.sand.as_deref_mut());
+    }
+}
+
+impl<'a> TreeSystem<'a> {
+    /// The system at the start of a step.
+    pub(crate) fn new(scene: TreeScene<'a>, parts: &'a mut TreeScratch) -> Self {
+        let TreeScene { model, terrain, .. } = scene;
+        let mut sand = scene.sand;
+        let tree = &mut parts.tree;
+        tree.load_tree(
+            0,
+            (model, terrain),
+            scene.gravity,
+            scene.command,
+            scene.drive_work,
+            sand.as_deref_mut(),
+        );
+        tree.drives.finish_loading();
+        tree.drives.begin_step();
+        tree.is_audited = !tree
+            .sand()
+            .is_some_and(|sand| sand.lanes() && sand.is_given());
+        Self {
+            model,
+            terrain,
+            sand,
+            parts,
+        }
+    }
+
+    /// The machine at the middle of the step, with a velocity (nv).
+    pub(super) fn middle<'v>(&'v self, v: &'v [f64]) -> Still<'v> {
+        Still::new(self.model.mechanism(), &self.parts.tree.poses_middle, v)
+    }
+
+    /// The machine at the predicted end of the step, with a velocity (nv).
+    pub(super) fn end<'v>(&'v self, v: &'v [f64]) -> Still<'v> {
+        Still::new(self.model.mechanism(), &self.parts.tree.poses_end, v)
+    }
+
     /// μ and e of a contact whose two materials have a law of their own.
     #[inline]
     fn between_materials(&self, options: &StepOptions, contact: &Contact) -> Option<[f64; 2]> {
         if options.materials.is_empty() {
             return None;
         }
-        contact.between_materials(self.model, self.terrain, &options.materials)
-    }
-}
-
-impl TreeSystem<'_> {
-    /// The sand with its ground and poses, and the factor of M̂.
-    pub(super) fn sand(
-        &mut self,
-    ) -> Option<(&mut SandContact<f64>, SandScene<'_, f64>, &Factor<f64>)> {
-        (self.parts).sand(self.model, self.terrain.soft(), self.ruts)
+        contact.between_materials(self.model, &**self.terrain, &options.materials)
     }
 
-    /// Rows of contacts at the end pose, and of touches at that of the middle, as
+    /// Rows of contacts at the end of the step, and of touches at its middle, as
     /// [`Contacting::assemble`] builds them. W stays what it was.
     pub(super) fn assemble_rows(&mut self, contacts: &[Contact], touches: &[Contact], v: &[f64]) {
-        let parts = &mut *self.parts;
+        let mechanism = self.model.mechanism();
+        let TreeScratch { tree, system, .. } = &mut *self.parts;
         let placed = [
-            (&parts.kinematics_end, contacts),
-            (&parts.kinematics, touches),
+            (Still::new(mechanism, &tree.poses_end, v), contacts),
+            (Still::new(mechanism, &tree.poses_middle, v), touches),
         ];
-        (parts.system).assemble_rows(self.model, &parts.factor, &placed, v);
-        parts.note_friction(contacts);
-        if let Some(loops) = &mut parts.loops {
-            loops.project_contacts(self.model, &mut parts.system);
+        system.assemble(self.model, &tree.factor, &placed);
+        if let Some(loops) = &mut tree.loops {
+            loops.project_contacts(system);
         }
-    }
-
-    /// Adds what is implicit to the mass matrix and factors it; whether it is positive.
-    fn factor_implicit(&mut self, options: &StepOptions) -> bool {
-        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
-        let mass_matrix = &mut parts.mass_matrix;
-        let add = |k, a| mass_matrix.add_to_diagonal(mechanism, k, a);
-        (parts.drives).add_implicit(mechanism, step(options), add);
-        if let Some(sand) = &mut parts.sand {
-            sand.add_to_mass(mechanism, mass_matrix);
-        }
-        mass_matrix.factorise(mechanism, &mut parts.factor)
-    }
-
-    /// Begins the loops of the step, with the factor of M̂.
-    fn begin_loops(&mut self) {
-        let TreeScratch {
-            loops,
-            kinematics,
-            joints_middle,
-            factor,
-            ..
-        } = &mut *self.parts;
-        if let Some(loops) = loops {
-            let placed = placed(self.model, kinematics, joints_middle);
-            loops.begin(&placed, factor, 0);
-        }
-    }
-
-    /// Adds the impulse of the drives and of the sand to `y`, for a step that ends with the iterate
-    /// `v_end`.
-    #[inline]
-    fn add_actuation(
-        &self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_end: &[f64],
-        y: &mut [f64],
-    ) {
-        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
-        let velocities = [start.v, v_end];
-        (self.parts.drives).add_impulse(mechanism, step(options), places, velocities, y);
-        self.parts.add_sand(options.time_step, v_end, y, false);
-        for (y, force) in y.iter_mut().zip(&self.parts.applied) {
-            *y += options.time_step * force;
-        }
-    }
-
-    /// `y = h (τ − b)` with the bias b at a velocity, and the forces of joints and sand at the
-    /// start of the step. `v_bias`: `None` for the bias at rest, gravity's.
-    #[inline]
-    fn load_with_bias(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_bias: Option<&[f64]>,
-        y: &mut [f64],
-    ) {
-        let parts = &mut *self.parts;
-        let v_bias = v_bias.unwrap_or_else(|| {
-            y.fill(0.0);
-            y
-        });
-        bias(
-            self.model.mechanism(),
-            self.model.inertias(),
-            parts.kinematics.poses(),
-            v_bias,
-            options.gravity.into(),
-            &mut parts.bias_scratch,
-            &mut parts.force,
-        );
-        for (y, f) in y.iter_mut().zip(&parts.force) {
-            *y = -options.time_step * f;
-        }
-        self.add_actuation(options, start, start.v, y);
+        self.parts.note_friction(contacts);
     }
 }
 
 impl Dynamics for TreeSystem<'_> {
     type T = f64;
-    type Configuration = Configuration;
+    type Configuration = LaneConfiguration<f64>;
 
-    #[inline]
     fn nv(&self) -> usize {
         self.model.nv()
     }
 
-    #[inline]
     fn n_clusters(&self) -> usize {
-        self.model.mechanism().n_clusters()
+        self.parts.tree.n_clusters()
     }
 
-    #[inline]
     fn cluster_of_velocity(&self, k: usize) -> usize {
-        self.model.mechanism().cluster_of_velocity(k)
+        self.parts.tree.cluster_of_velocity(k)
     }
 
-    #[inline]
     fn is_held(&self, cluster: usize) -> bool {
-        self.model.mechanism().is_held(cluster)
+        self.parts.tree.is_held(cluster)
     }
 
-    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Configuration, to: &mut Configuration) {
-        if self.n_clusters() > 1 {
-            to.take_clusters(self.model, from, &lanes);
-        } else if lanes(0) {
-            to.clone_from(from);
-        }
+    fn take(
+        &self,
+        lanes: impl Fn(usize) -> bool,
+        from: &LaneConfiguration<f64>,
+        to: &mut LaneConfiguration<f64>,
+    ) {
+        self.parts.tree.take(lanes, from, to);
     }
 
-    #[inline]
-    fn advance(&self, q: &mut Configuration, v: &[f64], h: f64) {
-        q.advance(self.model, v, h);
+    fn set_moved(
+        &self,
+        from: &LaneConfiguration<f64>,
+        v: &[f64],
+        h: f64,
+        to: &mut LaneConfiguration<f64>,
+    ) {
+        self.parts.tree.set_moved(from, v, h, to);
     }
 
-    #[inline]
-    fn is_finite(&self, q: &Configuration) -> bool {
+    fn advance(&self, q: &mut LaneConfiguration<f64>, v: &[f64], h: f64) {
+        self.parts.tree.advance(q, v, h);
+    }
+
+    fn is_finite(&self, q: &LaneConfiguration<f64>) -> bool {
         q.is_finite()
     }
 
-    #[inline]
-    fn normalise(&self, q: &mut Configuration) {
+    fn normalise(&self, q: &mut LaneConfiguration<f64>) {
         q.normalise();
     }
 
-    #[inline]
-    fn place_middle(&mut self, q: &Configuration) {
-        self.parts.place_middle(self.model, q);
+    fn place_middle(&mut self, q: &LaneConfiguration<f64>) {
+        self.parts.tree.place_middle(q);
     }
 
-    #[inline]
-    fn place_end(&mut self, q: &Configuration) {
-        self.parts.place_end(self.model, q);
+    fn place_end(&mut self, q: &LaneConfiguration<f64>) {
+        self.parts.tree.place_end(q);
+        self.parts.joints_end.clone_from(&q.joints);
     }
 
-    #[inline]
-    fn update_mass_matrix(&mut self, options: &StepOptions, _: bool, _: bool) {
-        self.parts.apply(self.model, &self.command.wrenches);
-        if let Some((sand, scene, _)) = self.sand() {
-            sand.linearise(&scene, true, step(options), options.gravity.into());
-        }
-        let (mechanism, parts) = (self.model.mechanism(), &mut *self.parts);
-        let mass_matrix = &mut parts.mass_matrix;
-        mass_matrix.update(mechanism, self.model.inertias(), parts.kinematics.poses());
-        let inertia = |k| mass_matrix.diagonal(mechanism, k);
-        (parts.drives).set_theta(mechanism, step(options), inertia);
+    fn update_mass_matrix(&mut self, options: &StepOptions, going: bool, is_first: bool) {
+        self.parts.tree.update_mass_matrix(options, going, is_first);
     }
 
-    #[inline]
     fn factorise(&mut self, options: &StepOptions) -> bool {
-        if self.factor_implicit(options) {
-            self.begin_loops();
-            return true;
-        }
-        // Tangents of sand whose sizes differ too much leave no factor.
-        let parts = &mut *self.parts;
-        let Some(sand) = &mut parts.sand else {
-            return false;
-        };
-        sand.drop_tangents();
-        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
-        (parts.mass_matrix).update(mechanism, inertias, parts.kinematics.poses());
-        let is_positive = self.factor_implicit(options);
-        self.begin_loops();
-        is_positive
+        let tree = &mut self.parts.tree;
+        tree.factorise(options)
+            || tree.drop_tangents() && {
+                tree.update_mass_matrix(options, true, false);
+                tree.factorise(options)
+            }
     }
 
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        (self.parts.mass_matrix).times(self.model.mechanism(), v, out);
+        self.parts.tree.multiply_mass(v, out);
     }
 
-    #[inline]
     fn turning(
         &mut self,
         options: &StepOptions,
         v: &[f64],
         is_gyroscopic: &mut [bool],
     ) -> Option<f64> {
-        let mut most = 0.0_f64;
-        for (cluster, own) in is_gyroscopic.iter_mut().enumerate() {
-            let turning = Turning::of_cluster(0.0, self.model.mechanism(), v, cluster);
-            *own = turning.is_gyroscopic(options.time_step);
-            most = most.max(turning.of_frames());
-        }
-        Some(most)
+        self.parts.tree.turning(options, v, is_gyroscopic)
     }
 
     fn translation_axis(&self, velocity: usize) -> Option<usize> {
-        let mut trees = self.model.trees().iter();
-        let tree = trees.find(|tree| tree.velocities.contains(&velocity))?;
-        let axis = velocity - tree.velocities.start;
-        (tree.is_free && axis < 3).then_some(axis)
+        self.parts.tree.translation_axis(velocity)
     }
 
     fn conserves_momenta(&self) -> bool {
@@ -295,250 +237,164 @@ impl Dynamics for TreeSystem<'_> {
     }
 
     fn is_audited(&self) -> bool {
-        !self.parts.has_given_sand()
+        self.parts.tree.is_audited
     }
 
     fn energies(
         &mut self,
         options: &StepOptions,
-        q: &Configuration,
+        q: &LaneConfiguration<f64>,
         v: &[f64],
-        mut each: impl FnMut(usize, [f64; 2], Vec3<f64>),
+        each: impl FnMut(usize, [f64; 2], Vec3<f64>),
     ) {
-        let TreeScratch {
-            q: lane,
-            energy: scratch,
-            ..
-        } = &mut *self.parts;
-        lane.set_lane(0, q);
-        let (mechanism, inertias) = (self.model.mechanism(), self.model.inertias());
-        let gravity = options.gravity.into();
-        let found = energies(mechanism, inertias, lane, v, gravity, scratch);
-        for (cluster, own) in found.iter().enumerate() {
-            each(cluster, own.energy.kinetic_and_potential(), own.momentum);
-        }
+        self.parts.tree.energies(options, q, v, each);
     }
 
-    #[inline]
     fn mass(&self, cluster: usize) -> Option<f64> {
-        let model = self.model;
-        Some(model.inertias().mass_of(model.mechanism(), cluster))
+        self.parts.tree.mass(cluster)
     }
 
-    #[inline]
     fn half_solve(&self, y: &mut [f64]) {
-        self.parts.factor.half_solve(self.model.mechanism(), y);
+        self.parts.tree.half_solve(y);
     }
 
-    #[inline]
     fn half_solve_back(&self, y: &mut [f64]) {
-        (self.parts.factor).half_solve_back(self.model.mechanism(), y);
+        self.parts.tree.half_solve_back(y);
     }
 
-    #[inline]
     fn close_velocity(&mut self, options: &StepOptions, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
-        if let Some(loops) = &mut self.parts.loops {
-            loops.close(options.theta, v_begin, v, y);
-        }
+        self.parts.tree.close_velocity(options, v_begin, v, y);
     }
 
     fn add_loop_impulse(&mut self, out: &mut [f64]) {
-        if let Some(loops) = &mut self.parts.loops {
-            loops.add_generalized_impulse(&std::iter::empty(), out);
-        }
+        self.parts.tree.add_loop_impulse(out);
     }
 
-    #[inline]
     fn close_end(
         &mut self,
         lanes: bool,
         p: &[f64],
-        q: &mut Configuration,
+        q: &mut LaneConfiguration<f64>,
         v: &mut [f64],
     ) -> Option<f64> {
-        let TreeScratch {
-            loops,
-            factor,
-            q: lane,
-            ..
-        } = &mut *self.parts;
-        let loops = loops.as_mut().filter(|_| lanes)?;
-        lane.set_lane(0, q);
-        let gap = loops.end(self.model, factor, p, lane, v);
-        lane.to_lane(0, q);
-        Some(gap)
+        if let Some(loops) = &mut self.parts.tree.loops {
+            loops.find_impulses(&each(p));
+        }
+        self.parts.tree.close_end(lanes, p, q, v)
     }
 
     fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
-        let stated = options.penetration_tolerance;
-        tolerated(stated, self.model.mechanism(), cluster)
+        self.parts.tree.tolerated(options, cluster)
     }
 
     fn displacement(&self, y: &[f64], cluster: usize) -> f64 {
-        displacement(0.0, self.model.mechanism(), y, cluster)
+        self.parts.tree.displacement(y, cluster)
     }
 }
 
+/// A start of a step.
+type At<'a> = Start<'a, LaneConfiguration<f64>>;
+
 impl Forces for TreeSystem<'_> {
-    #[inline]
-    fn load(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_mean: &[f64],
-        y: &mut [f64],
-    ) {
-        self.load_with_bias(options, start, Some(v_mean), y);
+    fn begin_load(&mut self, options: &StepOptions, start: At<'_>) {
+        self.parts.tree.begin_load(options, start);
+    }
+
+    fn load(&mut self, options: &StepOptions, start: At<'_>, v_mean: &[f64], y: &mut [f64]) {
+        self.parts.tree.load(options, start, v_mean, y);
     }
 
     fn add_given(&self, options: &StepOptions, impulse: &mut [f64]) {
-        // Given forces are the same at any velocity.
-        (self.parts).add_sand(options.time_step, &self.parts.force, impulse, true);
+        self.parts.tree.add_given(options, impulse);
+    }
+
+    fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [f64]) {
+        self.parts.tree.begin_gyroscopic(options, scratch);
     }
 
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Configuration>,
+        start: At<'_>,
         v_mean: &[f64],
         impulse: &[f64],
         y: &mut [f64],
     ) {
-        self.load_with_bias(options, start, None, y);
-        let (parts, model) = (&mut *self.parts, self.model);
-        let of = Turned {
-            mechanism: model.mechanism(),
-            inertias: model.inertias(),
-            poses: parts.kinematics.poses(),
-            mass_matrix: &parts.mass_matrix,
-        };
-        let velocities = [start.v, v_mean];
-        (parts.gyroscopic).solve(&of, step(options), velocities, impulse, y);
+        let tree = &mut self.parts.tree;
+        tree.load_gyroscopic(options, start, v_mean, impulse, y);
     }
 
-    #[inline]
     fn choose_branches(&mut self, v: &[f64]) {
-        let drives = &mut self.parts.drives;
-        drives.set_lane(0, self.model.joints(), self.command);
-        drives.finish_loading();
-        drives.choose_branches(self.model.mechanism(), v);
-        if let Some(sand) = &mut self.parts.sand {
-            sand.start_from(v);
-        }
+        self.parts.tree.choose_branches(v);
     }
 
-    fn most_revisions(&self, _: usize) -> usize {
-        if self.parts.sand.is_some() {
-            MOST_REVISIONS_IN_SAND
-        } else {
-            MOST_REVISIONS
-        }
+    fn may_revise(&self) -> bool {
+        self.parts.tree.may_revise()
+    }
+
+    fn most_revisions(&self, lane: usize) -> usize {
+        self.parts.tree.most_revisions(lane)
     }
 
     fn unsettled(&mut self, lanes: bool, v_end: &[f64]) -> bool {
-        let tried = self.parts.sand.clone();
-        let is_new = (self.sand())
-            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
-        self.parts.sand = tried;
-        is_new && lanes
+        self.parts.tree.unsettled(lanes, v_end)
     }
 
-    fn revise(&mut self, _: bool, v: &[f64], v_end: &[f64]) -> bool {
-        let mechanism = self.model.mechanism();
-        let is_new = (self.parts.drives).revise(mechanism, true, v, v_end);
-        let is_new_in_sand = (self.sand())
-            .is_some_and(|(sand, scene, factor)| sand.revise(&scene, true, factor, v_end));
-        is_new | is_new_in_sand
+    fn revise(&mut self, lanes: bool, v: &[f64], v_end: &[f64]) -> bool {
+        self.parts.tree.revise(lanes, v, v_end)
     }
 
-    fn work(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Configuration>,
-        v_end: &[f64],
-        out: &mut [Work],
-    ) {
-        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
-        let velocities = [start.v, v_end];
-        (self.parts.drives).work(mechanism, step(options), places, velocities, out);
-        let mut of_sand = std::mem::take(&mut self.parts.of_sand);
-        of_sand.clear();
-        of_sand.resize(out.len(), 0.0);
-        if let Some((sand, scene, _)) = self.sand() {
-            sand.work(mechanism, &scene.layers, velocities, &mut of_sand);
-        }
-        for (cluster, (work, of_sand)) in out.iter_mut().zip(&of_sand).enumerate() {
-            let own = 0..self.parts.applied.len();
-            let own = own.filter(|&k| mechanism.cluster_of_velocity(k) == cluster);
-            let power = own.map(|k| {
-                let mean = options.theta * v_end[k] + (1.0 - options.theta) * start.v[k];
-                self.parts.applied[k] * mean
-            });
-            work.supplied += options.time_step * power.sum::<f64>();
-            work.damped -= *of_sand;
-        }
-        self.parts.of_sand = of_sand;
+    fn work(&mut self, options: &StepOptions, start: At<'_>, v_end: &[f64], out: &mut [Work]) {
+        self.parts.tree.work(options, start, v_end, out);
     }
 
-    fn stored(&self, q: &Configuration, out: &mut [f64]) {
-        let mechanism = self.model.mechanism();
-        (self.parts.drives).stored(mechanism, 0.0, &q.joints, out);
+    fn stored(&self, q: &LaneConfiguration<f64>, out: &mut [f64]) {
+        self.parts.tree.stored(q, out);
     }
 
     fn work_of_displacement(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Configuration>,
+        start: At<'_>,
         v_end: &[f64],
         displacement: &[f64],
     ) -> Option<f64> {
-        let (mechanism, places) = (self.model.mechanism(), &start.configuration.joints);
-        let motion = [start.v, v_end, displacement];
-        let applied = self.parts.applied.iter().zip(displacement);
-        let of_wrenches = applied.map(|(force, way)| force * way).sum::<f64>();
-        let drives = &self.parts.drives;
-        let of_drives = drives.work_of_displacement(mechanism, step(options), places, motion);
-        Some(of_wrenches + of_drives)
+        let tree = &mut self.parts.tree;
+        tree.work_of_displacement(options, start, v_end, displacement)
     }
 
-    #[inline]
     fn accept(&mut self, lanes: bool) {
-        if !lanes {
-            return;
-        }
-        let parts = &mut *self.parts;
-        parts.drives.accept_part();
-        if let Some(sand) = &mut parts.sand {
-            sand.accept(true);
+        if lanes {
+            self.parts.tree.accept_part();
         }
     }
 
-    fn begin_balance(&mut self, start: Start<'_, Configuration>) {
-        let parts = &mut *self.parts;
-        (parts.kinematics).update_for_step(self.model, start.configuration);
-        (parts.balance).begin(self.model, &parts.kinematics, start.v);
+    fn begin_balance(&mut self, start: At<'_>) {
+        let TreeScratch { tree, balance, .. } = &mut *self.parts;
+        tree.place_middle(start.configuration);
+        balance.begin(self.model, &tree.poses_middle, start.v);
     }
 
     /// In momentum form, exact at both ends; see [`crate::integrator::moreau_jean_newton`].
     fn balance(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Configuration>,
+        start: At<'_>,
         v_end: &[f64],
         _v_mean: &[f64],
         _scratch: &mut [f64],
         y: &mut [f64],
     ) {
-        let parts = &mut *self.parts;
+        let TreeScratch { tree, balance, .. } = &mut *self.parts;
         let scene = BalanceScene {
             model: self.model,
-            kinematics: [&parts.kinematics, &parts.kinematics_end],
+            poses: [&tree.poses_middle, &tree.poses_end],
             gravity: &options.gravity,
             h: options.time_step,
             theta: options.theta,
         };
-        parts.balance.residual(&scene, start, v_end, y);
-        self.add_actuation(options, start, v_end, y);
+        balance.residual(&scene, start, v_end, y);
+        tree.actuate(options, start, v_end, y);
     }
 }
 
@@ -551,53 +407,47 @@ impl Contacting for TreeSystem<'_> {
         clusters_of(self.model, key)
     }
 
-    #[inline]
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Contact>) {
-        self.parts.unknown_ground = detect(
-            self.model,
-            &self.parts.kinematics,
-            &self.parts.kinematics_end,
-            self.terrain,
-            v,
-            &activation,
-            out,
-        );
-        for contact in out.iter_mut() {
-            turn_to_rollers(self.model, contact);
-        }
+        let model = &**self.model;
         let TreeScratch {
-            kinematics,
+            tree,
             pairs,
-            joints_middle,
+            unknown_ground,
             ..
         } = &mut *self.parts;
-        detect_pairs(self.model, kinematics, v, &activation, pairs, out);
-        detect_limits(self.model, kinematics, joints_middle, v, &activation, out);
-        list_friction(self.model, kinematics, out);
+        let at = |poses| Still::new(model.mechanism(), poses, v);
+        let (middle, end) = (at(&tree.poses_middle), at(&tree.poses_end));
+        let machine = Moving {
+            model,
+            middle: &middle,
+            end: &end,
+        };
+        out.clear();
+        let parts = Part::all(model);
+        *unknown_ground = detect_parts(parts, &machine, &**self.terrain, &activation, out);
+        for contact in out.iter_mut() {
+            turn_to_rollers(model, contact);
+        }
+        detect_pairs_of(model, &middle, &activation, pairs, out);
+        detect_limits(model, &middle, &tree.joints_middle, &activation, out);
+        list_friction(model, &middle, out);
     }
 
     fn unknown_ground(&self) -> Option<[f64; 2]> {
         self.parts.unknown_ground
     }
 
-    #[inline]
     fn relocate(&mut self, contacts: &mut [Contact]) {
-        let parts = &*self.parts;
+        let (model, end) = (&**self.model, self.end(&[]));
         for contact in contacts {
             if contact.key.opposite == Opposite::Stop {
-                relocate_limit(
-                    self.model,
-                    &parts.kinematics_end,
-                    &parts.joints_end,
-                    contact,
-                );
+                relocate_limit(model, &end, &self.parts.joints_end, contact);
             } else {
-                relocate(self.model, &parts.kinematics_end, self.terrain, contact);
+                relocate_to(model, &end, &**self.terrain, contact);
             }
         }
     }
 
-    #[inline]
     fn friction_coefficient(&self, options: &StepOptions, contact: &Contact) -> f64 {
         match contact.key.opposite {
             Opposite::Stop if joint_friction::joint_of(contact).is_some() => 1.0,
@@ -609,7 +459,6 @@ impl Contacting for TreeSystem<'_> {
         }
     }
 
-    #[inline]
     fn normal_shift(&self, options: &StepOptions, contact: &Contact, u_N_before: f64) -> f64 {
         if let Some(joint) = joint_friction::joint_of(contact) {
             let most = options.time_step * self.model.joints()[joint].passive.friction;
@@ -619,13 +468,12 @@ impl Contacting for TreeSystem<'_> {
         rebound(of_pair.map_or(options.restitution, |[_, e]| e), u_N_before)
     }
 
-    #[inline]
     fn yields(&self) -> bool {
         self.model.has_compliance()
     }
 
     fn compliance(&self, contact: &Contact, v: &[f64]) -> Option<Compliance> {
-        let (model, poses) = (self.model, self.parts.kinematics.poses());
+        let (model, poses) = (&**self.model, &self.parts.tree.poses_middle);
         let of = |part: Part| {
             let (tread, wheel) = part.tread(model)?;
             let n = contact.frame.n.into();
@@ -638,48 +486,36 @@ impl Contacting for TreeSystem<'_> {
         self.parts.system.soften(diagonal);
     }
 
-    #[inline]
     fn assemble(&mut self, contacts: &[Contact], v: &[f64], u: &mut [f64]) {
         self.assemble_rows(contacts, &[], v);
         self.parts.system.multiply(self.model);
         u.copy_from_slice(&self.parts.system.u);
     }
 
-    #[inline]
     fn is_immovable(&self, contact: usize) -> bool {
         self.parts.system.is_immovable(contact)
     }
 
-    #[inline]
     fn local(&self, y: &[f64], out: &mut [f64]) {
         self.parts.system.local(self.model, y, out);
     }
 
-    #[inline]
     fn add_local_of_velocity(&self, contacts: &[Contact], v: &[f64], out: &mut [f64]) {
-        self.parts.system.add_local_of_velocity(
-            self.model,
-            &self.parts.kinematics_end,
-            (0, contacts),
-            v,
-            out,
-        );
+        let (system, end) = (&self.parts.system, self.end(v));
+        system.add_local_of_velocity(self.model, &end, (0, contacts), out);
     }
 
-    #[inline]
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
         self.parts.system.add_impulses(self.model, p, y);
-        if let Some(loops) = &self.parts.loops {
+        if let Some(loops) = &self.parts.tree.loops {
             loops.answer(&each(p), y);
         }
     }
 
-    #[inline]
     fn generalized_impulse(&self, contacts: &[Contact], p: &[f64], out: &mut [f64]) {
-        generalized_impulse(self.model, &self.parts.kinematics_end, contacts, p, out);
+        generalized_impulse(self.model, &self.parts.tree.poses_end, contacts, p, out);
     }
 
-    #[inline]
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
     }
@@ -698,10 +534,4 @@ impl Contacting for TreeSystem<'_> {
             _ => 1.0,
         }
     }
-}
-
-/// h and θ.
-#[inline]
-fn step(options: &StepOptions) -> (f64, f64) {
-    (options.time_step, options.theta)
 }

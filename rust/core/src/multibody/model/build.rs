@@ -112,7 +112,7 @@ impl Model {
             rubbing,
             joint_velocities,
             trees,
-            mechanism,
+            mechanism: Arc::new(mechanism),
             inertias,
             joints,
             description,
@@ -138,7 +138,7 @@ impl Model {
             (trees, closure.holds_the_world())
         });
         let tied: Vec<(Vec<usize>, bool)> = tied.collect();
-        self.mechanism.tie(&tied);
+        Arc::make_mut(&mut self.mechanism).tie(&tied);
         self.find_levers();
         Ok(self)
     }

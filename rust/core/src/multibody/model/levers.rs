@@ -4,6 +4,8 @@
 //! upper bounds in any configuration, found once when the model is built; they grow with the
 //! machine.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::Model;
@@ -149,11 +151,12 @@ impl Model {
                 lever.arm = if size > 0.0 { size } else { 1.0 };
             }
         }
-        for own in &mut self.mechanism.joints {
+        let mechanism = Arc::make_mut(&mut self.mechanism);
+        for own in &mut mechanism.joints {
             let same = levers.iter().filter(|lever| lever.first == own.velocity);
             own.arm = same.map(|lever| lever.arm).fold(0.0, f64::max);
         }
-        self.mechanism.levers = levers;
-        self.mechanism.sizes = sizes;
+        mechanism.levers = levers;
+        mechanism.sizes = sizes;
     }
 }

@@ -43,7 +43,7 @@ pub struct Model {
     description: ModelDescription,
     bodies: Vec<Body>,
     trees: Vec<Tree>,
-    mechanism: Mechanism,
+    mechanism: Arc<Mechanism>,
     inertias: Inertias<f64>,
     frames: Vec<Frame>,
     wheels: Vec<Wheel>,
@@ -127,7 +127,7 @@ impl Model {
     /// The bodies and joints, as the sources of the dynamics read them.
     #[inline]
     #[must_use]
-    pub fn mechanism(&self) -> &Mechanism {
+    pub fn mechanism(&self) -> &Arc<Mechanism> {
         &self.mechanism
     }
 

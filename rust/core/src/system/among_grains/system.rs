@@ -8,7 +8,7 @@ use crate::integrator::{
     Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
-use crate::multibody::Configuration;
+use crate::multibody::LaneConfiguration;
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
 };
@@ -29,7 +29,7 @@ pub struct TreeAmongGrains<'a> {
     pub parts: &'a mut CompositeScratch,
 }
 
-type Both = (Vec<f64>, Configuration);
+type Both = (Vec<f64>, LaneConfiguration<f64>);
 
 /// Report of the harder of two solves, with the work of both.
 fn harder(a: &SolveReport, b: &SolveReport) -> SolveReport {
@@ -61,7 +61,7 @@ impl TreeAmongGrains<'_> {
     fn starts<'q>(
         &self,
         start: Start<'q, Both>,
-    ) -> (Start<'q, Vec<f64>>, Start<'q, Configuration>) {
+    ) -> (Start<'q, Vec<f64>>, Start<'q, LaneConfiguration<f64>>) {
         let ((q_a, q_b), (v_a, v_b)) = (start.configuration, self.halves(start.v));
         let of_grains = Start {
             configuration: q_a,
@@ -100,7 +100,10 @@ impl TreeAmongGrains<'_> {
         pairs.width = model.nv();
         pairs.n_coordinates = pairs.machine_at + pairs.width;
         for c in 0..pairs.machine.len() {
-            (self.tree.parts.system).push_dense_rows(model, c, &mut pairs.rows);
+            let rows = self.tree.parts.system.free_rows(c);
+            for k in 0..3 {
+                pairs.rows.extend(rows.iter().map(|z| z[k]));
+            }
         }
         self.push_diagonal(pairs);
     }
@@ -236,6 +239,12 @@ impl Dynamics for TreeAmongGrains<'_> {
 }
 
 impl Forces for TreeAmongGrains<'_> {
+    fn begin_load(&mut self, options: &StepOptions, start: Start<'_, Both>) {
+        let (start_a, start_b) = self.starts(start);
+        self.bed.begin_load(options, start_a);
+        self.tree.begin_load(options, start_b);
+    }
+
     fn load(
         &mut self,
         options: &StepOptions,
@@ -247,6 +256,14 @@ impl Forces for TreeAmongGrains<'_> {
         let ((v_a, v_b), (y_a, y_b)) = (self.halves(v_mean), self.halves_mut(y));
         self.bed.load(options, start_a, v_a, y_a);
         self.tree.load(options, start_b, v_b, y_b);
+    }
+
+    fn add_given(&self, options: &StepOptions, impulse: &mut [f64]) {
+        self.tree.add_given(options, &mut impulse[self.bed.nv()..]);
+    }
+
+    fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [f64]) {
+        (self.tree).begin_gyroscopic(options, &mut scratch[self.bed.nv()..]);
     }
 
     fn load_gyroscopic(
@@ -441,9 +458,9 @@ impl Contacting for TreeAmongGrains<'_> {
         self.bed.add_local_of_velocity(&parts.of_grains, v_a, out_a);
         tree.add_local_of_velocity(&parts.of_tree, v_b, out_b);
         let first = parts.of_tree.len();
-        let (system, kinematics) = (&tree.parts.system, &tree.parts.kinematics);
         let (touches, touched) = ((first, &parts.contacts[..]), &mut out_b[3 * first..]);
-        system.add_local_of_velocity(tree.model, kinematics, touches, v_b, touched);
+        let system = &tree.parts.system;
+        system.add_local_of_velocity(tree.model, &tree.middle(v_b), touches, touched);
         self.subtract_points(&parts.touches, v_a, touched);
     }
 
@@ -466,8 +483,8 @@ impl Contacting for TreeAmongGrains<'_> {
         (self.bed).generalized_impulse(&parts.of_grains, p_a, out_a);
         tree.generalized_impulse(&parts.of_tree, p_b, out_b);
         let mut own = vec![0.0; out_b.len()];
-        let kinematics = &tree.parts.kinematics;
-        generalized_impulse(tree.model, kinematics, &parts.contacts, touches, &mut own);
+        let poses = &tree.parts.tree.poses_middle;
+        generalized_impulse(tree.model, poses, &parts.contacts, touches, &mut own);
         for (out, own) in out_b.iter_mut().zip(own) {
             *out += own;
         }

@@ -4,6 +4,7 @@
 use nalgebra::Vector3;
 
 use super::contact::GrainTouch;
+use crate::contact::body_motion::{BodyMotion, Still};
 use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{Activation, Contact, ContactFrame, ContactKey, Part};
 use crate::geometry::query::{dispatch, pairs};
@@ -33,16 +34,16 @@ pub(super) fn find(
     touches: &mut Vec<GrainTouch>,
 ) {
     touches.clear();
-    let (model, kinematics) = (tree.model, &tree.parts.kinematics);
+    let (model, middle) = (tree.model, tree.middle(v.1));
     let grains = &bed.scene.grains;
     #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
     let n = grains.len() as u32;
     for part in Part::all(model) {
-        let shape = part.place(model, kinematics);
-        let speed = approach(tree, part, &shape, v.1).max(bed.parts.search.fastest);
+        let shape = part.placed(model, &middle);
+        let speed = approach(&middle, part.body(model), &shape).max(bed.parts.search.fastest);
         let sizes = [grains.smallest(), grains.largest()];
         let search = Search::new(&activation, sizes, speed);
-        let origin = *kinematics.origin(part.body(model));
+        let origin = middle.origin(part.body(model));
         let centre = origin + shape.centre();
         gather(bed, (&centre, &extent(&shape)), search.reach, near);
         for grain in &*near {
@@ -66,7 +67,7 @@ pub(super) fn find(
                     gap_start: point.gap,
                 };
                 turn_to_rollers(model, &mut touch.contact);
-                if search.admits(point.gap, approach_of(bed, tree, &touch, v)) {
+                if search.admits(point.gap, approach_of(bed, &middle, &touch, v.0)) {
                     touches.push(touch);
                 }
             });
@@ -81,12 +82,12 @@ pub(super) fn gap_at_end(
     tree: &TreeSystem<'_>,
     touch: &GrainTouch,
 ) -> f64 {
-    let (model, kinematics) = (tree.model, &tree.parts.kinematics_end);
+    let (model, end) = (tree.model, tree.end(&[]));
     let (part, i) = (touch.contact.part, touch.grain() as usize);
     let centre = Vector3::from_column_slice(&bed.parts.end[COORDINATES * i..][..3]);
-    let origin = kinematics.origin(part.body(model));
+    let origin = end.origin(part.body(model));
     let ball = ball(centre - origin, bed.scene.grains.radius()[i]);
-    dispatch::nearest_points(&ball, &part.place(model, kinematics)).gap
+    dispatch::nearest_points(&ball, &part.placed(model, &end)).gap
 }
 
 fn ball(centre: Vector3<f64>, radius: f64) -> PlacedShape<'static> {
@@ -94,27 +95,21 @@ fn ball(centre: Vector3<f64>, radius: f64) -> PlacedShape<'static> {
 }
 
 /// Normal velocity of a touch's two sides, m/s.
-fn approach_of(
-    bed: &GrainSystem<'_, 3>,
-    tree: &TreeSystem<'_>,
-    touch: &GrainTouch,
-    (v_a, v_b): (&[f64], &[f64]),
-) -> f64 {
+fn approach_of(bed: &GrainSystem<'_, 3>, middle: &Still<'_>, touch: &GrainTouch, v: &[f64]) -> f64 {
     let Contact {
         body, point, frame, ..
     } = &touch.contact;
-    let own = (tree.parts.kinematics).point_velocity(tree.model, *body, point, v_b);
+    let own = middle.point_velocity(*body, point);
     let mut u = [frame.n.dot(&own), 0.0, 0.0];
-    bed.subtract_point(touch.pushed(), v_a, &frame.rows(), &mut u);
+    bed.subtract_point(touch.pushed(), v, &frame.rows(), &mut u);
     u[0]
 }
 
 /// Upper bound on the speed at which a point of a part's surface approaches anything, m/s. The spin
 /// of a wheel about its axle moves its surface within itself.
-fn approach(tree: &TreeSystem<'_>, part: Part, shape: &PlacedShape<'_>, v: &[f64]) -> f64 {
-    let (model, kinematics) = (tree.model, &tree.parts.kinematics);
-    let (body, centre) = (part.body(model), shape.centre());
-    let velocity = |x: &Vector3<f64>| kinematics.point_velocity(model, body, x, v);
+fn approach(middle: &Still<'_>, body: usize, shape: &PlacedShape<'_>) -> f64 {
+    let centre = shape.centre();
+    let velocity = |x: &Vector3<f64>| middle.point_velocity(body, x);
     let at_centre = velocity(&centre);
     let turning = |e: &Vector3<f64>| (velocity(&(centre + e)) - at_centre).norm();
     let turning = match shape {

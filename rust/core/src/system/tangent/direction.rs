@@ -2,8 +2,8 @@
 
 use super::held_tree::TangentScene;
 use super::scratch::Tangent;
+use crate::contact::loops::Projector;
 use crate::scalar::{Dual, Lane};
-use crate::system::loops::Projector;
 
 /// A direction in which a step is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -83,29 +83,26 @@ impl TreeScratch {
     /// Gives the next steps the forces of the sand, see [`SandContact::give`]. Wheels leave no
     /// ruts.
     pub(crate) fn give_sand(&mut self, wrenches: Option<&[Option<Vector6<f64>>]>) {
-        if let Some(sand) = &mut self.sand {
-            sand.ruts_stay = true;
-            sand.give(0, wrenches);
-        }
+        self.tree.give_sand(0, wrenches);
     }
 
     /// Whether each wheel touched the sand in the last step, and whether that had nothing left to
     /// give.
     pub(crate) fn modes_of_sand(&self) -> Vec<[bool; 2]> {
-        let sand = self.sand.as_deref();
         let modes = |sand: &SandContact<f64>| -> Vec<[bool; 2]> {
             let patches = sand.patches.iter();
             (patches.map(|patch| [patch.force.is_touching, patch.is_empty])).collect()
         };
-        sand.map(modes).unwrap_or_default()
+        self.tree.sand().map(modes).unwrap_or_default()
     }
 }
 
 impl TreeSystem<'_> {
     /// How far the given forces of the step that was just taken are from those at its end, wheel by
     /// wheel. The system was loaded with the sand as it was before the step.
-    pub(crate) fn sand_errors(&mut self) -> Vec<SandError> {
-        let Some((sand, scene, _)) = self.sand() else {
+    pub(crate) fn sand_errors(&self) -> Vec<SandError> {
+        let tree = &self.parts.tree;
+        let (Some(sand), scene) = (tree.sand(), tree.sand_scene()) else {
             return Vec::new();
         };
         let ground = scene.ground(0);
@@ -125,12 +122,12 @@ impl TreeSystem<'_> {
 
     /// The sand of that step; none on firm ground. `numbers`: indices of numbers of the soil.
     pub(crate) fn hold_sand(
-        &mut self,
+        &self,
         options: &StepOptions,
         step: &HeldStep<Contact>,
         numbers: &[usize],
     ) -> Option<HeldSand> {
-        let (sand, scene, _) = self.sand()?;
+        let (sand, scene) = (self.parts.tree.sand()?, self.parts.tree.sand_scene());
         let ground = scene.ground(0)?;
         let (v_end, length) = (sand.guess.clone(), sand.step.length);
         let held = sand.patches.iter().map(|patch| {
@@ -182,7 +179,7 @@ impl TreeSystem<'_> {
     }
 
     fn twist_of(&self, wheel: usize, v: &[f64]) -> Six<f64> {
-        let sand = self.parts.sand.as_ref();
+        let sand = self.parts.tree.sand();
         sand.map_or([0.0; SIX], |sand| sand.patches[wheel].map.twist(v))
     }
 
@@ -197,11 +194,11 @@ impl TreeSystem<'_> {
         let mut unit = [0.0; SIX];
         unit[component] = 1.0;
         let mut y = vec![0.0; self.nv()];
-        if let Some(sand) = &self.parts.sand {
+        if let Some(sand) = self.parts.tree.sand() {
             (sand.patches[wheel].map).add_impulse(&unit, options.time_step, &mut y);
         }
         self.half_solve(&mut y);
-        if let Some(loops) = &self.parts.loops {
+        if let Some(loops) = &self.parts.tree.loops {
             loops.restrict(&mut y);
         }
         let mut du = vec![0.0; step.law.p.len()];

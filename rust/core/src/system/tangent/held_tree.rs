@@ -5,10 +5,10 @@ use std::sync::Arc;
 use super::held_sand::HeldSand;
 use crate::contact::contact_slope::ContactSlope;
 use crate::contact::{Contact, Opposite, Part};
-use crate::geometry::Terrain;
 use crate::integrator::held_step::HeldStep;
 use crate::integrator::{Contacting, Dynamics, ScratchOf, Start, StepOptions};
-use crate::multibody::{Configuration, Model};
+use crate::multibody::{Configuration, LaneConfiguration, Model};
+use crate::scalar::Single;
 use crate::system::TreeSystem;
 use crate::system::command::Command;
 
@@ -55,23 +55,24 @@ impl TreeSystem<'_> {
         ws: &ScratchOf<Self>,
         numbers: &[usize],
     ) -> Option<HeldTree> {
-        let (model, terrain): (&Model, &dyn Terrain) = (self.model, self.terrain);
         let step = self.hold_step(options, ws)?;
-        let is_soft = terrain.soft().is_some();
+        let is_soft = self.terrain.soft().is_some();
         let sand = self.hold_sand(options, &step, numbers);
         if sand.is_none() && is_soft {
             return None;
         }
-        let mut q = start.configuration.clone();
+        let mut q = LaneConfiguration::new(Single::best(), self.model.mechanism());
+        q.set_lane(0, start.configuration);
         self.advance(&mut q, start.v, options.time_step);
         self.place_end(&q);
+        let end = self.end(&[]);
         let contacts = step.contacts.iter().enumerate().map(|(i, contact)| {
             let joint = match contact.part {
                 Part::Limit(joint, _) | Part::Friction(joint) => Some(joint),
                 _ => None,
             };
             HeldContact {
-                slope: ContactSlope::of(model, &self.parts.kinematics_end, terrain, contact),
+                slope: ContactSlope::of(self.model, end, &**self.terrain, contact),
                 restitution: self.normal_shift(options, contact, 1.0),
                 is_soft: step.yields.get(i).is_some_and(|yields| *yields),
                 joint,
@@ -94,7 +95,7 @@ impl TreeSystem<'_> {
             let pairs = &options.materials;
             contact.key.opposite != Opposite::Stop
                 && (pairs.is_empty()
-                    || (contact.between_materials(self.model, self.terrain, pairs)).is_none())
+                    || (contact.between_materials(self.model, &**self.terrain, pairs)).is_none())
         };
         HeldStep::of(self, options, ws, is_common)
     }

@@ -8,6 +8,7 @@ use super::held_tree::TangentScene;
 use super::sand::n_of_sand;
 use super::scratch::Tangent;
 use super::varying_sand::VaryingSand;
+use crate::contact::placed_wheel::PlacedWheel;
 use crate::integrator::NoProbe;
 use crate::integrator::audit::note_energies;
 use crate::integrator::held_step::SAME;
@@ -15,7 +16,6 @@ use crate::integrator::projection::set_gaps;
 use crate::integrator::scheme::{Next, conclude, finish, prepare};
 use crate::multibody::Configuration;
 use crate::scalar::{Dual, Lane, LaneMask};
-use crate::system::sand_wheel::PlacedWheel;
 
 /// Relative difference of velocities that is rounding.
 const ROUNDING: f64 = 1e-13;

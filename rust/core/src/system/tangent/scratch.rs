@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::held_system::{Held, HeldAnswer, HeldParts};
+use crate::contact::loops::Loops;
 use crate::integrator::data::{Data, DataOf};
 use crate::multibody::{LaneConfiguration, Model};
 use crate::scalar::{Dual, Lane};
 use crate::system::drives::Drives;
-use crate::system::loops::Loops;
 use crate::system::tree_lanes::TreeLanes;
 
 /// Passes with the lanes of `T`.
@@ -26,7 +26,7 @@ pub(crate) struct Tangent<T: Lane> {
 impl<T: Lane> Tangent<T> {
     /// Room for a machine.
     pub(crate) fn new(token: T::Token, model: &Model) -> Self {
-        let mechanism = Arc::new(model.mechanism().clone());
+        let mechanism = Arc::clone(model.mechanism());
         let mut tree = TreeLanes::new(token, &mechanism, &[], Vec::new(), 0);
         tree.loops = Loops::new(token, &mechanism, model.loops(), 1);
         let base = LaneConfiguration::new(token, &mechanism);

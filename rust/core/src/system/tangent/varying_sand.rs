@@ -1,11 +1,12 @@
 //! Wheels in sand with their derivatives: their forces, and what the sand remembers of them.
 
 use super::held_sand::{HeldSand, HeldWheel, REST};
+use crate::contact::placed_wheel::PlacedWheel;
 use crate::multibody::Mechanism;
 use crate::sand::memory::{after_way, rate};
 use crate::scalar::{Dual, Lane, Vec3};
 use crate::system::sand_tangent::TwistMap;
-use crate::system::sand_wheel::{LanePose, PlacedWheel};
+use crate::system::sand_wheel::LanePose;
 use crate::system::six::{self, SIX, Six};
 
 /// A wheel with its derivatives.

@@ -1,14 +1,13 @@
 //! The dynamics of trees in lanes.
 
-use super::{Implicit, TreeLanes};
+use super::TreeLanes;
+use crate::contact::loops::Projector;
 use crate::integrator::{Dynamics, StepOptions};
+use crate::multibody::LaneConfiguration;
 use crate::multibody::energy::energies;
 use crate::multibody::loops::Placed;
-use crate::multibody::{LaneConfiguration, MassMatrix};
 use crate::scalar::{Lane, LaneMask, Vec3};
 use crate::system::extent::{Turning, displacement, tolerated};
-use crate::system::gyroscopic::Gyroscopic;
-use crate::system::loops::Projector;
 
 impl<T: Lane> TreeLanes<T> {
     /// Adds the implicit terms of motors, held joints, springs, dampers and sand to M.
@@ -27,19 +26,6 @@ impl<T: Lane> TreeLanes<T> {
         if let Some(sand) = &mut self.sand {
             sand.add_to_mass(machine, mass_matrix);
         }
-    }
-
-    /// Keeps M̂, which its factor replaces, for implicit gyroscopic terms.
-    fn keep_mass_matrix(&mut self) {
-        let (token, machine) = (self.token, &*self.mechanism);
-        let own = self.implicit.get_or_insert_with(|| {
-            Box::new(Implicit {
-                solver: Gyroscopic::new(token),
-                mass_matrix: MassMatrix::new(token, machine),
-                given: vec![T::splat(token, 0.0); machine.nv()],
-            })
-        });
-        own.mass_matrix.clone_from(&self.mass_matrix);
     }
 }
 
@@ -137,12 +123,12 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
 
     fn factorise(&mut self, options: &StepOptions) -> T::Mask {
         self.add_implicit(options);
-        if self.turns {
-            self.keep_mass_matrix();
-        }
-        let is_definite = self
-            .mass_matrix
-            .factorise_in_place(&self.mechanism, &mut self.factor);
+        let (mechanism, mass_matrix) = (&*self.mechanism, &mut self.mass_matrix);
+        let is_definite = if self.turns | self.may_turn {
+            mass_matrix.factorise(mechanism, &mut self.factor)
+        } else {
+            mass_matrix.factorise_in_place(mechanism, &mut self.factor)
+        };
         if let Some(loops) = &mut self.loops {
             let placed = Placed {
                 mechanism: &self.mechanism,

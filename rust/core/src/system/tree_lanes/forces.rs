@@ -1,13 +1,40 @@
 //! The forces on trees in lanes, without those of contacts.
 
-use super::TreeLanes;
+use super::{Implicit, TreeLanes};
 use crate::integrator::{Forces, StartOf, StepOptions, Work};
 use crate::multibody::LaneConfiguration;
 use crate::multibody::bias::bias;
 use crate::scalar::Lane;
-use crate::system::gyroscopic::Turned;
+use crate::system::gyroscopic::{Gyroscopic, Turned};
+
+impl TreeLanes<f64> {
+    /// A part of the step becomes the state: its impulses and work are added to those of the parts
+    /// before it.
+    pub fn accept_part(&mut self) {
+        self.drives.accept_part();
+        if let Some(sand) = &mut self.sand {
+            sand.accept(true);
+        }
+    }
+}
 
 impl<T: Lane> TreeLanes<T> {
+    /// Adds the impulse of drives, sand and wrenches over a step that ends with the iterate
+    /// `v_end`.
+    #[inline(always)]
+    pub fn actuate(
+        &self,
+        options: &StepOptions,
+        start: StartOf<'_, Self>,
+        v_end: &[T],
+        out: &mut [T],
+    ) {
+        let (step, places) = (self.step(options), &start.configuration.joints);
+        (self.drives).add_impulse(&self.mechanism, step, places, [start.v, v_end], out);
+        self.push_with_sand(options, v_end, out, false);
+        self.push(step.0, out);
+    }
+
     /// `y` = the bias at a velocity.
     fn weigh(&mut self, v: &[T], y: &mut [T]) {
         bias(
@@ -25,15 +52,10 @@ impl<T: Lane> TreeLanes<T> {
 impl<T: Lane> Forces for TreeLanes<T> {
     #[inline(always)]
     fn begin_load(&mut self, options: &StepOptions, start: StartOf<'_, Self>) {
-        let step = self.step(options);
-        self.torque.fill(step.0.like(0.0));
-        let (machine, torque) = (&*self.mechanism, &mut self.torque);
-        let (places, v) = (&start.configuration.joints, start.v);
-        (self.drives).add_impulse(machine, step, places, [v, v], torque);
-        if let Some(sand) = &self.sand {
-            sand.add_impulse(options.time_step, v, torque);
-        }
-        self.push(step.0);
+        let mut torque = std::mem::take(&mut self.torque);
+        torque.fill(self.number(0.0));
+        self.actuate(options, start, start.v, &mut torque);
+        self.torque = torque;
     }
 
     fn load(&mut self, options: &StepOptions, _: StartOf<'_, Self>, v_mean: &[T], y: &mut [T]) {
@@ -51,17 +73,21 @@ impl<T: Lane> Forces for TreeLanes<T> {
     }
 
     #[inline(always)]
-    fn add_given(&self, _: &StepOptions, impulse: &mut [T]) {
+    fn add_given(&self, options: &StepOptions, impulse: &mut [T]) {
         for (impulse, given) in impulse.iter_mut().zip(&self.given) {
             *impulse += *given;
         }
+        self.push_with_sand(options, &self.torque, impulse, true);
     }
 
     fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [T]) {
-        let Some(mut own) = self.implicit.take() else {
-            return;
-        };
         let (h, _) = self.step(options);
+        let mut own = self.implicit.take().unwrap_or_else(|| {
+            Box::new(Implicit {
+                solver: Gyroscopic::new(self.token),
+                given: scratch.to_vec(),
+            })
+        });
         scratch.fill(h.like(0.0));
         self.weigh(scratch, &mut own.given);
         for (given, torque) in own.given.iter_mut().zip(&self.torque) {
@@ -87,7 +113,7 @@ impl<T: Lane> Forces for TreeLanes<T> {
             mechanism: &self.mechanism,
             inertias: &self.inertias,
             poses: &self.poses_middle,
-            mass_matrix: &own.mass_matrix,
+            mass_matrix: &self.mass_matrix,
         };
         own.solver.solve(&of, step, [start.v, v_mean], impulse, y);
     }
@@ -116,7 +142,10 @@ impl<T: Lane> Forces for TreeLanes<T> {
     }
 
     fn unsettled(&mut self, lanes: T::Mask, v_end: &[T]) -> T::Mask {
-        self.revise_sand(lanes, v_end)
+        let tried = self.sand.clone();
+        let unsettled = self.revise_sand(lanes, v_end);
+        self.sand = tried;
+        unsettled
     }
 
     fn most_revisions(&self, lane: usize) -> usize {

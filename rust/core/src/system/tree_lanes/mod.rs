@@ -3,7 +3,8 @@
 //!
 //! [`TreeLanes`] has the [`Dynamics`](crate::integrator::Dynamics) of the tree (`dynamics`) and its
 //! [`Forces`](crate::integrator::Forces) (`forces`): drives, wrenches (`pushing`), sand (`sinking`)
-//! and closed loops. Whoever holds one adds the contacts: [`crate::lanes`], [`super::tangent`].
+//! and closed loops. Whoever holds one adds the contacts: [`super::block`], [`super::tree`],
+//! [`super::tangent`].
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 mod dynamics;
@@ -13,21 +14,22 @@ mod sinking;
 
 use std::sync::Arc;
 
-use super::command::Wrench;
+use super::command::{Command, Wrench};
 use super::drives::Drives;
 use super::gyroscopic::Gyroscopic;
-use super::loops::Loops;
 use super::sand::SandContact;
-use super::sand_wheel::PlacedWheel;
+use crate::contact::loops::Loops;
+use crate::contact::placed_wheel::PlacedWheel;
 use crate::geometry::Terrain;
 use crate::integrator::StepOptions;
 use crate::multibody::bias::BiasScratch;
 use crate::multibody::model::Loop;
 use crate::multibody::{EnergyScratch, Factor, Inertias, MassMatrix, Mechanism, Model, Poses};
-use crate::sand::RutMap;
+use crate::sand::{RutMap, SandState};
 use crate::scalar::{Lane, MAX_LANES, Vec3};
 
 /// Trees of one mechanism: their descriptions, commands, and the matrices of a step.
+#[derive(Clone)]
 pub(crate) struct TreeLanes<T: Lane> {
     pub token: T::Token,
     pub mechanism: Arc<Mechanism>,
@@ -54,13 +56,15 @@ pub(crate) struct TreeLanes<T: Lane> {
     pub poses_middle: Poses<T>,
     pub poses_end: Poses<T>,
     /// Coordinates of the joints at the midpoint.
-    joints_middle: Vec<T>,
+    pub joints_middle: Vec<T>,
     pub mass_matrix: MassMatrix<T>,
     pub factor: Factor<T>,
     bias_scratch: BiasScratch<T>,
     implicit: Option<Box<Implicit<T>>>,
-    /// Whether a tree may need them in the present step.
+    /// Whether a tree may need implicit gyroscopic terms in the present step, and whether any step
+    /// may: M̂ is then kept beside its factor.
     turns: bool,
+    pub may_turn: bool,
     energy_scratch: EnergyScratch<T>,
     /// Closed loops, which number the contacts by their places, and how many there are.
     pub loops: Option<Box<Loops<T>>>,
@@ -70,10 +74,9 @@ pub(crate) struct TreeLanes<T: Lane> {
 }
 
 /// What steps with implicit gyroscopic terms need beside the others.
+#[derive(Clone)]
 struct Implicit<T: Lane> {
     solver: Gyroscopic<T>,
-    /// M̂.
-    mass_matrix: MassMatrix<T>,
     /// Impulse of the forces but the gyroscopic ones (nv).
     given: Vec<T>,
 }
@@ -112,12 +115,35 @@ impl<T: Lane> TreeLanes<T> {
             bias_scratch: BiasScratch::new(token, mechanism),
             implicit: None,
             turns: false,
+            may_turn: false,
             energy_scratch: EnergyScratch::new(token, mechanism),
             loops: Loops::new(token, mechanism, loops, 0),
             n_places,
             torque: vector(),
             mechanism: Arc::clone(mechanism),
         }
+    }
+
+    /// Gives a lane a tree under a command on a terrain. `work`: of each drive since the call began
+    /// (n_joints), J. [`Drives::finish_loading`] follows after all lanes.
+    pub fn load_tree(
+        &mut self,
+        lane: usize,
+        (model, terrain): (&Arc<Model>, &Arc<dyn Terrain>),
+        gravity: [f64; 3],
+        command: &Command,
+        work: &[f64],
+        sand: Option<&mut SandState>,
+    ) {
+        if !(self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, model)) {
+            self.inertias.set_lane(lane, model.inertias());
+            self.models[lane] = Some(Arc::clone(model));
+        }
+        self.gravity.set(lane, gravity);
+        self.wrenches[lane].clone_from(&command.wrenches);
+        self.drives.set_lane(lane, model.joints(), command);
+        self.drives.set_work(lane, work);
+        self.load_sand(lane, terrain, sand);
     }
 
     #[inline(always)]

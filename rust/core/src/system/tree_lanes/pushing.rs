@@ -45,12 +45,12 @@ impl<T: Lane> TreeLanes<T> {
         }
     }
 
-    /// Adds the impulse of the wrenches over the step, of length `h`, to `torque`.
+    /// Adds the impulse of the wrenches over the step, of length `h`.
     #[inline(always)]
-    pub(super) fn push(&mut self, h: T) {
+    pub(super) fn push(&self, h: T, out: &mut [T]) {
         if self.is_pushed() {
-            for (torque, force) in self.torque.iter_mut().zip(&self.applied) {
-                *torque += h * *force;
+            for (out, force) in out.iter_mut().zip(&self.applied) {
+                *out += h * *force;
             }
         }
     }

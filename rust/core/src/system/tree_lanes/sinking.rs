@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector6;
+
 use super::TreeLanes;
 use crate::geometry::Terrain;
 use crate::integrator::{MOST_REVISIONS, StepOptions};
@@ -31,6 +33,11 @@ impl<T: Lane> TreeLanes<T> {
         });
         sand.load(lane, Some((layer, state)));
         self.soft[lane] = Some(Arc::clone(terrain));
+        self.swap_ruts(lane, state);
+    }
+
+    /// Exchanges the ruts of a lane with those of a tree.
+    pub fn swap_ruts(&mut self, lane: usize, state: &mut SandState) {
         std::mem::swap(&mut self.ruts[lane], &mut state.ruts);
     }
 
@@ -48,7 +55,7 @@ impl<T: Lane> TreeLanes<T> {
     /// Gives a tree that is not stored its ruts back.
     pub fn return_ruts(&mut self, lane: usize, state: Option<&mut SandState>) {
         if let Some(state) = state {
-            std::mem::swap(&mut self.ruts[lane], &mut state.ruts);
+            self.swap_ruts(lane, state);
         }
     }
 
@@ -59,6 +66,47 @@ impl<T: Lane> TreeLanes<T> {
         if let Some(own) = own.filter(|own| own.n_wheels() > ruts.n_wheels()) {
             std::mem::swap(own, ruts);
         }
+    }
+
+    /// The sand; none before a tree stood on soft ground.
+    pub fn sand(&self) -> Option<&SandContact<T>> {
+        self.sand.as_deref()
+    }
+
+    /// Gives the next steps of a lane the forces of the sand, see [`SandContact::give`]. Wheels
+    /// leave no ruts.
+    pub fn give_sand(&mut self, lane: usize, wrenches: Option<&[Option<Vector6<f64>>]>) {
+        if let Some(sand) = &mut self.sand {
+            sand.ruts_stay = true;
+            sand.give(lane, wrenches);
+        }
+    }
+
+    /// Adds the impulse of the sand over a step that ends with the velocity `v`: only if its forces
+    /// are given, or only if not.
+    #[inline(always)]
+    pub(super) fn push_with_sand(
+        &self,
+        options: &StepOptions,
+        v: &[T],
+        out: &mut [T],
+        is_given: bool,
+    ) {
+        if let Some(sand) = &self.sand
+            && sand.is_given() == is_given
+        {
+            sand.add_impulse(options.time_step, v, out);
+        }
+    }
+
+    /// Takes the forces of the sand as they are, without their tangents, of which those whose sizes
+    /// differ too much leave no factor of M̂; whether there is any.
+    pub fn drop_tangents(&mut self) -> bool {
+        let sand = self.sand.as_mut().filter(|sand| sand.lanes().any());
+        sand.is_some_and(|sand| {
+            sand.drop_tangents();
+            true
+        })
     }
 
     /// Most repetitions of a lane's step.
@@ -120,7 +168,7 @@ impl<T: Lane> TreeLanes<T> {
         layers
     }
 
-    fn sand_scene(&self) -> SandScene<'_, T> {
+    pub fn sand_scene(&self) -> SandScene<'_, T> {
         SandScene {
             mechanism: &self.mechanism,
             poses: &self.poses_middle,

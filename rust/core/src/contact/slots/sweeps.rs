@@ -7,10 +7,10 @@
 
 use super::contacts::Contacts;
 use super::rows::Rows;
+use crate::contact::loops::Loops;
 use crate::contact::rows::{add_scaled, along};
 use crate::scalar::{Lane, LaneMask};
 use crate::solver::batch::problem::Triple;
-use crate::system::loops::Loops;
 
 /// Newton steps on the multiplier of a slide.
 const SLIDE_STEPS: usize = 2;
@@ -70,7 +70,7 @@ impl<T: Lane> Rows<T> {
     /// Improves impulses by slot, N s, with `n` sweeps; `q`: free velocity by slot, m/s. Only slots
     /// with problems that have factors are swept; those that a lane does not use get zero.
     #[inline(always)]
-    pub(super) fn sweep(
+    pub(crate) fn sweep(
         &mut self,
         contacts: &Contacts<T>,
         n: usize,
@@ -136,7 +136,7 @@ fn push_loops<T: Lane>(loops: Option<&Loops<T>>, slot: usize, p: &Triple<T>, z: 
 /// rigid discs start from the last step: parked wheels would press against each other with what
 /// the sweeps leave.
 #[inline(always)]
-pub(super) fn write_start<T: Lane>(
+pub(crate) fn write_start<T: Lane>(
     contacts: &Contacts<T>,
     lanes: T::Mask,
     p: &[Triple<T>],

@@ -11,7 +11,7 @@ impl<T: Lane> Contacts<T> {
     /// Adds the contacts of a wheel with faces at the midpoint, in some lanes; it has the axle `s`
     /// and the centre `centre` there. Returns the lanes where they must be found lane by lane.
     #[inline(always)]
-    pub(super) fn look_at_pieces(
+    pub(crate) fn look_at_pieces(
         &mut self,
         (w, lanes): (usize, T::Mask),
         ground: &mut Ground<T>,

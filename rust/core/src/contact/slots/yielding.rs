@@ -9,7 +9,7 @@ use crate::scalar::Lane;
 
 /// Springs and damper of a slot, and the lanes that have them.
 #[inline(always)]
-pub(super) fn spring<T: Lane>(
+pub(crate) fn spring<T: Lane>(
     (machine, contacts): (&Machine, &Contacts<T>),
     (poses, v): (&Poses<T>, &[T]),
     slot: usize,

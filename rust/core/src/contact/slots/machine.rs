@@ -7,10 +7,10 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
-use thiserror::Error;
 
 use super::clusters::Clusters;
 use crate::contact::Part;
+use crate::contact::placed_wheel::PlacedWheel;
 #[cfg(doc)]
 use crate::geometry::Roller;
 use crate::law::compliance::Tread;
@@ -20,25 +20,9 @@ use crate::multibody::{Mechanism, Model, Wheel};
 use crate::scalar::elementary::hypot;
 use crate::solver::batch::pattern::Pattern;
 use crate::solver::batch::problem::{MAX_CONTACTS, MAX_DENSE, MAX_DRY};
-use crate::system::sand_wheel::PlacedWheel;
 
 /// Most slots of a wheel beside those of its circles on a plane.
 const MOST_FURTHER: usize = 2;
-
-/// Most slots of a machine: they are numbered by 8 bits.
-const MAX_SLOTS: usize = 256;
-
-/// Why a machine has no fast step.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum Unsupported {
-    /// A problem has no room for the contacts of its wheels with a plane, its stops and its joints
-    /// with dry friction.
-    #[error("wheels, stops and dry joints can have {0} contacts, more than {MAX_CONTACTS}")]
-    TooManyContacts(usize),
-    /// The machines of a model together need too many slots for contacts.
-    #[error("the machines need {0} slots for contacts, more than {MAX_SLOTS}")]
-    TooManySlots(usize),
-}
 
 /// What a block of rovers has in common: a mechanism, and its wheels, boxes and stops.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +31,7 @@ pub struct Machine {
     /// Wheels, in the model's order.
     pub wheels: Vec<WheelDisc>,
     /// Wheels as sand meets them, in the model's order.
-    pub(super) in_sand: Vec<PlacedWheel>,
+    pub(crate) in_sand: Vec<PlacedWheel>,
     /// Boxes and balls that collide with the ground, in the model's order.
     pub boxes: Vec<BodyBox>,
     /// Joints with stops, ascending.
@@ -57,13 +41,13 @@ pub struct Machine {
     /// Closed loops.
     pub loops: Vec<Loop>,
     /// Slots between those of the wheels and the joints: [`Self::find_free_slots`].
-    pub(super) spares: Vec<Option<usize>>,
+    pub(crate) spares: Vec<Option<usize>>,
     /// Whether bodies of the machine can touch each other.
-    pub(super) has_pairs: bool,
+    pub(crate) has_pairs: bool,
     /// Whether bodies of one tree can touch each other.
-    pub(super) touches_itself: bool,
+    pub(crate) touches_itself: bool,
     /// Which trees have contact problems of their own.
-    pub(super) clusters: Clusters,
+    pub(crate) clusters: Clusters,
 }
 
 impl Deref for Machine {
@@ -129,13 +113,11 @@ pub struct BodyBox {
 
 impl Machine {
     /// The machine of a model.
-    ///
-    /// # Errors
-    /// Why it has no fast step.
-    pub fn of(model: &Model) -> Result<Self, Unsupported> {
+    #[must_use]
+    pub fn of(model: &Model) -> Self {
         let touches_itself = model.trees().iter().any(|tree| tree.self_contact);
         let mut machine = Self {
-            mechanism: Arc::new(model.mechanism().clone()),
+            mechanism: Arc::clone(model.mechanism()),
             wheels: model.wheels().iter().map(WheelDisc::of).collect(),
             in_sand: (model.wheels().iter()).map(PlacedWheel::of).collect(),
             boxes: (Part::all(model).skip(model.wheels().len()))
@@ -155,18 +137,14 @@ impl Machine {
             clusters: Clusters::of(model.mechanism(), model.loops()),
         };
         for cluster in 0..machine.clusters.n() {
-            machine.give_slots(cluster)?;
+            machine.give_slots(cluster);
         }
         machine.spares = machine.find_free_slots();
-        let n = machine.slot_bodies().len();
-        if n > MAX_SLOTS {
-            return Err(Unsupported::TooManySlots(n));
-        }
-        Ok(machine)
+        machine
     }
 
     /// What moves of it.
-    pub(super) fn mechanism(&self) -> &Arc<Mechanism> {
+    pub(crate) fn mechanism(&self) -> &Arc<Mechanism> {
         &self.mechanism
     }
 
@@ -177,13 +155,13 @@ impl Machine {
     }
 
     /// The cluster of a body.
-    pub(super) fn cluster_of(&self, body: usize) -> usize {
+    pub(crate) fn cluster_of(&self, body: usize) -> usize {
         self.clusters.of_tree(self.tree_of_body(body))
     }
 
     /// Most contacts of a cluster's problem with the whole operator, dry joints among them: none if
     /// a wheel touches a plane at two points.
-    pub(super) fn most_dense(&self, cluster: usize) -> usize {
+    pub(crate) fn most_dense(&self, cluster: usize) -> usize {
         let mut wheels = self.wheels_of(cluster);
         let n_dry = self.n_dry(cluster);
         if wheels.any(|wheel| wheel.n_circles() > 1) || n_dry > MAX_DRY {
@@ -194,13 +172,13 @@ impl Machine {
     }
 
     /// Number of a cluster's joints with dry friction.
-    pub(super) fn n_dry(&self, cluster: usize) -> usize {
+    pub(crate) fn n_dry(&self, cluster: usize) -> usize {
         let of = |joint: &&usize| self.cluster_of(self.joints[**joint].body) == cluster;
         self.rubbing.iter().filter(of).count()
     }
 
     /// Whether wheels of a cluster are rigid, and none touches a plane at two points.
-    pub(super) fn has_rigid_discs(&self, cluster: usize) -> bool {
+    pub(crate) fn has_rigid_discs(&self, cluster: usize) -> bool {
         let is_rigid = |wheel: &WheelDisc| wheel.tread.is_none();
         let has_lines = |wheel: &WheelDisc| wheel.n_circles() > 1;
         self.wheels_of(cluster).any(is_rigid) && !self.wheels_of(cluster).any(has_lines)
@@ -210,24 +188,23 @@ impl Machine {
         (self.wheels.iter()).filter(move |wheel| self.cluster_of(wheel.body) == cluster)
     }
 
-    /// Gives each wheel of a cluster slots for its circles on a plane, and as many further ones as
-    /// there is room for.
-    fn give_slots(&mut self, cluster: usize) -> Result<(), Unsupported> {
+    /// Gives each wheel of a cluster slots for its circles on a plane, and further ones: as many as
+    /// there is room for in a pattern along paths, and all if its pattern has all entries anyway.
+    fn give_slots(&mut self, cluster: usize) {
         let is_own = |joint: &usize| self.cluster_of(self.joints[*joint].body) == cluster;
         let n_of_joints = self.joints_with_slots().filter(is_own).count();
         let n_wheels = self.wheels_of(cluster).count();
         let n_circles = self.wheels_of(cluster).map(WheelDisc::n_circles);
         let n_needed = n_of_joints + n_circles.sum::<usize>();
-        let Some(room) = MAX_CONTACTS.checked_sub(n_needed) else {
-            return Err(Unsupported::TooManyContacts(n_needed));
+        let further = match MAX_CONTACTS.checked_sub(n_needed) {
+            Some(room) => (room / n_wheels.max(1)).min(MOST_FURTHER),
+            None => MOST_FURTHER,
         };
-        let further = (room / n_wheels.max(1)).min(MOST_FURTHER);
         for w in 0..self.wheels.len() {
             if self.cluster_of(self.wheels[w].body) == cluster {
                 self.wheels[w].n_slots = self.wheels[w].n_circles() + further;
             }
         }
-        Ok(())
     }
 
     /// Whether any wheel yields where it touches.
@@ -237,7 +214,7 @@ impl Machine {
     }
 
     /// Pattern of a cluster's contact problems.
-    pub(super) fn pattern(&self, cluster: usize) -> &Arc<Pattern> {
+    pub(crate) fn pattern(&self, cluster: usize) -> &Arc<Pattern> {
         let bodies = self.slot_bodies();
         let own = bodies.into_iter().flatten();
         let own = own.filter(|body| self.cluster_of(*body) == cluster);
@@ -251,7 +228,7 @@ impl Machine {
     /// longer equal, make another machine.
     #[must_use]
     pub fn fits(&self, model: &Model) -> bool {
-        Self::of(model).is_ok_and(|other| other == *self)
+        Self::of(model) == *self
     }
 }
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::Block;
+use super::lane_rover::LaneRover;
 use crate::integrator::audit::note_energies;
-use crate::lanes::lane_rover::LaneRover;
 use crate::sand::RutMap;
 use crate::scalar::Lane;
 
@@ -22,12 +22,14 @@ impl<T: Lane> Block<T> {
         let system = &mut self.system;
         (system.friction).set(lane, rover.options.friction_coefficient);
         system.ground.set_lane(lane, rover.terrain);
-        let tree = &mut system.tree;
-        tree.load_sand(lane, rover.terrain, rover.sand.as_deref_mut());
-        tree.wrenches[lane].clone_from(&rover.command.wrenches);
-        let joints = rover.model.joints();
-        tree.drives.set_lane(lane, joints, rover.command);
-        tree.drives.set_work(lane, rover.drive_work);
+        system.tree.load_tree(
+            lane,
+            (rover.model, rover.terrain),
+            rover.options.gravity.into(),
+            rover.command,
+            rover.drive_work,
+            rover.sand.as_deref_mut(),
+        );
         self.data.time.set(lane, *rover.time);
         self.data.load_memory(lane, rover.warm_start);
     }
@@ -43,19 +45,12 @@ impl<T: Lane> Block<T> {
             && data.start.is_lane(lane, rover.configuration)
     }
 
-    /// Gives a lane the inertia and the state of a rover.
+    /// Gives a lane the state of a rover, and the friction of its joints.
     fn fill(&mut self, lane: usize, rover: &LaneRover<'_>) {
-        let system = &mut self.system;
-        let tree = &mut system.tree;
-        if !(tree.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model)) {
-            tree.inertias.set_lane(lane, rover.model.inertias());
-            let joints = rover.model.joints();
-            for (own, &joint) in system.dry_friction.iter_mut().zip(&system.machine.rubbing) {
-                own.set(lane, joints[joint].passive.friction);
-            }
-            tree.models[lane] = Some(Arc::clone(rover.model));
+        let (system, joints) = (&mut self.system, rover.model.joints());
+        for (own, &joint) in system.dry_friction.iter_mut().zip(&system.machine.rubbing) {
+            own.set(lane, joints[joint].passive.friction);
         }
-        tree.gravity.set(lane, rover.options.gravity.into());
         self.data.start.set_lane(lane, rover.configuration);
         for (own, x) in self.data.v.iter_mut().zip(&*rover.v) {
             own.set(lane, *x);

@@ -13,7 +13,7 @@ use crate::scalar::{Lane, LaneMask};
 
 /// What a joint's slot is for.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum JointRow<T> {
+pub(crate) enum JointRow<T> {
     /// Stops of the joint, and the end that is active in each lane: 1 the lower, −1 the upper.
     Stop(T),
     /// Dry friction of the joint.
@@ -23,7 +23,7 @@ pub(super) enum JointRow<T> {
 impl<T: Lane> JointRow<T> {
     /// The only row of H that is not zero, and its entry at the joint's velocity.
     #[inline(always)]
-    pub(super) fn entry(self, zero: T) -> (usize, T) {
+    pub(crate) fn entry(self, zero: T) -> (usize, T) {
         match self {
             Self::Stop(end) => (0, end),
             Self::Friction => (1, zero.like(1.0)),
@@ -32,7 +32,7 @@ impl<T: Lane> JointRow<T> {
 
     /// Makes the own block of W regular.
     #[inline(always)]
-    pub(super) fn close(self, own: &mut [T; 9]) {
+    pub(crate) fn close(self, own: &mut [T; 9]) {
         match self {
             Self::Stop(_) => close_stop(own),
             Self::Friction => joint_friction::close(own),
@@ -41,7 +41,7 @@ impl<T: Lane> JointRow<T> {
 
     /// The part and the key of a lane's contact.
     #[inline(always)]
-    pub(super) fn names(self, joint: usize, lane: usize) -> (Part, ContactKey) {
+    pub(crate) fn names(self, joint: usize, lane: usize) -> (Part, ContactKey) {
         match self {
             Self::Stop(end) => {
                 let side = if end.get(lane) > 0.0 {
@@ -59,7 +59,7 @@ impl<T: Lane> JointRow<T> {
 impl<T: Lane> Contacts<T> {
     /// The joint that a slot is for, if it is, and what for.
     #[inline(always)]
-    pub(super) fn joint_row(&self, slot: usize) -> Option<(usize, JointRow<T>)> {
+    pub(crate) fn joint_row(&self, slot: usize) -> Option<(usize, JointRow<T>)> {
         let own = slot.checked_sub(self.first_of_joints)?;
         Some(match self.stops.get(own) {
             Some(stop) => (stop.joint, JointRow::Stop(self.ends[own])),
@@ -69,7 +69,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Slots of the joints with dry friction.
     #[inline(always)]
-    pub(super) fn slots_of_friction(&self) -> Range<usize> {
+    pub(crate) fn slots_of_friction(&self) -> Range<usize> {
         self.first_of_joints + self.stops.len()..self.slots.len()
     }
 

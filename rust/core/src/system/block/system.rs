@@ -1,18 +1,19 @@
 //! The rovers of a block as the systems of the scheme: where their contacts are.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use std::sync::Arc;
 
 use super::by_method::ByMethod;
 use crate::contact::ContactKey;
+use crate::contact::slots::contacts::Contacts;
+use crate::contact::slots::ground::Ground;
+use crate::contact::slots::joint_slots::JointRow;
+use crate::contact::slots::machine::Machine;
+use crate::contact::slots::rows::{Answer, Rows, in_slots};
+use crate::contact::slots::yielding::spring;
 use crate::integrator::grouped::Grouped;
 use crate::integrator::systems::{MemoryOf, Systems};
 use crate::integrator::{StepOptions, StepReport};
-use crate::lanes::contacts::Contacts;
-use crate::lanes::ground::Ground;
-use crate::lanes::joint_slots::JointRow;
-use crate::lanes::machine::Machine;
-use crate::lanes::rows::{Answer, Rows, in_slots};
-use crate::lanes::yielding::spring;
 use crate::law::compliance::{Compliance, Yielding};
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Lane, Vec3};
@@ -168,8 +169,7 @@ impl<T: Lane> Systems for LaneSystem<T> {
         problems: &mut [ContactProblem],
         is_same: &mut [T::Mask],
     ) {
-        let own = (lane, self.tree.models[lane].as_ref());
-        self.contacts.recall(own, memory, problems, is_same);
+        self.recall_impulses(lane, memory, problems, is_same);
     }
 
     #[inline(always)]

@@ -1,4 +1,10 @@
-//! A block of rovers: [`crate::integrator::scheme`] in the lanes of a register.
+//! A block of rovers: [`crate::integrator::scheme`] in the lanes of a register, with the usual
+//! effort.
+//!
+//! Most steps of a wheeled rover are alike: a tree of joints, wheels that roll and slip, motors,
+//! springs and stops. Rovers of one machine take them together, in the lanes of a scalar
+//! ([`crate::scalar`]): one, four or eight. A rover that needs more leaves the block before its
+//! state changes, and [`crate::integrator::moreau_jean`] takes its step alone.
 //!
 //! A step has three parts, between which its contact problems are solved with those of other blocks
 //! ([`crate::solver::batch::queue`]):
@@ -11,11 +17,29 @@
 //!
 //! A lane whose step cannot be taken falls back: its state stays as it was.
 //!
-//! `loading`: rovers come and go; `system`: the rovers and their contacts, as the scheme sees them,
-//! with `contact_list`, `problems` and `by_method`. What moves is `crate::system::tree_lanes`.
+//! ```text
+//! LaneRover ──► Block::load_rover     state, command and memory of one rover into its lane
+//!                    │
+//!                    ▼
+//!               Block::prepare        poses, contacts, mass matrix, W, free velocity
+//!                    │
+//!                    ▼
+//!               Queue                 the friction-contact problems
+//!                    │
+//!                    ▼
+//!               Block::conclude       new state, motors' branches, energy audit
+//!                    │  Next          again, or the problem of the position projection
+//!                    ▼
+//!               Block::finish ──► Block::store_rover
+//! ```
+//!
+//! [`lane_rover`]: what a block reads of a rover; `loading`: rovers come and go; `system`: the
+//! rovers and their contacts ([`crate::contact::slots`]), as the scheme sees them, with
+//! `contact_list`, `problems` and `by_method`. What moves is `crate::system::tree_lanes`.
 
 mod by_method;
 mod contact_list;
+pub mod lane_rover;
 mod loading;
 mod problems;
 mod system;
@@ -23,8 +47,8 @@ mod system;
 use std::sync::Arc;
 
 use self::system::LaneSystem;
-use super::machine::Machine;
 use crate::contact::ContactKey;
+use crate::contact::slots::machine::Machine;
 use crate::integrator::data::Data;
 use crate::integrator::projection::set_gaps;
 use crate::integrator::{Obstacle, Probe, StepOptions, StepReport, scheme};
@@ -93,10 +117,10 @@ impl<T: Lane> Block<T> {
         &self.data.reports[lane]
     }
 
-    /// World positions of a lane's roots where the contacts of the last step were evaluated, m.
-    pub fn origins(&self, lane: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
-        let trees = 0..self.system.machine.trees.len();
-        trees.map(move |tree| self.system.tree.poses_end.origin_of(tree).get(lane))
+    /// World position of a root in a lane where the contacts of the last step were evaluated, m.
+    #[must_use]
+    pub fn origin(&self, lane: usize, tree: usize) -> [f64; 3] {
+        self.system.tree.poses_end.origin_of(tree).get(lane)
     }
 
     /// Number of the friction-contact problems of all lanes: one of each cluster in each lane.

@@ -28,19 +28,15 @@ use super::machine::{Machine, Stop};
 use super::parts::{Parts, Twist};
 use super::pieces::LanePlane;
 use crate::contact::detection::touch_of_wheel;
-use crate::contact::{
-    Activation, Contact, ContactFrame, ContactKey, Opposite, Part, clusters_of, rollers,
-};
+use crate::contact::{Activation, Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
 use crate::geometry::query::disc_plane::{FLAT, rolling, to_lowest};
 use crate::geometry::query::section::Section;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
-use crate::integrator::WarmStart;
-use crate::integrator::grouped::Grouped;
 use crate::multibody::{Model, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
-use crate::solver::batch::problem::{ContactProblem, MAX_CONTACTS, MAX_LARGE};
+use crate::solver::batch::problem::{MAX_CONTACTS, MAX_LARGE};
 
 /// Number of the plane in every terrain that has one.
 const PLANE: u32 = 0;
@@ -63,7 +59,7 @@ pub struct Slot<T: Lane> {
     on_sphere: T::Mask,
     sphere: GroundSphere<T>,
     /// The plane that it stands on where the ground is a surface.
-    pub(super) plane: LanePlane<T>,
+    pub(crate) plane: LanePlane<T>,
 }
 
 impl<T: Lane> Slot<T> {
@@ -83,7 +79,7 @@ impl<T: Lane> Slot<T> {
 
 /// A circle of a wheel over a plane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stand<T: Lane> {
+pub(crate) struct Stand<T: Lane> {
     /// m.
     pub gap: T,
     /// Lanes where the circle is a contact.
@@ -107,7 +103,7 @@ pub struct Listed {
     /// Their number, at most [`MAX_CONTACTS`].
     pub n: usize,
     /// Slot of each.
-    pub slots: [u8; MAX_CONTACTS],
+    pub slots: [u16; MAX_CONTACTS],
     /// What the next step knows each by.
     pub keys: [ContactKey; MAX_CONTACTS],
 }
@@ -115,26 +111,26 @@ pub struct Listed {
 /// The contacts of a block.
 #[derive(Clone, Debug)]
 pub struct Contacts<T: Lane> {
-    pub(super) token: T::Token,
-    pub(super) parts: Parts,
-    pub(super) by_lane: ByLane,
-    pub(super) stops: Vec<Stop>,
+    pub(crate) token: T::Token,
+    pub(crate) parts: Parts,
+    pub(crate) by_lane: ByLane,
+    pub(crate) stops: Vec<Stop>,
     /// End at which the joint of each stop is: 1 the lower, −1 the upper, 0 none.
-    pub(super) ends: Vec<T>,
+    pub(crate) ends: Vec<T>,
     /// Joints with dry friction.
-    pub(super) rubbing: Vec<usize>,
+    pub(crate) rubbing: Vec<usize>,
     /// The first spare slot, and the first slot of a joint.
     first_spare: usize,
-    pub(super) first_of_joints: usize,
+    pub(crate) first_of_joints: usize,
     twists: Vec<Twist<T>>,
-    pub(super) slots: Vec<Slot<T>>,
+    pub(crate) slots: Vec<Slot<T>>,
     /// Part of each slot: a wheel, or, counted on from the wheels, a spare slot or a joint.
-    pub(super) part_of: Vec<usize>,
+    pub(crate) part_of: Vec<usize>,
     heights: Vec<Heights<T>>,
     /// Cluster of each body, and of each slot that is not for contacts between bodies.
     cluster_of_body: Vec<usize>,
     cluster_of: Vec<Option<usize>>,
-    pub(super) used: Vec<usize>,
+    pub(crate) used: Vec<usize>,
     /// Number of slots in use that are not of joints.
     n_of_shapes: usize,
     /// Contact data of each cluster.
@@ -164,7 +160,7 @@ struct InCluster {
     has_rigid_discs: bool,
     is_tied: bool,
     /// The cluster whose list has its contacts, in each lane.
-    leader: [u8; MAX_LANES],
+    leader: [u16; MAX_LANES],
     /// Number of its velocities, and those of the clusters before it in that list.
     nv: u16,
     first_column: [u16; MAX_LANES],
@@ -293,19 +289,19 @@ impl<T: Lane> Contacts<T> {
 
     /// Slots in use that are not of joints, ascending.
     #[inline(always)]
-    pub(super) fn used_by_shapes(&self) -> &[usize] {
+    pub(crate) fn used_by_shapes(&self) -> &[usize] {
         &self.used[..self.n_of_shapes]
     }
 
     /// Slots of joints in use, ascending; they follow all others.
     #[inline(always)]
-    pub(super) fn used_by_joints(&self) -> &[usize] {
+    pub(crate) fn used_by_joints(&self) -> &[usize] {
         &self.used[self.n_of_shapes..]
     }
 
     /// Slots of a cluster in use in any lane whose problem has the whole operator.
     #[inline(always)]
-    pub(super) fn used_densely(&self, cluster: usize) -> &[usize] {
+    pub(crate) fn used_densely(&self, cluster: usize) -> &[usize] {
         if self.factored == 0 && self.clusters.len() == 1 {
             &self.used
         } else {
@@ -315,13 +311,13 @@ impl<T: Lane> Contacts<T> {
 
     /// Lanes with a problem that has the factors of its operator.
     #[inline(always)]
-    pub(super) fn factored(&self) -> u32 {
+    pub(crate) fn factored(&self) -> u32 {
         self.factored
     }
 
     /// Lanes in which a slot's contact is in a problem that has the factors of its operator.
     #[inline(always)]
-    pub(super) fn near(&self, slot: usize) -> u32 {
+    pub(crate) fn near(&self, slot: usize) -> u32 {
         if self.factored == 0 {
             0
         } else {
@@ -331,7 +327,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Slots in use with a contact in a problem that has the factors of its operator.
     #[inline(always)]
-    pub(super) fn used_nearby(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn used_nearby(&self) -> impl Iterator<Item = usize> {
         let used = self.used.iter().copied();
         used.filter(
             #[inline(always)]
@@ -341,19 +337,19 @@ impl<T: Lane> Contacts<T> {
 
     /// The cluster of a slot that is not for contacts between bodies.
     #[inline(always)]
-    pub(super) fn cluster_of(&self, slot: usize) -> Option<usize> {
+    pub(crate) fn cluster_of(&self, slot: usize) -> Option<usize> {
         self.cluster_of[slot]
     }
 
     /// The first cluster of a cluster's group in a lane.
     #[inline(always)]
-    pub(super) fn leader(&self, cluster: usize, lane: usize) -> usize {
+    pub(crate) fn leader(&self, cluster: usize, lane: usize) -> usize {
         self.clusters[cluster].leader[lane].into()
     }
 
     /// The cluster of the body that a slot's contact is on in a lane.
     #[inline(always)]
-    pub(super) fn own_cluster(&self, slot: usize, lane: usize) -> usize {
+    pub(crate) fn own_cluster(&self, slot: usize, lane: usize) -> usize {
         self.cluster_of[slot].unwrap_or_else(|| {
             let contact = self.by_lane.contact(slot, lane);
             contact.map_or(0, |contact| self.cluster_of_body[contact.body])
@@ -362,13 +358,13 @@ impl<T: Lane> Contacts<T> {
 
     /// Lanes in which clusters touch each other.
     #[inline(always)]
-    pub(super) fn joined(&self) -> u32 {
+    pub(crate) fn joined(&self) -> u32 {
         self.joined
     }
 
     /// Number of the clusters.
     #[inline(always)]
-    pub(super) fn n_clusters(&self) -> usize {
+    pub(crate) fn n_clusters(&self) -> usize {
         self.clusters.len()
     }
 
@@ -381,7 +377,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Whether a problem has the factors of its operator.
     #[inline(always)]
-    pub(super) fn is_factored(&self, problem: usize) -> bool {
+    pub(crate) fn is_factored(&self, problem: usize) -> bool {
         let (cluster, lane) = (problem / T::LANES, problem % T::LANES);
         self.clusters[cluster].factored >> lane & 1 == 1
     }
@@ -389,7 +385,7 @@ impl<T: Lane> Contacts<T> {
     /// The clusters whose contacts are in a problem. `None` where no bodies touch each other: its
     /// own.
     #[inline(always)]
-    pub(super) fn members(&self, problem: usize) -> Option<impl Iterator<Item = usize> + '_> {
+    pub(crate) fn members(&self, problem: usize) -> Option<impl Iterator<Item = usize> + '_> {
         let (cluster, lane) = (problem / T::LANES, problem % T::LANES);
         let touches = self.clusters[cluster].touches >> lane & 1 == 1;
         touches.then(|| {
@@ -401,7 +397,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Where a cluster's velocities begin in a problem that has all velocities, if it has them.
     #[inline(always)]
-    pub(super) fn first_column(&self, cluster: usize, problem: usize) -> Option<usize> {
+    pub(crate) fn first_column(&self, cluster: usize, problem: usize) -> Option<usize> {
         let (leader, lane) = (problem / T::LANES, problem % T::LANES);
         let own = &self.clusters[cluster];
         (usize::from(own.leader[lane]) == leader).then(|| own.first_column[lane].into())
@@ -410,7 +406,7 @@ impl<T: Lane> Contacts<T> {
     /// Whether a problem with factors is solved with the operator that they give: that of rigid
     /// discs that push or tow each other.
     #[inline(always)]
-    pub(super) fn is_multiplied(&self, problem: usize) -> bool {
+    pub(crate) fn is_multiplied(&self, problem: usize) -> bool {
         let fits = self.lists[problem].n <= MAX_LARGE;
         let is_of_discs = |own: usize| self.clusters[own].has_rigid_discs;
         let has_lines = |own: usize| self.clusters[own].most_dense == 0;
@@ -427,7 +423,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Number of dry joints in a problem.
     #[inline(always)]
-    pub(super) fn n_dry(&self, problem: usize) -> usize {
+    pub(crate) fn n_dry(&self, problem: usize) -> usize {
         let n = |cluster: usize| self.clusters[cluster].n_dry;
         match self.members(problem) {
             None => n(problem / T::LANES),
@@ -464,7 +460,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Whether every slot in use is active in all lanes: a contact's place is then the same in all.
     #[inline(always)]
-    pub(super) fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.is_full
     }
 
@@ -504,7 +500,7 @@ impl<T: Lane> Contacts<T> {
     }
 
     /// The contacts of a rover with their slots, problem by problem.
-    pub(super) fn all_of<'a>(
+    pub(crate) fn all_of<'a>(
         &'a self,
         machine: &'a Machine,
         lane: usize,
@@ -517,85 +513,14 @@ impl<T: Lane> Contacts<T> {
 
     /// The problem of each lane in which a slot is active.
     #[inline(always)]
-    pub(super) fn homes(&self, slot: usize) -> &[u16; MAX_LANES] {
+    pub(crate) fn homes(&self, slot: usize) -> &[u16; MAX_LANES] {
         &self.homes[slot]
     }
 
     /// Place of a slot among the contacts of that problem.
     #[inline(always)]
-    pub(super) fn places(&self, slot: usize) -> &[u8; MAX_LANES] {
+    pub(crate) fn places(&self, slot: usize) -> &[u8; MAX_LANES] {
         &self.places[slot]
-    }
-
-    /// Fills the problems' `p` with the impulses that a rover remembers of its contacts, N s, zero
-    /// for new ones. Marks in `is_same` each cluster whose group had exactly these contacts in the
-    /// last step.
-    #[inline(always)]
-    pub fn recall(
-        &self,
-        (lane, model): (usize, Option<&Arc<Model>>),
-        memory: &WarmStart,
-        problems: &mut [ContactProblem],
-        is_same: &mut [T::Mask],
-    ) {
-        let own = T::mask(self.token, 1 << lane);
-        let (mut n, mut n_known) = (0, 0);
-        for (index, is_same) in self.problems_of(lane).zip(&mut *is_same) {
-            let (list, problem) = (&self.lists[index], &mut problems[index]);
-            let n_before = n_known;
-            for (place, out) in problem.p.chunks_exact_mut(3).enumerate().take(list.n) {
-                let wanted = list.keys[place];
-                let same = memory.impulses.get(n + place);
-                let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
-                    n_known += 1;
-                    *known
-                } else {
-                    let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
-                    n_known += usize::from(found.is_some());
-                    found.map_or([0.0; 3], |(_, known)| *known)
-                };
-                out.copy_from_slice(&known);
-            }
-            n += list.n;
-            let has_new = n_known - n_before != list.n;
-            *is_same = (*is_same & !own) | (if has_new { own & !own } else { own });
-        }
-        if n_known == memory.impulses.len() {
-            // Followers have no list: what their leaders say holds for them.
-        } else if let [only] = &mut *is_same {
-            *only = *only & !own;
-        } else if let Some(model) = model {
-            self.note_lost(lane, model, memory, is_same);
-        }
-        self.intersect(is_same);
-    }
-
-    /// Takes the mark from clusters that have lost a contact.
-    #[cold]
-    fn note_lost(&self, lane: usize, model: &Model, memory: &WarmStart, is_same: &mut [T::Mask]) {
-        let others = !T::mask(self.token, 1 << lane);
-        let has = |wanted: &ContactKey| {
-            let mut lists = self.problems_of(lane).map(|index| &self.lists[index]);
-            lists.any(|list| list.keys[..list.n].contains(wanted))
-        };
-        for (key, _) in memory.impulses.iter().filter(|(key, _)| !has(key)) {
-            for cluster in clusters_of(model, key) {
-                is_same[cluster] = is_same[cluster] & others;
-            }
-        }
-    }
-
-    /// Makes a rover remember the impulses of its contacts, the problems' `p`, N s.
-    #[inline(always)]
-    pub fn remember(&self, lane: usize, problems: &[ContactProblem], memory: &mut WarmStart) {
-        memory.impulses.clear();
-        for index in self.problems_of(lane) {
-            let (list, problem) = (&self.lists[index], &problems[index]);
-            for (place, p) in problem.p.chunks_exact(3).enumerate().take(list.n) {
-                let known = (list.keys[place], [p[0], p[1], p[2]]);
-                memory.impulses.push(known);
-            }
-        }
     }
 
     /// Finds the contacts of a step and moves them to its end. Returns the lanes that fall back.
@@ -629,6 +554,7 @@ impl<T: Lane> Contacts<T> {
             let tree = self.parts.wheels[w].tree;
             let heights = self.heights[tree];
             let mut rest = self.look_at_wheel(w, heights.for_wheels, ground, sight);
+            rest = rest | ground.beside_firm;
             let slots = self.parts.wheels[w].slots.clone();
             if self.slots[slots.clone()].iter().any(|own| own.active.any()) {
                 let pose = &end.bodies[self.parts.wheels[w].body];
@@ -660,7 +586,7 @@ impl<T: Lane> Contacts<T> {
         for b in 0..self.parts.boxes.len() {
             let height = self.heights[self.parts.boxes[b].tree].middle;
             let near = self.look_at_box(b, height, ground, sight);
-            self.ask(self.parts.boxes[b].part, near, sight);
+            self.ask(self.parts.boxes[b].part, near | ground.beside_firm, sight);
         }
         let mut fallbacks = T::mask(self.token, 0);
         let meeting = if sight.machine.has_pairs {
@@ -689,7 +615,7 @@ impl<T: Lane> Contacts<T> {
     #[inline(always)]
     fn find_leaders(&mut self) {
         for (cluster, own) in self.clusters.iter_mut().enumerate() {
-            own.leader = [small(cluster); MAX_LANES];
+            own.leader = [narrow(cluster); MAX_LANES];
             own.first_column = [0; MAX_LANES];
             own.touches = 0;
         }
@@ -860,7 +786,7 @@ impl<T: Lane> Contacts<T> {
     /// Where a circle of a wheel with the axle `s` and the centre `centre` touches a plane of the
     /// normal n at the midpoint, the origin of its tree being at the given height (m) over it.
     #[inline(always)]
-    pub(super) fn stands(
+    pub(crate) fn stands(
         &self,
         (w, circle): (usize, usize),
         (n, base): (Vec3<T>, T),
@@ -1094,7 +1020,7 @@ impl<T: Lane> Contacts<T> {
     /// Chooses the problems that have the factors of their operator: those with many contacts, and
     /// with contacts between bodies.
     #[inline(always)]
-    pub(super) fn choose_forms(&mut self) {
+    pub(crate) fn choose_forms(&mut self) {
         self.factored = 0;
         for (own, lists) in self
             .clusters
@@ -1131,7 +1057,7 @@ impl<T: Lane> Contacts<T> {
     /// Lists the contacts of a slot, of a joint's without ground, after those of the slots before
     /// it. Returns the lanes that have too many.
     #[inline(always)]
-    pub(super) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
+    pub(crate) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
         let joint_row = self.joint_row(slot);
         let shown = match joint_row {
             Some(_) => NO_KEY,
@@ -1171,9 +1097,9 @@ impl<T: Lane> Contacts<T> {
                 too_many |= 1 << lane;
                 continue;
             }
-            homes[lane] = home_of(home);
+            homes[lane] = narrow(home);
             places[lane] = small(list.n);
-            list.slots[list.n] = small(slot);
+            list.slots[list.n] = narrow(slot);
             let mut key = shown;
             if given >> lane & 1 == 1 {
                 if let Some(contact) = by_lane.contact(slot, lane) {
@@ -1206,7 +1132,7 @@ impl InCluster {
             n_dry: machine.n_dry(cluster),
             has_rigid_discs: machine.has_rigid_discs(cluster),
             is_tied: machine.clusters.n_trees(cluster) > 1,
-            leader: [small(cluster); MAX_LANES],
+            leader: [narrow(cluster); MAX_LANES],
             nv: u16::try_from(machine.clusters.nv(cluster)).unwrap_or(u16::MAX),
             first_column: [0; MAX_LANES],
             touches: 0,
@@ -1231,18 +1157,18 @@ impl Listed {
     };
 }
 
-/// A place or a slot, of which there are less than 256.
+/// A place, of which there are at most [`MAX_CONTACTS`].
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation)] // checked where machines are made
+#[allow(clippy::cast_possible_truncation)] // less than 256
 fn small(index: usize) -> u8 {
     index as u8
 }
 
-/// A problem, of which there are at most as many as slots in all lanes.
+/// A slot, a cluster or a problem: a machine has less than 65 536 in all lanes.
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation)] // checked where machines are made
-fn home_of(problem: usize) -> u16 {
-    problem as u16
+#[allow(clippy::cast_possible_truncation)] // a machine with more bodies would not fit in memory
+fn narrow(index: usize) -> u16 {
+    index as u16
 }
 
 /// Number of a primitive, kept in a lane.

@@ -38,7 +38,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// A wheel in every lane.
 #[derive(Clone, Copy)]
-pub(super) struct Rim<T> {
+pub(crate) struct Rim<T> {
     /// World, m.
     pub centre: Vec3<T>,
     /// Unit.
@@ -51,14 +51,14 @@ pub(super) struct Rim<T> {
 
 /// A plane of every lane: `normal · x + offset = 0`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LanePlane<T> {
+pub(crate) struct LanePlane<T> {
     pub normal: Vec3<T>,
     pub offset: T,
 }
 
 /// A face of every lane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LaneFace<T> {
+pub(crate) struct LaneFace<T> {
     pub plane: LanePlane<T>,
     /// Normal and offset of the walls around what is over it, and lanes where they are open.
     walls: [(Vec3<T>, T, u32); 3],
@@ -85,7 +85,7 @@ struct Kept<P, const N: usize> {
 
 /// The pieces near a wheel.
 #[derive(Clone, Debug)]
-pub(super) struct Pieces<T> {
+pub(crate) struct Pieces<T> {
     faces: Kept<LaneFace<T>, MAX_FACES>,
     edges: Kept<LaneEdge<T>, MAX_EDGES>,
     /// Convex vertices.

@@ -1,44 +1,34 @@
-//! The fast steps of a rover, alone and in a lane of a block.
+//! The steps of a rover with the usual effort: in its own block, and in a lane of another one.
 
 use std::sync::Arc;
 
 use super::active_contact::ActiveContact;
-use super::quick::solve;
+use super::own_block::solve;
 use super::rover::{RoverScene, RoverSimulation};
-use super::scene::QuickStep;
-use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
-use crate::lanes::block::{Block, Next};
-use crate::lanes::lane_rover::LaneRover;
-use crate::lanes::machine::Machine;
-use crate::scalar::{Lane, Single};
+use super::scene::{Usual, UsualStep};
+use crate::contact::slots::machine::Machine;
+use crate::integrator::{NoProbe, Phase, Probe, StepError, StepReport, Variant};
+use crate::scalar::{Instructions, Lane, Single};
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;
+use crate::system::block::lane_rover::LaneRover;
+use crate::system::block::{Block, Next};
 
 impl RoverScene {
-    /// The machine of its fast steps; none if with these options it has none.
-    fn fast_machine(&self, options: &StepOptions) -> Option<&Arc<Machine>> {
-        match self.fallback_reason(options) {
-            None => self.machine.as_ref().ok(),
-            Some(_) => None,
-        }
-    }
-
-    /// Takes a fast step; None if that is not possible, and nothing has changed.
-    pub(super) fn take_fast_step(
+    /// Takes a step in the rover's own block.
+    pub(super) fn take_usual_step(
         &self,
-        step: &mut QuickStep<'_, Self>,
+        step: &mut UsualStep<'_, Self>,
         probe: &mut dyn Probe,
-    ) -> Option<StepReport> {
-        let quick = &mut step.parts.quick;
-        quick.set_last(false);
-        let machine = self.fast_machine(step.options)?;
+    ) -> Usual {
+        let own = &mut step.parts.own;
+        own.set_last(false);
+        if step.options.variant != Variant::Linearised {
+            return Usual::None;
+        }
         let token = Single::best();
-        let block = quick
-            .block
-            .get_or_insert_with(|| Box::new(Block::new(token, machine)));
-        let queue = quick
-            .queue
-            .get_or_insert_with(|| Box::new(Queue::new(token)));
+        let block = (own.block).get_or_insert_with(|| Box::new(Block::new(token, &self.machine)));
+        let queue = own.queue.get_or_insert_with(|| Box::new(Queue::new(token)));
         let mut lane_rover = LaneRover {
             model: &self.model,
             terrain: &self.terrain,
@@ -55,7 +45,7 @@ impl RoverScene {
         };
         block.load_rover(0, &mut lane_rover);
         block.begin();
-        let (problems, gap_problems) = (&mut quick.problems, &mut quick.gap_problems);
+        let (problems, gap_problems) = (&mut own.problems, &mut own.gap_problems);
         for all in [&mut *problems, &mut *gap_problems] {
             all.resize_with(block.n_problems(), ContactProblem::default);
         }
@@ -63,7 +53,7 @@ impl RoverScene {
         if !block.is_going(0) {
             // Its problems may have more contacts than fit.
             block.return_ruts(0, &mut lane_rover);
-            return None;
+            return Usual::Refused;
         }
         let solver = &step.options.solver;
         let mut next = Next::Retake;
@@ -85,19 +75,29 @@ impl RoverScene {
         block.finish(is_deep.then_some(&mut gap_problems[..]), probe);
         if block.fallback(0).is_some() {
             block.return_ruts(0, &mut lane_rover);
-            return None;
+            return Usual::Refused;
         }
         block.store_rover(0, &mut lane_rover);
         let report = *block.report(0);
-        quick.set_last(true);
-        Some(report)
+        own.set_last(true);
+        Usual::Taken(report)
     }
 }
 
 impl RoverSimulation {
-    /// The machine of its fast steps; none if it has none.
+    /// Rovers to a register in a batch on this machine; 1 for the Newton variant, whose steps are
+    /// taken alone.
+    #[must_use]
+    pub fn lanes(&self) -> usize {
+        match self.options.variant {
+            Variant::Linearised => Instructions::of_this_machine().lanes(),
+            Variant::Newton => 1,
+        }
+    }
+
+    /// What rovers in its block have in common; none if its steps are taken alone.
     pub(super) fn machine(&self) -> Option<&Arc<Machine>> {
-        self.scene.fast_machine(&self.options)
+        (self.options.variant == Variant::Linearised).then_some(&self.scene.machine)
     }
 
     /// Whether the machine of another rover is its own. An equal one becomes its own.
@@ -110,7 +110,7 @@ impl RoverSimulation {
         }
         let is_equal = **own == **other;
         if is_equal {
-            self.scene.machine = Ok(Arc::clone(other));
+            self.scene.machine = Arc::clone(other);
         }
         is_equal
     }
@@ -151,10 +151,10 @@ impl RoverSimulation {
         });
     }
 
-    /// A general step.
-    pub(super) fn step_generally(&mut self) -> Result<StepReport, StepError> {
+    /// A step with all effort.
+    pub(super) fn step_alone(&mut self) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
-        self.general_step(&variant, &mut NoProbe)
+        self.step_with_all_effort(&variant, &mut NoProbe)
     }
 
     fn lane_rover(&mut self) -> LaneRover<'_> {

@@ -4,10 +4,10 @@ use nalgebra::Vector3;
 
 use super::Block;
 use super::system::LaneSystem;
+use crate::contact::slots::contacts::Sight;
+use crate::contact::slots::joint_slots::JointRow;
 use crate::contact::{Activation, Contact};
 use crate::integrator::StepOptions;
-use crate::lanes::contacts::Sight;
-use crate::lanes::joint_slots::JointRow;
 use crate::law::materials::Materials;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Lane, LaneMask};

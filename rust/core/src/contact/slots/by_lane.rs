@@ -1,69 +1,19 @@
 //! The contacts of a block that are found lane by lane (`lane_detection`).
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::machine::Machine;
-use crate::contact::body_motion::BodyMotion;
 use crate::contact::{Contact, PairSearch, Part};
-use crate::multibody::Motion;
-use crate::multibody::Poses;
-use crate::multibody::mechanism::Mechanism;
-use crate::scalar::{Lane, MAX_LANES, Vec3};
-
-/// A lane of a block.
-#[derive(Clone, Copy)]
-pub(super) struct OneLane<'a, T: Lane> {
-    pub machine: &'a Machine,
-    pub poses: &'a Poses<T>,
-    pub v: &'a [T],
-    pub lane: usize,
-}
-
-impl<T: Lane> BodyMotion for OneLane<'_, T> {
-    #[inline]
-    fn mechanism(&self) -> &Mechanism {
-        self.machine
-    }
-
-    #[inline]
-    fn origin(&self, body: usize) -> Vector3<f64> {
-        let tree = self.machine.tree_of_body(body);
-        self.poses.origin_of(tree).get(self.lane).into()
-    }
-
-    #[inline]
-    fn pose(&self, body: usize) -> (Matrix3<f64>, Vector3<f64>) {
-        let own = &self.poses.bodies[body];
-        let columns = own.R.columns().map(|x| Vector3::from(x.get(self.lane)));
-        (Matrix3::from_columns(&columns), own.r.get(self.lane).into())
-    }
-
-    #[inline]
-    fn motion(&self, motion: usize) -> Motion<f64> {
-        let own = &self.poses.motions[motion];
-        let vector = |x: Vec3<T>| Vec3::from(Vector3::from(x.get(self.lane)));
-        Motion {
-            axis: vector(own.axis),
-            swing: vector(own.swing),
-        }
-    }
-
-    #[inline]
-    fn velocity(&self, k: usize) -> f64 {
-        self.v[k].get(self.lane)
-    }
-}
+use crate::scalar::MAX_LANES;
 
 /// A part whose contacts are asked for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(crate) struct Asked {
     pub part: Part,
     pub lanes: u32,
 }
 
 /// A contact of a lane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(crate) struct Found {
     pub lane: usize,
     pub contact: Contact,
     /// Whether the path of its slot is not its body's.
@@ -72,7 +22,7 @@ pub(super) struct Found {
 
 /// The contacts of a block that are found lane by lane.
 #[derive(Clone, Debug)]
-pub(super) struct ByLane {
+pub(crate) struct ByLane {
     /// Slots that contacts of each body fit, and those of contacts between bodies.
     pub hosts: Vec<Vec<usize>>,
     pub of_pairs: Vec<usize>,
@@ -89,7 +39,7 @@ pub(super) struct ByLane {
 
 impl ByLane {
     /// Room for a machine whose wheels' slots end at `first_spare`.
-    pub(super) fn new(machine: &Machine, first_spare: usize) -> Self {
+    pub(crate) fn new(machine: &Machine, first_spare: usize) -> Self {
         let bodies = machine.slot_bodies();
         let n_slots = bodies.len();
         let last_spare = first_spare + machine.spares.len();
@@ -116,25 +66,25 @@ impl ByLane {
 
     /// Whether anything is to be found.
     #[inline(always)]
-    pub(super) fn is_asked(&self) -> bool {
+    pub(crate) fn is_asked(&self) -> bool {
         !self.asked.is_empty()
     }
 
     /// Asks for the contacts of a part in some lanes.
     #[cold]
-    pub(super) fn ask(&mut self, part: Part, lanes: u32) {
+    pub(crate) fn ask(&mut self, part: Part, lanes: u32) {
         self.asked.push(Asked { part, lanes });
     }
 
     /// Lanes of a slot with a contact that was found lane by lane.
     #[inline(always)]
-    pub(super) fn given(&self, slot: usize) -> u32 {
+    pub(crate) fn given(&self, slot: usize) -> u32 {
         self.given[slot]
     }
 
     /// The contact of a slot in a lane, if it was found lane by lane.
     #[inline(always)]
-    pub(super) fn contact(&self, slot: usize, lane: usize) -> Option<&Contact> {
+    pub(crate) fn contact(&self, slot: usize, lane: usize) -> Option<&Contact> {
         (self.given[slot] >> lane & 1 == 1)
             .then(|| &self.found[usize::from(self.places[slot][lane])].contact)
     }
@@ -155,19 +105,19 @@ impl ByLane {
 
     /// Contacts of a slot that were found lane by lane, with their lanes.
     #[inline(always)]
-    pub(super) fn contacts(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+    pub(crate) fn contacts(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
         (self.found(slot)).map(|found| (found.lane, &found.contact))
     }
 
     /// Contacts found lane by lane whose path is not that of their slot, with their lanes.
     #[inline(always)]
-    pub(super) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+    pub(crate) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
         (self.found(slot).filter(|found| found.is_guest)).map(|found| (found.lane, &found.contact))
     }
 
     /// Contacts between bodies, with their lanes: the body and the other one.
     #[inline(always)]
-    pub(super) fn pairs(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
         self.found.iter().filter_map(|found| {
             let other = found.contact.other?;
             Some((found.lane, [found.contact.body, other.body]))
@@ -176,7 +126,7 @@ impl ByLane {
 
     /// Forgets all of the last step.
     #[inline(always)]
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.asked.clear();
         if !self.found.is_empty() {
             self.found.clear();

@@ -1,10 +1,12 @@
 //! The problems of a block: how they are posed, and what their answers say.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::system::LaneSystem;
-use crate::contact::clusters_of;
+use crate::contact::slots::sweeps::write_start;
+use crate::contact::{ContactKey, clusters_of};
 use crate::integrator::grouped::Grouped;
 use crate::integrator::{StepOptions, StepReport, WarmStart};
-use crate::lanes::sweeps::write_start;
+use crate::multibody::Model;
 use crate::scalar::{Lane, LaneMask};
 use crate::solver::batch::problem::{ContactProblem, Triple};
 use crate::solver::{Method, SolverOptions};
@@ -102,6 +104,78 @@ impl<T: Lane> LaneSystem<T> {
         }
     }
 
+    /// Fills the problems' `p` with the impulses that a rover remembers of its contacts, N s, zero
+    /// for new ones. Marks in `is_same` each cluster whose group had exactly these contacts in the
+    /// last step.
+    #[inline(always)]
+    pub(super) fn recall_impulses(
+        &self,
+        lane: usize,
+        memory: &WarmStart,
+        problems: &mut [ContactProblem],
+        is_same: &mut [T::Mask],
+    ) {
+        let (contacts, own) = (&self.contacts, T::mask(self.token, 1 << lane));
+        let (mut n, mut n_known) = (0, 0);
+        for (index, is_same) in contacts.problems_of(lane).zip(&mut *is_same) {
+            let (list, problem) = (contacts.list(index), &mut problems[index]);
+            let n_before = n_known;
+            for (place, out) in problem.p.chunks_exact_mut(3).enumerate().take(list.n) {
+                let wanted = list.keys[place];
+                let same = memory.impulses.get(n + place);
+                let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
+                    n_known += 1;
+                    *known
+                } else {
+                    let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
+                    n_known += usize::from(found.is_some());
+                    found.map_or([0.0; 3], |(_, known)| *known)
+                };
+                out.copy_from_slice(&known);
+            }
+            n += list.n;
+            let has_new = n_known - n_before != list.n;
+            *is_same = (*is_same & !own) | (if has_new { own & !own } else { own });
+        }
+        if n_known == memory.impulses.len() {
+            // Followers have no list: what their leaders say holds for them.
+        } else if let [only] = &mut *is_same {
+            *only = *only & !own;
+        } else if let Some(model) = &self.tree.models[lane] {
+            self.note_lost(lane, model, memory, is_same);
+        }
+        contacts.intersect(is_same);
+    }
+
+    /// Takes the mark from clusters that have lost a contact.
+    #[cold]
+    fn note_lost(&self, lane: usize, model: &Model, memory: &WarmStart, is_same: &mut [T::Mask]) {
+        let others = !T::mask(self.token, 1 << lane);
+        let has = |wanted: &ContactKey| {
+            let contacts = &self.contacts;
+            let mut lists = contacts.problems_of(lane).map(|index| contacts.list(index));
+            lists.any(|list| list.keys[..list.n].contains(wanted))
+        };
+        for (key, _) in memory.impulses.iter().filter(|(key, _)| !has(key)) {
+            for cluster in clusters_of(model, key) {
+                is_same[cluster] = is_same[cluster] & others;
+            }
+        }
+    }
+
+    /// Makes a rover remember the impulses of its contacts, the problems' `p`, N s.
+    #[inline(always)]
+    fn remember(&self, lane: usize, problems: &[ContactProblem], memory: &mut WarmStart) {
+        memory.impulses.clear();
+        for index in self.contacts.problems_of(lane) {
+            let (list, problem) = (self.contacts.list(index), &problems[index]);
+            for (place, p) in problem.p.chunks_exact(3).enumerate().take(list.n) {
+                let known = (list.keys[place], [p[0], p[1], p[2]]);
+                memory.impulses.push(known);
+            }
+        }
+    }
+
     /// Enters the answers in reports and memories; returns the lanes whose problems are solved.
     pub(super) fn read_answers(
         &mut self,
@@ -126,7 +200,7 @@ impl<T: Lane> LaneSystem<T> {
                 }
             }
             solved |= u32::from(is_solved) << lane;
-            self.contacts.remember(lane, problems, memory);
+            self.remember(lane, problems, memory);
         }
         T::mask(self.token, solved)
     }

@@ -25,14 +25,13 @@
 //! Source: Gear et al. 1985, for constraints on both levels; Featherstone 2008, ch. 8, for loops
 //! closed on a tree.
 //!
-//! Written over the scalar: a rover of the general step, those of a block (`crate::lanes`), or dual
-//! numbers of one rover with a direction a lane (`super::tangent`). A row that some lanes leave
+//! Written over the scalar: one rover, those of a block ([`super::slots`]), or dual numbers of one rover
+//! with a direction a lane. A row that some lanes leave
 //! out is zero there, so that no lane depends on its neighbours.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use crate::contact::ContactSystem;
-use crate::contact::rows::{Triple, add_scaled, along};
-use crate::integrator::report::MOST_OPEN;
+use super::ContactSystem;
+use super::rows::{Triple, add_scaled, along};
 use crate::multibody::error::StateError;
 use crate::multibody::loops::{Placed, widest, write_loops};
 use crate::multibody::model::Loop;
@@ -41,6 +40,9 @@ use crate::multibody::{
     Model, Poses,
 };
 use crate::scalar::{Lane, LaneMask, Single};
+
+/// Gap of a closed loop at the end of a step above which the step has not converged, m or rad.
+pub(crate) const MOST_OPEN: f64 = 1e-6;
 
 /// Part of a row outside the span of earlier rows, relative to the longest of its loop, below which
 /// it follows from them.
@@ -420,7 +422,7 @@ impl<T: Lane> Loops<T> {
 
     /// `y −= Qᵀ Q y`: what the loops leave of any change of the velocity.
     #[inline(always)]
-    pub(super) fn restrict(&self, y: &mut [T]) {
+    pub(crate) fn restrict(&self, y: &mut [T]) {
         for row in 0..self.m() {
             let q = self.q(row);
             let share = dot(q, y);
@@ -485,26 +487,13 @@ impl<T: Lane> Loops<T> {
 
     /// Projects a configuration from elsewhere onto the loops, and the velocity onto their rates.
     /// Returns the widest gap that is left.
-    pub(super) fn project(
+    pub(crate) fn project(
         &mut self,
         with: &Projector<'_, T>,
         q: &mut LaneConfiguration<T>,
         v: &mut [T],
     ) -> T {
         let gap = self.project_in(with, MOST_ELSEWHERE, q);
-        self.project_velocity(with, v);
-        gap
-    }
-
-    /// Projects a configuration at the end of a step onto the loops, and the velocity onto their
-    /// rates. Returns the widest gap that is left, m or rad.
-    pub(super) fn project_end(
-        &mut self,
-        with: &Projector<'_, T>,
-        q: &mut LaneConfiguration<T>,
-        v: &mut [T],
-    ) -> T {
-        let gap = self.project_position(with, q);
         self.project_velocity(with, v);
         gap
     }
@@ -611,7 +600,7 @@ impl<T: Lane> Loops<T> {
     }
 
     /// Impulses of all rows in the last step (m), N s or N m s, to be set.
-    pub(super) fn impulses_mut(&mut self) -> &mut [T] {
+    pub(crate) fn impulses_mut(&mut self) -> &mut [T] {
         &mut self.impulses
     }
 }
@@ -623,39 +612,31 @@ impl Loops<f64> {
     }
 
     /// Computes B, and projects the rows of contacts; those that the loops hold are then zero.
-    pub(super) fn project_contacts(&mut self, model: &Model, system: &mut ContactSystem) {
+    pub(crate) fn project_contacts(&mut self, system: &mut ContactSystem) {
         let n = system.n_contacts();
         self.set_size(n);
-        if n == 0 {
-            return;
-        }
-        for row in 0..self.m() {
-            let b = self.B[row * n..][..n].as_flattened_mut();
-            system.local(model, self.middle.q(row, model.nv()), b);
-        }
-        system.spread(model);
+        system.begin_restriction();
         for c in 0..n {
-            let free = system.squares(model, c);
-            self.project_rows(c, system.spread_rows(model, c));
-            let held = Self::holds(&free, &system.squares(model, c), ROUNDED_SQUARE);
+            for row in 0..self.m() {
+                let mut b = [0.0; 3];
+                for (z, q) in system.rows(c).iter().zip(self.q(row)) {
+                    add_scaled(&mut b, z, *q);
+                }
+                *self.product_mut(row, c) = b;
+            }
+            let free = squares(system.rows(c));
+            let rows = system.restricted_mut(c);
+            self.project_rows(c, rows);
+            let held = Self::holds(&free, &squares(rows), ROUNDED_SQUARE);
             self.hold(c, held);
-            system.hold(model, c, &free, held);
+            system.hold(c, &free, held);
         }
     }
+}
 
-    /// Projects the configuration onto the loops and the velocity onto their rates, and keeps the
-    /// impulses of a step with the contacts' p. Returns the widest gap that is left.
-    pub(super) fn end(
-        &mut self,
-        model: &Model,
-        factor: &Factor<f64>,
-        p: &[f64],
-        q: &mut LaneConfiguration<f64>,
-        v: &mut [f64],
-    ) -> f64 {
-        self.find_impulses(&each(p));
-        self.project_end(&projector(model, factor), q, v)
-    }
+/// Squares of the lengths of a contact's rows, 1/kg.
+fn squares(rows: &[Triple<f64>]) -> Triple<f64> {
+    [0, 1, 2].map(|k| rows.iter().map(|z| z[k] * z[k]).sum())
 }
 
 /// What a single machine is projected with.
@@ -669,7 +650,7 @@ fn projector<'a>(model: &'a Model, factor: &'a Factor<f64>) -> Projector<'a, f64
 }
 
 /// The impulses p (3 n_c) of a single machine, by contact.
-pub(super) fn each(p: &[f64]) -> impl Iterator<Item = (usize, bool, Triple<f64>)> + Clone {
+pub(crate) fn each(p: &[f64]) -> impl Iterator<Item = (usize, bool, Triple<f64>)> + Clone {
     let all = p.chunks_exact(3).map(|p| [p[0], p[1], p[2]]);
     all.enumerate().map(|(contact, p)| (contact, true, p))
 }
@@ -686,7 +667,7 @@ fn factor_of(model: &Model, kinematics: &Kinematics) -> Option<Factor<f64>> {
 }
 
 /// The poses of a single machine.
-pub(super) fn placed<'a>(
+pub(crate) fn placed<'a>(
     model: &'a Model,
     kinematics: &'a Kinematics,
     joints: &'a [f64],

@@ -20,7 +20,7 @@ const _: () = assert!(
 
 /// The clusters of a machine.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Clusters {
+pub(crate) struct Clusters {
     /// Cluster of each tree.
     of_tree: Vec<usize>,
     /// Velocities of each cluster, ascending; those of a free root come first.
@@ -54,11 +54,11 @@ impl LazyPattern {
 
 /// Patterns with all entries, by number of velocities: of bodies that touch each other.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct WidePatterns(Vec<(usize, LazyPattern)>);
+pub(crate) struct WidePatterns(Vec<(usize, LazyPattern)>);
 
 impl WidePatterns {
     /// Pattern with all entries for clusters that have `nv` velocities together.
-    pub(super) fn of(&self, nv: usize) -> &Arc<Pattern> {
+    pub(crate) fn of(&self, nv: usize) -> &Arc<Pattern> {
         let Some((_, own)) = self.0.iter().find(|(size, _)| *size == nv) else {
             unreachable!("invariant: all sums of clusters are listed")
         };
@@ -68,7 +68,7 @@ impl WidePatterns {
 
 impl Clusters {
     /// Clusters of a mechanism with closed `loops`.
-    pub(super) fn of(mechanism: &Mechanism, loops: &[Loop]) -> Self {
+    pub(crate) fn of(mechanism: &Mechanism, loops: &[Loop]) -> Self {
         let of_tree: Vec<usize> = mechanism.trees.iter().map(|tree| tree.cluster).collect();
         let n = mechanism.n_clusters();
         let mut velocities = vec![Vec::new(); n];
@@ -102,27 +102,27 @@ impl Clusters {
     }
 
     /// Number of clusters.
-    pub(super) fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         self.velocities.len()
     }
 
     /// Cluster of a tree: the index of the contact problem that its contacts belong to.
-    pub(super) fn of_tree(&self, tree: usize) -> usize {
+    pub(crate) fn of_tree(&self, tree: usize) -> usize {
         self.of_tree[tree]
     }
 
     /// Number of trees of a cluster.
-    pub(super) fn n_trees(&self, cluster: usize) -> usize {
+    pub(crate) fn n_trees(&self, cluster: usize) -> usize {
         self.of_tree.iter().filter(|own| **own == cluster).count()
     }
 
     /// Number of velocities in the problems of a cluster.
-    pub(super) fn nv(&self, cluster: usize) -> usize {
+    pub(crate) fn nv(&self, cluster: usize) -> usize {
         self.leads[cluster] + self.velocities[cluster].len()
     }
 
     /// Cluster of each of `nv` velocities, and its place among those of the cluster's problems.
-    pub(super) fn places(&self, nv: usize) -> Vec<[usize; 2]> {
+    pub(crate) fn places(&self, nv: usize) -> Vec<[usize; 2]> {
         let mut places = vec![[0; 2]; nv];
         for (cluster, own) in self.velocities.iter().enumerate() {
             for (place, &velocity) in own.iter().enumerate() {
@@ -133,24 +133,27 @@ impl Clusters {
     }
 
     /// Patterns of problems with contacts between bodies.
-    pub(super) fn wide(&self) -> &WidePatterns {
+    pub(crate) fn wide(&self) -> &WidePatterns {
         &self.wide
     }
 
     /// Pattern of the problems of a cluster, whose slots move the bodies with these paths. Where
-    /// loops are closed, or a coupled joint follows one with other carriers, it has all entries.
+    /// loops are closed, a coupled joint follows one with other carriers, or there are more slots
+    /// than contacts of a problem, it has all entries.
     /// Equal clusters have the same one.
-    pub(super) fn pattern(&self, cluster: usize, paths: &[&[usize]]) -> &Arc<Pattern> {
+    pub(crate) fn pattern(&self, cluster: usize, paths: &[&[usize]]) -> &Arc<Pattern> {
         self.patterns[cluster].get(|| {
             let (own, lead) = (&self.velocities[cluster], self.leads[cluster]);
+            let own_slots = paths.len();
             let place = |velocity: &usize| Some(lead + own.binary_search(velocity).ok()?);
             let local = |path: &&[usize]| {
                 let known = path.iter().map(place);
                 (0..lead).map(Some).chain(known).collect::<Option<Vec<_>>>()
             };
             let paths = paths.iter().map(local).collect::<Option<Vec<_>>>();
+            let has_room = !self.has_loops[cluster] && own_slots <= MAX_CONTACTS;
             let of_tree = paths
-                .filter(|_| !self.has_loops[cluster])
+                .filter(|_| has_room)
                 .and_then(|paths| Pattern::new(self.nv(cluster), &paths));
             let Some(found) = of_tree else {
                 return Arc::clone(self.wide.of(self.nv(cluster)));

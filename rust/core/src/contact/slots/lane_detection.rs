@@ -2,10 +2,11 @@
 //! of boxes and balls, of bodies with each other, and of wheels that touch more than a plane or a
 //! few spheres. They take free slots whose path of velocities begins with their body's.
 
-use super::by_lane::{Asked, Found, OneLane};
+use super::by_lane::{Asked, Found};
 use super::contacts::{Contacts, Sight};
 use super::ground::Ground;
 use super::machine::Machine;
+use crate::contact::body_motion::Still;
 use crate::contact::detection::{Moving, detect_parts};
 use crate::contact::pair_detection::detect_pairs_of;
 use crate::contact::relocation::relocate_to;
@@ -16,7 +17,7 @@ impl<T: Lane> Contacts<T> {
     /// Finds what was asked for, and contacts between bodies in the lanes `meeting`. Returns the
     /// lanes with unknown ground or too few slots.
     #[cold]
-    pub(super) fn find_by_lane(
+    pub(crate) fn find_by_lane(
         &mut self,
         ground: &Ground<T>,
         sight: &Sight<'_, T>,
@@ -27,8 +28,8 @@ impl<T: Lane> Contacts<T> {
             let (Some(model), Some(terrain)) = (&sight.models[lane], ground.terrain(lane)) else {
                 continue;
             };
-            let at = |poses| OneLane {
-                machine: sight.machine,
+            let at = |poses| Still {
+                mechanism: sight.machine.mechanism(),
                 poses,
                 v: sight.v,
                 lane,

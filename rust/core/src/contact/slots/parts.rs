@@ -18,7 +18,7 @@ use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Wheels and boxes.
 #[derive(Clone, Debug)]
-pub(super) struct Parts {
+pub(crate) struct Parts {
     pub wheels: Vec<Wheel>,
     pub boxes: Vec<Solid>,
     /// First velocities of the trees' free roots, whose twists come first; none of a tree that a
@@ -30,7 +30,7 @@ pub(super) struct Parts {
 
 /// A wheel, as contacts need it.
 #[derive(Clone, Debug)]
-pub(super) struct Wheel {
+pub(crate) struct Wheel {
     pub body: usize,
     pub tree: usize,
     /// Slots for the wheel's contacts.
@@ -62,7 +62,7 @@ enum Axle {
 
 /// A box, as contacts need it.
 #[derive(Clone, Debug)]
-pub(super) struct Solid {
+pub(crate) struct Solid {
     pub part: Part,
     pub body: usize,
     pub tree: usize,
@@ -88,14 +88,14 @@ struct Carrier {
 
 /// Velocity of a body: angular, and of its material point at the origin of its tree.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Twist<T> {
+pub(crate) struct Twist<T> {
     pub angular: Vec3<T>,
     pub linear: Vec3<T>,
 }
 
 impl Parts {
     /// The parts of a machine.
-    pub(super) fn of(machine: &Machine) -> Self {
+    pub(crate) fn of(machine: &Machine) -> Self {
         let mut carriers: Vec<Carrier> = (machine.trees.iter())
             .map(|tree| Carrier {
                 body: tree.is_free.then_some(tree.bodies.start),
@@ -163,13 +163,13 @@ impl Parts {
     }
 
     /// Number of twists.
-    pub(super) fn n_carriers(&self) -> usize {
+    pub(crate) fn n_carriers(&self) -> usize {
         self.carriers.len()
     }
 
     /// Twists of all carriers.
     #[inline(always)]
-    pub(super) fn find_twists<T: Lane>(&self, poses: &Poses<T>, v: &[T], twists: &mut [Twist<T>]) {
+    pub(crate) fn find_twists<T: Lane>(&self, poses: &Poses<T>, v: &[T], twists: &mut [Twist<T>]) {
         let n = self.carriers.len();
         let twists = &mut twists[..n];
         for (twist, first) in twists.iter_mut().zip(&self.roots) {
@@ -212,7 +212,7 @@ impl Link {
 impl<T: Lane> Twist<T> {
     /// Velocity of a material point, m/s.
     #[inline(always)]
-    pub(super) fn velocity(&self, x: Vec3<T>) -> Vec3<T> {
+    pub(crate) fn velocity(&self, x: Vec3<T>) -> Vec3<T> {
         self.linear + self.angular.cross(x)
     }
 }
@@ -220,13 +220,13 @@ impl<T: Lane> Twist<T> {
 impl Wheel {
     /// Whether the wheel has a width.
     #[inline(always)]
-    pub(super) fn is_wide(&self) -> bool {
+    pub(crate) fn is_wide(&self) -> bool {
         self.section.half > 0.0 || self.section.rounding > 0.0
     }
 
     /// Place of a circle along the axle, m.
     #[inline(always)]
-    pub(super) fn along(&self, circle: usize) -> f64 {
+    pub(crate) fn along(&self, circle: usize) -> f64 {
         if circle == 0 {
             self.section.half
         } else {
@@ -236,19 +236,19 @@ impl Wheel {
 
     /// Number of its circles.
     #[inline(always)]
-    pub(super) fn n_circles(&self) -> usize {
+    pub(crate) fn n_circles(&self) -> usize {
         if self.section.half > 0.0 { 2 } else { 1 }
     }
 
     /// Centre relative to the origin of its tree, m.
     #[inline(always)]
-    pub(super) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
+    pub(crate) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
         place(pose, self.centre.as_ref())
     }
 
     /// Unit axle.
     #[inline(always)]
-    pub(super) fn axle<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
+    pub(crate) fn axle<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
         match self.axle {
             Axle::Frame(k, is_reversed) => {
                 let axis = match k {
@@ -265,7 +265,7 @@ impl Wheel {
     /// Upper bound on the speed at which its surface moves along its normal, m/s, with the unit
     /// axle `s` and its centre at `centre`: its spin moves it nowhere.
     #[inline(always)]
-    pub(super) fn speed<T: Lane>(&self, twist: &Twist<T>, (s, centre): (Vec3<T>, Vec3<T>)) -> T {
+    pub(crate) fn speed<T: Lane>(&self, twist: &Twist<T>, (s, centre): (Vec3<T>, Vec3<T>)) -> T {
         let turning = twist.angular.cross(s).norm();
         twist.velocity(centre).norm() + turning * turning.like(self.bound)
     }
@@ -274,13 +274,13 @@ impl Wheel {
 impl Solid {
     /// Centre relative to the origin of its tree, m.
     #[inline(always)]
-    pub(super) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
+    pub(crate) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
         place(pose, self.centre.as_ref())
     }
 
     /// Rotation from the box's frame to the world's; its columns are the box's axes.
     #[inline(always)]
-    pub(super) fn axes<T: Lane>(&self, pose: &Pose<T>) -> Mat3<T> {
+    pub(crate) fn axes<T: Lane>(&self, pose: &Pose<T>) -> Mat3<T> {
         match &self.rotation {
             None => pose.R,
             Some(rotation) => pose.R.times_columns(rotation),
@@ -289,7 +289,7 @@ impl Solid {
 
     /// Upper bound on the speed of all its points, m/s, with its centre at `centre`.
     #[inline(always)]
-    pub(super) fn speed<T: Lane>(&self, twist: &Twist<T>, centre: Vec3<T>) -> T {
+    pub(crate) fn speed<T: Lane>(&self, twist: &Twist<T>, centre: Vec3<T>) -> T {
         twist.velocity(centre).norm() + twist.angular.norm() * centre.x.like(self.bound)
     }
 }

@@ -7,12 +7,13 @@
 
 use std::sync::Arc;
 
-use super::by_lane::OneLane;
 use super::clusters::WidePatterns;
 use super::contacts::{Contacts, Slot};
 use super::joint_slots::JointRow;
 use super::machine::Machine;
+use crate::contact::body_motion::Still;
 use crate::contact::jacobian::{add_impulse, for_each_row};
+use crate::contact::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
 use crate::contact::rows::{Path, Place, add, add_scaled, product, square};
 use crate::contact::{Contact, rollers};
 use crate::multibody::mechanism::{BASE, Mover};
@@ -21,7 +22,6 @@ use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::batch::pattern::Pattern;
 use crate::solver::batch::problem::{ContactProblem, Triple, block};
-use crate::system::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
 
 /// What is read of a problem.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,7 @@ pub struct Rows<T: Lane> {
     starts: Vec<usize>,
     /// Blocks of W for the slots of each cluster in use by lanes without factors, row-major:
     /// [`block`] of their positions among them, from the cluster's first.
-    pub(super) W: Vec<[T; 9]>,
+    pub(crate) W: Vec<[T; 9]>,
     first_blocks: Vec<usize>,
     /// Patterns of the problems with factors: of each cluster, and of those whose bodies touch each
     /// other.
@@ -65,14 +65,14 @@ pub struct Rows<T: Lane> {
     /// Number of velocities of each cluster.
     sizes: Vec<usize>,
     /// Diagonal blocks of W by slot, and what [`Self::soften`] added to them, 1/kg.
-    pub(super) diagonal: Vec<[T; 9]>,
-    pub(super) softness: Vec<Triple<T>>,
+    pub(crate) diagonal: Vec<[T; 9]>,
+    pub(crate) softness: Vec<Triple<T>>,
     /// W's entry of the normal of a joint's dry friction by slot, 1/kg; 0 of others.
-    pub(super) normal: Vec<T>,
+    pub(crate) normal: Vec<T>,
     /// The motion in [`Self::sweep`] (nv, factor coordinates), and the products of the loops with
     /// it.
-    pub(super) swept: Vec<T>,
-    pub(super) swept_loops: Vec<T>,
+    pub(crate) swept: Vec<T>,
+    pub(crate) swept_loops: Vec<T>,
     /// Z of each slot over all velocities without the motions that would open a loop
     /// (n_slots, nv), of a machine that loops tie to the world. Several contacts of one body on a
     /// stand are then dependent to the square of rounding, as W's entries are to rounding.
@@ -209,7 +209,7 @@ impl<T: Lane> Rows<T> {
 
     /// Path of a slot, and its rows of Z.
     #[inline(always)]
-    pub(super) fn of(&self, contacts: &Contacts<T>, slot: usize) -> (Path<'_>, &[Triple<T>]) {
+    pub(crate) fn of(&self, contacts: &Contacts<T>, slot: usize) -> (Path<'_>, &[Triple<T>]) {
         let path = self.path(contacts.part(slot));
         (path, &self.Z[self.starts[slot]..][..path.len()])
     }
@@ -254,8 +254,8 @@ impl<T: Lane> Rows<T> {
                 *u = zero;
             }
             for (lane, contact) in contacts.by_lane.guests(slot) {
-                let one = OneLane {
-                    machine,
+                let one = Still {
+                    mechanism: machine.mechanism(),
                     poses: end,
                     v,
                     lane,
@@ -407,12 +407,12 @@ impl<T: Lane> Rows<T> {
 
     /// Lanes in which nothing moves a slot's contact along its normal.
     #[inline(always)]
-    pub(super) fn immovable(&self, slot: usize) -> T::Mask {
+    pub(crate) fn immovable(&self, slot: usize) -> T::Mask {
         self.immovable[slot]
     }
 
     /// Number of contacts of a lane that nothing moves along their normals.
-    pub(super) fn n_immovable(&self, contacts: &Contacts<T>, lane: usize) -> usize {
+    pub(crate) fn n_immovable(&self, contacts: &Contacts<T>, lane: usize) -> usize {
         let here =
             |slot: &&usize| (self.immovable[**slot] & contacts.slot(**slot).active).get(lane);
         self.held.iter().filter(here).count()
@@ -943,8 +943,8 @@ fn add_impulses_of_guests<T: Lane>(
     for &slot in contacts.used_by_shapes() {
         let guests = contacts.by_lane.guests(slot);
         for (lane, contact) in guests.filter(|(lane, _)| lanes.get(*lane)) {
-            let one = OneLane {
-                machine,
+            let one = Still {
+                mechanism: machine.mechanism(),
                 poses: end,
                 v: &[],
                 lane,
@@ -960,7 +960,7 @@ fn add_impulses_of_guests<T: Lane>(
 /// Writes the rows of Hᵀ and `Hᵀ v` of a lane's contact along the path of a slot that is not its
 /// own.
 fn write_guest<T: Lane>(
-    one: &OneLane<'_, T>,
+    one: &Still<'_, T>,
     contact: &Contact,
     path: Path<'_>,
     rows: &mut [Triple<T>],
@@ -986,7 +986,7 @@ fn write_guest<T: Lane>(
 
 /// Impulses of the slots in use, and where they have one among the lanes of a mask.
 #[inline(always)]
-pub(super) fn in_slots<'a, T: Lane>(
+pub(crate) fn in_slots<'a, T: Lane>(
     contacts: &'a Contacts<T>,
     lanes: T::Mask,
     p: &'a [Triple<T>],

@@ -1,16 +1,16 @@
-//! Scratch of a rover's fast steps: a block of one lane.
+//! The block of one lane in which a rover takes its steps with the usual effort.
 
 use std::sync::OnceLock;
 
-use crate::lanes::block::Block;
 use crate::solver::SolverOptions;
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;
+use crate::system::block::Block;
 
-/// A block of one lane, made when first needed. It holds no state: a copy has no block, only the
+/// A rover's own block, made when first needed. It holds no state: a copy has no block, only the
 /// operator of the last step.
 #[derive(Default)]
-pub(super) struct Quick {
+pub(super) struct OwnBlock {
     pub(super) block: Option<Box<Block<f64>>>,
     /// The solver's scratch.
     pub(super) queue: Option<Box<Queue<f64>>>,
@@ -22,7 +22,7 @@ pub(super) struct Quick {
     operator: OnceLock<Vec<f64>>,
 }
 
-impl Clone for Quick {
+impl Clone for OwnBlock {
     fn clone(&self) -> Self {
         let operator = OnceLock::new();
         if let Some(own) = self.operator() {
@@ -36,13 +36,13 @@ impl Clone for Quick {
     }
 }
 
-impl std::fmt::Debug for Quick {
+impl std::fmt::Debug for OwnBlock {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Quick").finish_non_exhaustive()
+        f.debug_struct("OwnBlock").finish_non_exhaustive()
     }
 }
 
-impl Quick {
+impl OwnBlock {
     /// Notes whether the last step was taken here.
     pub(super) fn set_last(&mut self, is_last: bool) {
         self.is_last = is_last;

@@ -16,9 +16,9 @@ const FOR_PAIRS: usize = 6;
 const MOST_FOR_PAIRS: usize = 24;
 
 impl Machine {
-    /// Bodies whose path the further slots have, as far as their cluster has room; `None`: all
-    /// velocities.
-    pub(super) fn find_free_slots(&self) -> Vec<Option<usize>> {
+    /// Bodies whose path the further slots have, as far as the pattern of their cluster has room if
+    /// it is one along paths; `None`: all velocities.
+    pub(crate) fn find_free_slots(&self) -> Vec<Option<usize>> {
         let n_pairs = (FOR_PAIRS * self.trees.len()).min(MOST_FOR_PAIRS);
         let for_pairs = std::iter::repeat_n(None, if self.has_pairs { n_pairs } else { 0 });
         let for_bodies = (0..self.clusters.n()).flat_map(|own| self.find_slots_of_bodies(own));
@@ -44,19 +44,20 @@ impl Machine {
             .joints_with_slots()
             .map(|joint| self.joints[joint].body);
         let n_of_joints = of_joints.filter(is_own).count();
-        let room = MAX_CONTACTS.saturating_sub(n_of_wheels + n_of_joints);
+        let room = MAX_CONTACTS.checked_sub(n_of_wheels + n_of_joints);
+        let room = room.unwrap_or(usize::MAX);
         let slots = ends.iter().flat_map(|&end| [end; FOR_BODIES]);
         slots.take(room).collect()
     }
 
     /// Joints with slots of their own: those with stops, then those with dry friction.
-    pub(super) fn joints_with_slots(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn joints_with_slots(&self) -> impl Iterator<Item = usize> {
         let stops = self.stops.iter().map(|stop| stop.joint);
         stops.chain(self.rubbing.iter().copied())
     }
 
     /// Bodies whose path each slot has, in order; `None`: all velocities.
-    pub(super) fn slot_bodies(&self) -> Vec<Option<usize>> {
+    pub(crate) fn slot_bodies(&self) -> Vec<Option<usize>> {
         let wheels = (self.wheels.iter())
             .flat_map(|wheel| std::iter::repeat_n(Some(wheel.body), wheel.n_slots));
         let joints = (self.joints_with_slots()).map(|joint| Some(self.joints[joint].body));
@@ -67,7 +68,7 @@ impl Machine {
     }
 
     /// Whether all that moves a body also moves another one.
-    pub(super) fn carries(&self, body: usize, other: usize) -> bool {
+    pub(crate) fn carries(&self, body: usize, other: usize) -> bool {
         self.tree_of_body(body) == self.tree_of_body(other)
             && self.path(other).starts_with(self.path(body))
     }

@@ -102,9 +102,9 @@ impl Kept {
 #[derive(Clone)]
 pub struct Ground<T: Lane> {
     /// Unit normal of the plane.
-    pub(super) normal: Vec3<T>,
+    pub(crate) normal: Vec3<T>,
     /// Offset of the plane, m; ∞ without a plane.
-    pub(super) offset: T,
+    pub(crate) offset: T,
     /// Terrain of each lane, once it has one.
     terrains: Vec<Option<Arc<dyn Terrain>>>,
     /// Terrains of the lanes whose ground may be more than a plane.
@@ -119,6 +119,9 @@ pub struct Ground<T: Lane> {
     soft: T::Mask,
     /// Rovers on a surface and a plane.
     mixed: T::Mask,
+    /// Rovers on soft ground with firm ground of another kind beside it, whose contacts are found
+    /// lane by lane.
+    pub(crate) beside_firm: T::Mask,
     planes: Vec<ContactPlane<T>>,
     /// Near each wheel.
     pieces: Vec<Pieces<T>>,
@@ -164,6 +167,7 @@ impl<T: Lane> Ground<T> {
             under_wheels: vec![None; T::LANES],
             soft: T::mask(token, 0),
             mixed: T::mask(token, 0),
+            beside_firm: T::mask(token, 0),
             planes: vec![ContactPlane::new(token); n_wheels],
             pieces: vec![Pieces::new(token); n_wheels],
             wheels: vec![near; n_wheels],
@@ -186,13 +190,17 @@ impl<T: Lane> Ground<T> {
         self.normal.set(lane, normal);
         self.offset.set(lane, offset);
         let soft = terrain.soft();
+        let own = T::mask(self.offset.token(), 1 << lane);
+        self.beside_firm = self.beside_firm & !own;
+        if soft.as_ref().is_some_and(|layer| !layer.is_alone) {
+            self.beside_firm = self.beside_firm | own;
+        }
         let is_plane = match &soft {
             Some(layer) => layer.surface.is_plane() && !terrain.can_be_passed(),
             None => terrain.is_plane(),
         };
         self.fields[lane] = (!is_plane).then(|| Arc::clone(terrain));
         self.has_spheres = self.fields.iter().any(Option::is_some);
-        let own = T::mask(self.offset.token(), 1 << lane);
         let has_surface = terrain.has_surface();
         self.surfaces[lane] = has_surface.then(|| Arc::clone(terrain));
         self.has_surfaces = self.surfaces.iter().any(Option::is_some);
@@ -234,20 +242,20 @@ impl<T: Lane> Ground<T> {
 
     /// Whether any rover's ground may have spheres.
     #[inline(always)]
-    pub(super) fn has_spheres(&self) -> bool {
+    pub(crate) fn has_spheres(&self) -> bool {
         self.has_spheres
     }
 
     /// Whether any rover's ground has a surface.
     #[inline(always)]
-    pub(super) fn has_surfaces(&self) -> bool {
+    pub(crate) fn has_surfaces(&self) -> bool {
         self.has_surfaces
     }
 
     /// Finds the plane that the rovers' wheel stands on where the ground is a surface: see
     /// [`ContactPlane::find`].
     #[inline(always)]
-    pub(super) fn find_plane(
+    pub(crate) fn find_plane(
         &mut self,
         wheel: usize,
         centre: Vec3<T>,
@@ -273,7 +281,7 @@ impl<T: Lane> Ground<T> {
 
     /// The plane under a wheel.
     #[inline(always)]
-    pub(super) fn under_wheel(&self, wheel: usize) -> LanePlane<T> {
+    pub(crate) fn under_wheel(&self, wheel: usize) -> LanePlane<T> {
         let ContactPlane { normal, offset, .. } = self.planes[wheel];
         LanePlane { normal, offset }
     }
@@ -281,7 +289,7 @@ impl<T: Lane> Ground<T> {
     /// The pieces that the rovers' wheel may touch, of the given lanes, and the lanes where they
     /// are known; none if they are in no lane.
     #[inline(always)]
-    pub(super) fn find_pieces(
+    pub(crate) fn find_pieces(
         &mut self,
         wheel: usize,
         lanes: T::Mask,
@@ -293,18 +301,18 @@ impl<T: Lane> Ground<T> {
     }
 
     /// The ground of a lane.
-    pub(super) fn terrain(&self, lane: usize) -> Option<&Arc<dyn Terrain>> {
+    pub(crate) fn terrain(&self, lane: usize) -> Option<&Arc<dyn Terrain>> {
         self.terrains[lane].as_ref()
     }
 
     /// Whether a rover's ground is a surface.
     #[inline(always)]
-    pub(super) fn is_surface(&self, lane: usize) -> bool {
+    pub(crate) fn is_surface(&self, lane: usize) -> bool {
         self.surfaces[lane].is_some()
     }
 
     /// Rovers whose wheels stand on a surface.
-    pub(super) fn on_surface(&self) -> T::Mask {
+    pub(crate) fn on_surface(&self) -> T::Mask {
         let bits = (self.under_wheels.iter().enumerate()).fold(0, |bits, (lane, own)| {
             bits | u32::from(own.is_some()) << lane
         });
@@ -313,20 +321,20 @@ impl<T: Lane> Ground<T> {
 
     /// Height of a point over the plane, m.
     #[inline(always)]
-    pub(super) fn height(&self, x: Vec3<T>) -> T {
+    pub(crate) fn height(&self, x: Vec3<T>) -> T {
         self.normal.dot(x) + self.offset
     }
 
     /// Height of a point over the plane that wheels stand on, m; ∞ on soft ground.
     #[inline(always)]
-    pub(super) fn height_for_wheels(&self, x: Vec3<T>) -> T {
+    pub(crate) fn height_for_wheels(&self, x: Vec3<T>) -> T {
         let height = self.height(x);
         T::select(self.soft, height.like(f64::INFINITY), height)
     }
 
     /// Spheres near a wheel, for the rover that has most; see [`Self::look_around_wheel`].
     #[inline(always)]
-    pub(super) fn near_wheel(&self, wheel: usize) -> &[GroundSphere<T>] {
+    pub(crate) fn near_wheel(&self, wheel: usize) -> &[GroundSphere<T>] {
         let near = &self.wheels[wheel];
         &near.spheres[..near.n]
     }
@@ -334,7 +342,7 @@ impl<T: Lane> Ground<T> {
     /// Makes [`Self::near_wheel`] contain all spheres that come closer than `need` (m) to a ball of
     /// radius `radius` (m) about `centre` (world, m). True where there are too many.
     #[inline(always)]
-    pub(super) fn look_around_wheel(
+    pub(crate) fn look_around_wheel(
         &mut self,
         wheel: usize,
         centre: Vec3<T>,
@@ -363,7 +371,7 @@ impl<T: Lane> Ground<T> {
     /// m) and the axes `R`, or so near that the box, which moves by up to `motion` (m) in half a
     /// step, may pass it.
     #[inline(always)]
-    pub(super) fn is_near_box(
+    pub(crate) fn is_near_box(
         &mut self,
         number: usize,
         centre: Vec3<T>,
@@ -569,7 +577,7 @@ fn clearance_of(solid: &OrientedBox, sphere: &Sphere) -> f64 {
 /// Upper bound on the motion of a point at unit distance from the centre: the Frobenius norm of the
 /// difference of two attitudes.
 #[inline(always)]
-pub(super) fn turning<T: Lane>(R: &Mat3<T>, S: &Mat3<T>) -> T {
+pub(crate) fn turning<T: Lane>(R: &Mat3<T>, S: &Mat3<T>) -> T {
     let (x, y, z) = (R.x - S.x, R.y - S.y, R.z - S.z);
     (x.dot(x) + y.dot(y) + z.dot(z)).sqrt()
 }
