@@ -106,8 +106,9 @@ pub(super) enum Level {
 }
 
 /// Divisor of the solver's budget for the least that each solve of a step gets, however much the
-/// ones before it have spent.
-const SOLVE_SHARE: u64 = 16;
+/// ones before it have spent. Of 5700 solves of heaps of 27 boxes that sweeps and Newton leave to
+/// the stages after them, 30% take more than a sixteenth of it, 4% more than a quarter.
+const SOLVE_SHARE: u64 = 4;
 
 /// Budget of the next solve of a step.
 pub(super) fn left_of(budget: u64, spent: u64) -> u64 {

@@ -94,7 +94,10 @@ impl<S: MechanicalSystem> Listed<'_, S> {
     ) -> Vec<usize> {
         let mut unsolved = Vec::new();
         for &leader in groups {
-            let options = self.options.solver;
+            let options = SolverOptions {
+                rounding: rounding(free.0),
+                ..self.options.solver
+            };
             let solved = if are_several {
                 self.solve_group(&options, problems, leader, Level::Velocity)
             } else {
@@ -112,7 +115,10 @@ impl<S: MechanicalSystem> Listed<'_, S> {
     /// Solves the problem of all contacts and charges the step's budget. Impulses that the motion
     /// leaves open are those of least norm.
     fn solve_all(&mut self, free: (&[f64], &[f64]), problems: &mut PosedOf<S>) -> SolveReport {
-        let options = self.solver_options();
+        let options = SolverOptions {
+            rounding: rounding(free.0),
+            ..self.solver_options()
+        };
         let list = &mut *self.list;
         let Posed { q, p, u, .. } = problems;
         let q = Local::flat(q);
@@ -304,6 +310,12 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         own.map(|own| self.system.displacement(&d.y, own))
             .fold(most, f64::max)
     }
+}
+
+/// Rounding of contact velocities, m/s, where the bodies move with `v` (m/s, rad/s): a few units in
+/// the last place of its largest entry. Levers are of the order of a metre.
+fn rounding(v: &[f64]) -> f64 {
+    4.0 * f64::EPSILON * v.iter().fold(0.0_f64, |most, v| most.max(v.abs()))
 }
 
 /// Share of the tolerated penetration that many contacts are projected to. Few are projected to the

@@ -3,8 +3,8 @@
 //!
 //! The chapter is built in layers, and no module uses one of a higher layer. From the bottom up:
 //!
-//! - `options`, `report`, `history`, `work`: the caller's options, the report, the residuals on the
-//!   way, and the count of work;
+//! - `options`, `report`, `history`, `work`, `draws`: the caller's options, the report, the
+//!   residuals on the way, the count of work, and numbers that look random;
 //! - `local`: one contact with all others fixed, answered by its law ([`crate::law`]), and its
 //!   mode;
 //! - `linear`: the linear system of a Newton step and its factors, dense or block-sparse;
@@ -48,6 +48,7 @@
 #![doc = include_str!("escalation.md")]
 
 pub mod batch;
+mod draws;
 mod entry;
 mod history;
 mod linear;

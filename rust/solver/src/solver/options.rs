@@ -85,6 +85,12 @@ pub struct SolverOptions {
     pub tolerance: f64,
     /// Largest violation of a converged answer at any contact, m/s; default 1e-9.
     pub velocity_tolerance: f64,
+    /// Rounding of the free velocity q, m/s; default 0. Bodies that move together have a q that is
+    /// the difference of larger velocities, known to the rounding of these.
+    ///
+    /// Where a stage of [`Method::Auto`] misses the tolerances, an answer whose violation is at most
+    /// this at any contact counts as converged.
+    pub rounding: f64,
     /// Most Newton steps of a stage, counting every linear solve; default 500.
     pub max_newton_steps: usize,
     /// Most Gauss–Seidel sweeps, or ADMM iterations, when that method is requested; default 10 000.
@@ -144,6 +150,11 @@ impl SolverOptions {
         residual.relative <= self.tolerance && residual.velocity <= self.velocity_tolerance
     }
 
+    /// Whether the violation is within the rounding of the data.
+    pub(super) fn is_rounding(&self, residual: Residual) -> bool {
+        residual.velocity <= self.rounding
+    }
+
     /// Factor by which a residual exceeds the tolerances.
     pub(super) fn excess(&self, residual: Residual) -> f64 {
         (residual.relative / self.tolerance).max(residual.velocity / self.velocity_tolerance)
@@ -156,6 +167,7 @@ impl Default for SolverOptions {
             method: Method::Auto,
             tolerance: 1e-12,
             velocity_tolerance: 1e-9,
+            rounding: 0.0,
             max_newton_steps: 500,
             max_sweeps: 10_000,
             regularisation: 1e-6,

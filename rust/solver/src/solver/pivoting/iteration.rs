@@ -18,6 +18,7 @@ use super::violation::{Law, Violations, judge};
 use crate::law::mode::{self, Mode};
 use crate::problem::Residual;
 use crate::scalar::{Lane, LaneMask, Single};
+use crate::solver::draws::Draws;
 
 /// Squared relative residual below which a rover without a slide counts as parked.
 const PARKED: f64 = 1e-12;
@@ -91,6 +92,9 @@ pub(crate) struct Pivoting<T: Lane, B: Store> {
     pub(super) last: T,
     pub(super) memory: ModeMemory<T>,
     pub(super) reversals: T,
+    /// In an attempt at random, what chooses the contact that changes its mode. `α` stays then, and
+    /// the modes may go in circles.
+    pub(crate) draws: Option<Draws>,
 }
 
 impl<T: Lane> Pivoting<T, Many> {
@@ -159,6 +163,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             last: zero,
             memory: ModeMemory::new(zero),
             reversals: zero,
+            draws: None,
         }
     }
 

@@ -7,6 +7,7 @@ use super::store::Store;
 use super::system::System;
 use crate::law::mode::ContactMode;
 use crate::scalar::{Lane, LaneMask};
+use crate::solver::draws::Draws;
 
 /// Factor by which `α` shrinks when a full step with the right modes gains nothing.
 const SHRINK: f64 = 1e-3;
@@ -42,14 +43,21 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         if !looks.any() {
             return;
         }
-        let worst = self.worst_contradiction(system.places(), looks);
+        let mut worst = self.worst_contradiction(system.places(), looks);
+        if self.draws.is_some() {
+            worst = self.weigh_at_random(system.places());
+        }
         // With the right modes nothing but α is left in the way.
         let is_settled = gains_nothing & looks & !zero.lt(worst);
         let (least, again) = (S::SMALLEST_ALPHA, S::SMALLEST_ALPHA_AGAIN);
         let least = T::select(zero.lt(self.asked), like.like(again), like.like(least)) * self.mean;
         let smaller = (like.like(SHRINK) * self.alpha).max(least);
-        self.alpha = T::select(is_settled, smaller, self.alpha);
-        let circles = looks & like.like(PATIENCE).lt(self.memory.idle);
+        let mut circles = looks & like.like(PATIENCE).lt(self.memory.idle);
+        if self.draws.is_none() {
+            self.alpha = T::select(is_settled, smaller, self.alpha);
+        } else {
+            circles = circles & !circles;
+        }
         let stuck = circles | is_settled;
         let reversed = if stuck.any() {
             self.reverse(system.places(), stuck)
@@ -107,6 +115,20 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
             let amount = T::select(self.sticks[i], of_stick, of_slide);
             let amount = T::select(self.closed[i], amount, -u[0]);
             let amount = T::select(lanes & !self.barred[i], amount, zero);
+            self.contradictions[i] = amount;
+            worst = amount.max(worst);
+        }
+        worst
+    }
+
+    /// Weighs the contradictions at random; returns the largest. The worst of several that are
+    /// about as large is not always the one to correct: correcting it may bring about the next, and
+    /// that one the first again.
+    fn weigh_at_random(&mut self, places: impl Iterator<Item = usize>) -> T {
+        let mut worst = self.mean.like(0.0);
+        for i in places {
+            let weight = self.draws.as_mut().map_or(1.0, Draws::next);
+            let amount = self.contradictions[i] * worst.like(weight);
             self.contradictions[i] = amount;
             worst = amount.max(worst);
         }

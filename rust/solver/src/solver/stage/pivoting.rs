@@ -11,6 +11,7 @@ use std::ops::Range;
 use crate::law::mode::{ContactMode, Mode};
 use crate::law::one_contact::solve_one_contact;
 use crate::problem::{ContactScales, Prepared, Residual};
+use crate::solver::draws::Draws;
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
 use crate::solver::options::SolverOptions;
 use crate::solver::pivoting::{FURTHER_ALPHAS, Many, NO_GAIN, Pivoting, System, Triple};
@@ -26,6 +27,14 @@ pub(in crate::solver) const SMALL_ALPHA: f64 = 1e-10;
 
 /// Residual below which a stop of progress may be the rounding of `W p + q`.
 const ROUNDING_ASKED: f64 = 1e-7;
+
+/// `α` of the attempts at random in turn, as multiples of the one whose proximal term is the
+/// tolerance where an impulse changes by its own size. With that one itself, rounding shifts loads
+/// through the null space of `W`; with a larger one, no step gets there.
+const ALPHAS_AT_RANDOM: [f64; 2] = [1e4, 1e3];
+
+/// Residual below which an attempt at random continues from the answer of the last.
+const CONTINUED: f64 = 1e-4;
 
 /// A prepared problem, its Newton system, and the work that it may take.
 struct PreparedSystem<'a, const D: usize> {
@@ -231,4 +240,48 @@ pub(in crate::solver) fn further_pivots<const D: usize>(
     p.copy_from_slice(&scratch.best);
     data.W.multiply_add(p, data.q, u);
     best.unwrap_or((SolveStatus::Stalled, Residual::UNSOLVED))
+}
+
+/// Pivots from `p` in a random order, with at most so many attempts, and gives the nearest answer.
+/// `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
+///
+/// A body may slide on another at more points than hold it, with speeds along the normals that
+/// differ by 1e-12 of the slip: some of the points then have to open, and as friction is
+/// nonassociated, correcting the worst contradiction first may go in circles.
+pub(in crate::solver) fn random_pivots<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    attempts: usize,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> (SolveStatus, Residual) {
+    let mut best = data.measure::<D>(p, u);
+    scratch.best.copy_from_slice(p);
+    for attempt in 0..attempts {
+        let size = p.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let exact = options.tolerance / (data.inverse_speed * size * data.mean_diagonal);
+        let alpha = (ALPHAS_AT_RANDOM[attempt % 2] * exact).min(1.0);
+        scratch.pivoting.draws = Some(Draws(attempt as u64));
+        let found = pivots::<D>(data, options, Some(alpha), p, u, scratch, iterations);
+        scratch.pivoting.draws = None;
+        if found.0 == SolveStatus::Converged {
+            return found;
+        }
+        if found.1.relative < best.relative {
+            best = found.1;
+            scratch.best.copy_from_slice(p);
+        }
+        if scratch.work.is_exhausted {
+            break;
+        }
+        let is_lost = found.1.relative.is_nan() || found.1.relative > CONTINUED;
+        if is_lost {
+            p.copy_from_slice(&scratch.best);
+        }
+    }
+    p.copy_from_slice(&scratch.best);
+    data.W.multiply_add(p, data.q, u);
+    (SolveStatus::Stalled, data.measure::<D>(p, u))
 }

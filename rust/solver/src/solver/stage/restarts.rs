@@ -8,6 +8,7 @@
 use super::pivoting;
 use crate::problem::{Prepared, Residual};
 use crate::scalar::elementary::sin_cos;
+use crate::solver::draws::Draws;
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
@@ -17,19 +18,6 @@ const STARTS: usize = 16;
 
 /// Fraction of contacts without load at the start.
 const OPEN: f64 = 0.2;
-
-/// Numbers in [0, 1) that look random: `SplitMix64` (Steele, Lea and Flood 2014).
-struct Draws(u64);
-
-impl Draws {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 /// Impulses in the cones, of a mean normal impulse `size`.
 fn draw<const D: usize>(mu: &[f64], size: f64, draws: &mut Draws, p: &mut [f64]) {

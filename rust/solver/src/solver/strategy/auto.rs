@@ -24,6 +24,11 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
 /// Newton steps of a short attempt with the proximal point method.
 const ATTEMPT: usize = 100;
 
+/// Attempts to pivot at random after the first attempt with the proximal point method, and after
+/// each other.
+const FEW_AT_RANDOM: usize = 3;
+const AT_RANDOM: usize = 6;
+
 /// Residual below which few contacts get a second proximal point run, from the best answer, and
 /// many are pivoted. Problems without a solution mostly stay above it.
 const NEAR: f64 = 1e-4;
@@ -75,6 +80,12 @@ impl<'a> Ladder<'a> {
         scratch: &mut Scratch,
         iterations: usize,
     ) -> Option<Outcome> {
+        let is_rounding = status != SolveStatus::NonFinite && self.options.is_rounding(residual);
+        let status = if is_rounding {
+            SolveStatus::Converged
+        } else {
+            status
+        };
         let status = scratch.list_stage(stage, status, iterations - self.before);
         self.before = iterations;
         let outcome = Outcome {
@@ -260,10 +271,12 @@ fn descend<const D: usize>(
 ///
 /// Where bodies touch at many points, `W` has a large null space. An answer may then violate the
 /// laws by 1e-9 and lie far from a true one: impulses have to move through the null space until a
-/// contact opens. Pivoting goes there in one step, the proximal point method in thousands.
+/// contact opens. Pivoting goes there in one step, the proximal point method in thousands. Where
+/// its modes go in circles, it goes on from the nearest answer in a random order.
 fn pivot_from_attempt<const D: usize>(
     data: &Prepared<'_>,
     ladder: &mut Ladder<'_>,
+    at_random: usize,
     p: &mut [f64],
     u: &mut [f64],
     scratch: &mut Scratch,
@@ -273,7 +286,15 @@ fn pivot_from_attempt<const D: usize>(
         return None;
     }
     scratch.start.copy_from_slice(p);
-    pivot_from_start::<D>(data, ladder, p, u, scratch, iterations)
+    let found = pivot_from_start::<D>(data, ladder, p, u, scratch, iterations);
+    if found.is_some() || scratch.work.is_exhausted {
+        return found;
+    }
+    let options = ladder.options;
+    p.copy_from_slice(&scratch.nearest);
+    data.W.multiply_add(p, data.q, u);
+    let found = pivoting::random_pivots::<D>(data, options, at_random, p, u, scratch, iterations);
+    ladder.enter(Stage::Pivoting, found, p, scratch, *iterations)
 }
 
 /// Many contacts: the proximal point method from the nearest answer, from zero, and again from the
@@ -293,7 +314,12 @@ fn descend_many<const D: usize>(
         max_newton_steps: ATTEMPT.min(options.max_newton_steps),
         ..*options
     };
-    for (is_from_zero, options) in [(false, &brief), (true, &brief), (false, options)] {
+    let attempts = [
+        (false, &brief, FEW_AT_RANDOM),
+        (true, &brief, AT_RANDOM),
+        (false, options, AT_RANDOM),
+    ];
+    for (is_from_zero, options, at_random) in attempts {
         if is_from_zero {
             p.fill(0.0);
         } else {
@@ -303,7 +329,7 @@ fn descend_many<const D: usize>(
         if found.is_some() || scratch.work.is_exhausted {
             return found;
         }
-        let found = pivot_from_attempt::<D>(data, ladder, p, u, scratch, iterations);
+        let found = pivot_from_attempt::<D>(data, ladder, at_random, p, u, scratch, iterations);
         if found.is_some() || scratch.work.is_exhausted {
             return found;
         }
