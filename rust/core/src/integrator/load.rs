@@ -2,7 +2,8 @@
 //!
 //! If the spin or the energy audit ([`super::audit`]) requires it, the gyroscopic terms are
 //! implicit: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)`, where Δv includes the impulses of persistent
-//! contact. The scheme is then stable at any spin and any step.
+//! contact. C is frozen at the mean velocity v_m of explicit terms, so the scheme is of second order
+//! and stable at any spin and any step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::data::DataOf;
@@ -11,10 +12,6 @@ use super::forces::{Forces, Start};
 use super::systems::{MaskOf, Systems};
 use super::yielding::add_shifts;
 use crate::scalar::{Lane, LaneMask};
-
-/// Passes over the mean velocity at which implicit gyroscopic terms are frozen: the second makes
-/// the step second order.
-const GYROSCOPIC_PASSES: usize = 2;
 
 /// The free change of the velocity, `d.y` in factor coordinates, and the contacts' free velocity
 /// `d.u`: first with the forces at v, then with those at the mean velocity that follows from them
@@ -27,30 +24,41 @@ pub(super) fn load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
         #[inline(always)]
         || push_and_drive(s, d, is_any, persists),
     );
+    let start = Start::at(&d.start, &d.v[..]);
+    (s.machine_mut()).load(&d.options, start, &d.v, &mut d.y);
+    S::run(
+        d.token,
+        #[inline(always)]
+        || find_mean(s, d, is_any),
+    );
     if d.is_any_implicit() {
-        load_implicitly(s, d, is_any);
+        s.machine_mut().begin_gyroscopic(&d.options, &mut d.y);
+        let start = Start::at(&d.start, &d.v[..]);
+        let (v_mean, foreseen) = (&d.v_mean, &d.foreseen);
+        (s.machine_mut()).load_gyroscopic(&d.options, start, v_mean, foreseen, &mut d.y);
+        correct(s, d, is_any);
+        d.y_implicit.copy_from_slice(&d.y);
     }
     if d.is_any_explicit() {
         let start = Start::at(&d.start, &d.v[..]);
-        (s.machine_mut()).load(&d.options, start, &d.v, &mut d.y);
-        S::run(
-            d.token,
-            #[inline(always)]
-            || find_mean(s, d, is_any),
-        );
-        let start = Start::at(&d.start, &d.v[..]);
         (s.machine_mut()).load(&d.options, start, &d.v_mean, &mut d.y);
-        s.machine().add_given(&d.options, &mut d.y);
-        S::run(
-            d.token,
-            #[inline(always)]
-            || correct_impulse(s, d, is_any),
-        );
+        correct(s, d, is_any);
     }
     S::run(
         d.token,
         #[inline(always)]
         || finish_load(s, d),
+    );
+}
+
+/// What the impulse `d.y` has besides the forces at the mean velocity.
+#[inline(always)]
+fn correct<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
+    s.machine().add_given(&d.options, &mut d.y);
+    S::run(
+        d.token,
+        #[inline(always)]
+        || correct_impulse(s, d, is_any),
     );
 }
 
@@ -63,32 +71,36 @@ fn push_and_drive<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool, persis
     s.machine_mut().begin_load(&d.options, start);
 }
 
-/// The mean velocity that follows from the forces at v and the impulses that persist.
+/// The mean velocity that follows from the forces at v and the impulses that persist. With implicit
+/// terms, `d.foreseen` has the latter and those of the loops.
 #[inline(always)]
 fn find_mean<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
     let pushed = d.pushed.iter().zip(&d.cluster_of).filter(|_| is_any);
     for (y, (pushed, cluster)) in d.y.iter_mut().zip(pushed) {
         *y = S::T::select(d.persists[*cluster], *y + *pushed, *y);
     }
-    close(s, d);
-    mean(s, d);
-}
-
-/// The impulse `d.y` in factor coordinates, so that the loops are closed.
-#[inline(always)]
-fn close<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     s.machine().half_solve(&mut d.y);
     (s.machine_mut()).close_velocity(&d.options, &d.v, &d.v, &mut d.y);
-}
-
-/// `d.v_mean` from the change `d.y` in factor coordinates.
-#[inline(always)]
-fn mean<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+    if d.is_any_implicit() {
+        foresee(s, d, is_any);
+    }
     let share = d.number(1.0 - d.options.theta);
     s.machine().half_solve_back(&mut d.y);
     for ((mean, v), change) in d.v_mean.iter_mut().zip(&d.v).zip(&d.y) {
         *mean = *v + share * *change;
     }
+}
+
+/// The impulses of contacts that persist, and of the loops, with which implicit terms reckon.
+#[inline(always)]
+fn foresee<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
+    let zero = d.number(0.0);
+    d.foreseen.fill(zero);
+    let pushed = d.pushed.iter().zip(&d.cluster_of).filter(|_| is_any);
+    for (foreseen, (pushed, cluster)) in d.foreseen.iter_mut().zip(pushed) {
+        *foreseen = S::T::select(d.persists[*cluster], *pushed, zero);
+    }
+    s.machine_mut().add_loop_impulse(&mut d.foreseen);
 }
 
 /// Adds the deferred correction r to the impulse `d.y`, and turns it into factor coordinates.
@@ -115,48 +127,4 @@ fn finish_load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     (s.machine_mut()).close_velocity(&d.options, &d.v, &d.v, &mut d.y);
     s.local(&d.y, &mut d.u);
     add_shifts(s, d);
-}
-
-/// `d.y_implicit`: the free change of velocity with implicit gyroscopic terms. `is_any`: whether
-/// the contacts of any group persist.
-fn load_implicitly<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
-    let zero = d.number(0.0);
-    s.machine_mut().begin_gyroscopic(&d.options, &mut d.y);
-    d.foreseen.fill(zero);
-    let pushed = d.pushed.iter().zip(&d.cluster_of).filter(|_| is_any);
-    for (foreseen, (pushed, cluster)) in d.foreseen.iter_mut().zip(pushed) {
-        *foreseen = S::T::select(d.persists[*cluster], *pushed, zero);
-    }
-    d.v_mean.copy_from_slice(&d.v);
-    for pass in 0..GYROSCOPIC_PASSES {
-        let start = Start::at(&d.start, &d.v[..]);
-        let (v_mean, foreseen) = (&d.v_mean, &d.foreseen);
-        (s.machine_mut()).load_gyroscopic(&d.options, start, v_mean, foreseen, &mut d.y);
-        if pass + 1 < GYROSCOPIC_PASSES {
-            S::run(
-                d.token,
-                #[inline(always)]
-                || foresee(s, d),
-            );
-        }
-    }
-    s.machine().add_given(&d.options, &mut d.y);
-    S::run(
-        d.token,
-        #[inline(always)]
-        || correct_impulse(s, d, is_any),
-    );
-    d.y_implicit.copy_from_slice(&d.y);
-}
-
-/// The mean velocity that follows from the impulse `d.y` and the foreseen one, and the impulses of
-/// the loops that are foreseen with it.
-#[inline(always)]
-fn foresee<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
-    for (y, foreseen) in d.y.iter_mut().zip(&d.foreseen) {
-        *y += *foreseen;
-    }
-    close(s, d);
-    s.machine_mut().add_loop_impulse(&mut d.foreseen);
-    mean(s, d);
 }
