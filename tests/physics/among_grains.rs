@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rover_core::contact::Activation;
 use rover_core::geometry::{Plane, SphereField, Terrain};
-use rover_core::integrator::{Contacting, Dynamics, Stabilisation, StepOptions, StepReport};
+use rover_core::integrator::{Dynamics, MechanicalSystem, Stabilisation, StepOptions, StepReport};
 use rover_core::law::rolling::RollingFriction;
 use rover_core::multibody::{Model, ModelDescription};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use rover_core::integrator::{
-    Integrator, MechanicalSystem, NoProbe, Scratch, Stabilisation, StateMut, StepOptions,
+    Dynamics, Integrator, MechanicalSystem, NoProbe, Scratch, Stabilisation, StateMut, StepOptions,
     StepReport, WarmStart,
 };
 use rover_core::nalgebra::{SVector, Vector3};
@@ -64,7 +64,7 @@ fn options() -> StepOptions {
 fn on_a_floor<const D: usize>(centres: &[SVector<f64, D>], mu: f64) -> Heap<D>
 where
     for<'a> GrainSystem<'a, D>:
-        MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
+        MechanicalSystem<Machine: Dynamics<Configuration = Vec<f64>>, Contact = GrainContact<D>>,
 {
     on_a_wall(Wall::floor(0.0), centres, mu)
 }
@@ -72,7 +72,7 @@ where
 fn on_a_wall<const D: usize>(wall: Wall<D>, centres: &[SVector<f64, D>], mu: f64) -> Heap<D>
 where
     for<'a> GrainSystem<'a, D>:
-        MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
+        MechanicalSystem<Machine: Dynamics<Configuration = Vec<f64>>, Contact = GrainContact<D>>,
 {
     let n = centres.len();
     let scene = GrainScene {
@@ -96,7 +96,7 @@ fn coordinates<const D: usize>(centres: &[SVector<f64, D>]) -> Vec<f64> {
 impl<const D: usize> Heap<D>
 where
     for<'a> GrainSystem<'a, D>:
-        MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
+        MechanicalSystem<Machine: Dynamics<Configuration = Vec<f64>>, Contact = GrainContact<D>>,
 {
     fn new(scene: GrainScene<D>, options: StepOptions, q: Vec<f64>) -> Self {
         scene.check().expect("a scene");
@@ -211,7 +211,7 @@ fn kappa<const D: usize>() -> f64 {
 fn rolls_after_sliding<const D: usize>(expected: f64)
 where
     for<'a> GrainSystem<'a, D>:
-        MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
+        MechanicalSystem<Machine: Dynamics<Configuration = Vec<f64>>, Contact = GrainContact<D>>,
 {
     let start: SVector<f64, D> = axis(1) * 0.1;
     let mut heap = on_a_floor(&[start], 0.3);
@@ -244,7 +244,7 @@ fn a_sliding_disk_comes_to_roll_at_two_thirds_and_a_ball_at_five_sevenths() {
 fn goes_down_a_slope<const D: usize>(mu: f64, slope: f64)
 where
     for<'a> GrainSystem<'a, D>:
-        MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
+        MechanicalSystem<Machine: Dynamics<Configuration = Vec<f64>>, Contact = GrainContact<D>>,
 {
     let alpha = slope.atan();
     let normal = axis::<D>(0) * alpha.sin() + axis::<D>(1) * alpha.cos();
@@ -301,7 +301,7 @@ fn small_pyramid<const D: usize>(room: f64) -> (Vec<SVector<f64, D>>, f64) {
 fn rests_on_others<const D: usize>()
 where
     for<'a> GrainSystem<'a, D>:
-        MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
+        MechanicalSystem<Machine: Dynamics<Configuration = Vec<f64>>, Contact = GrainContact<D>>,
 {
     let (centres, sine) = small_pyramid::<D>(1.1);
     let needed = (0.5 * sine.asin()).tan();
@@ -592,7 +592,7 @@ fn balls_that_rest_fall_asleep_and_wake_when_one_is_struck() {
 fn machine_moves_as_a_grain<const D: usize>()
 where
     for<'a> GrainSystem<'a, D>:
-        MechanicalSystem<Configuration = Vec<f64>, Contact = GrainContact<D>>,
+        MechanicalSystem<Machine: Dynamics<Configuration = Vec<f64>>, Contact = GrainContact<D>>,
 {
     let (mut flat, _) = small_pyramid::<2>(1.1);
     flat[2].y += 0.05;

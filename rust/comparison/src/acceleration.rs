@@ -3,12 +3,13 @@
 //! The schemes of [`rover_core::integrator`] do not need these; schemes that treat persistent
 //! contact as smooth motion do.
 
+use crate::whole::Whole;
 use rover_core::contact::Activation;
-use rover_core::integrator::{MechanicalSystem, Start, StepError, StepOptions};
+use rover_core::integrator::{Start, StepError, StepOptions};
 use rover_core::solver::{SolveReport, SolverWorkspace, solve};
 
 /// Largest displacement of any cluster, m, that `y` (nv) causes away from the contact points.
-pub(crate) fn largest_displacement<S: MechanicalSystem>(system: &S, y: &[f64]) -> f64 {
+pub(crate) fn largest_displacement<S: Whole>(system: &S, y: &[f64]) -> f64 {
     let clusters = 0..system.n_clusters();
     let own = clusters.map(|cluster| system.displacement(y, cluster));
     own.fold(0.0, f64::max)
@@ -21,7 +22,7 @@ const DELTA: f64 = 1e-3;
 
 /// Contacts no further than `reach` (m) and no faster than `slow` (m/s)
 /// along the normal, and all that penetrate; placed at q.
-pub(crate) fn find<S: MechanicalSystem>(
+pub(crate) fn find<S: Whole>(
     system: &mut S,
     q: &S::Configuration,
     v: &[f64],
@@ -41,7 +42,7 @@ pub(crate) fn find<S: MechanicalSystem>(
 }
 
 /// `a = M⁻¹ F(q, v)`, m/s² and rad/s²; the factor of M(q) stays in the system.
-pub(crate) fn free_acceleration<S: MechanicalSystem>(
+pub(crate) fn free_acceleration<S: Whole>(
     system: &mut S,
     options: &StepOptions,
     q: &S::Configuration,
@@ -70,7 +71,7 @@ pub(crate) fn free_acceleration<S: MechanicalSystem>(
 
 /// `b = d/dt (Hᵀ(q(t)) v)` along q ⊕ t v, m/s²; leaves the contacts placed
 /// and assembled at q, with `u = Hᵀ v`.
-pub(crate) fn convective_acceleration<S: MechanicalSystem>(
+pub(crate) fn convective_acceleration<S: Whole>(
     system: &mut S,
     contacts: &mut [S::Contact],
     q: &S::Configuration,
@@ -98,7 +99,7 @@ pub(crate) fn convective_acceleration<S: MechanicalSystem>(
 }
 
 /// μ of every contact.
-pub(crate) fn friction<S: MechanicalSystem>(
+pub(crate) fn friction<S: Whole>(
     system: &S,
     options: &StepOptions,
     contacts: &[S::Contact],
@@ -108,7 +109,7 @@ pub(crate) fn friction<S: MechanicalSystem>(
 }
 
 /// Solves the contact law on the assembled operator from `p`; `u = W p + q_free`.
-pub(crate) fn solve_law<S: MechanicalSystem>(
+pub(crate) fn solve_law<S: Whole>(
     system: &S,
     options: &StepOptions,
     contacts: &[S::Contact],
@@ -124,7 +125,7 @@ pub(crate) fn solve_law<S: MechanicalSystem>(
 }
 
 /// `change = M⁻¹ H p`.
-pub(crate) fn response<S: MechanicalSystem>(system: &S, p: &[f64], change: &mut Vec<f64>) {
+pub(crate) fn response<S: Whole>(system: &S, p: &[f64], change: &mut Vec<f64>) {
     change.clear();
     change.resize(system.nv(), 0.0);
     system.add_impulses(p, change);
@@ -136,7 +137,7 @@ pub(crate) fn response<S: MechanicalSystem>(system: &S, p: &[f64], change: &mut 
 ///
 /// In persistent contact, where `Hᵀ v` is 0 in the locked directions, the reactions are exact. A
 /// separating contact has none; that of a sliding contact opposes the slip.
-pub(crate) fn smooth_acceleration<S: MechanicalSystem>(
+pub(crate) fn smooth_acceleration<S: Whole>(
     system: &mut S,
     options: &StepOptions,
     contacts: &mut [S::Contact],

@@ -21,9 +21,10 @@
 
 use std::cell::RefCell;
 
+use crate::whole::Whole;
 use rover_core::integrator::{
-    Dynamics, Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, StateMut, StepError,
-    StepOptions, StepReport, StepStatus, UnilateralContact, WarmStart,
+    Dynamics, Integrator, KeyOf, Probe, ScratchOf, StateMut, StepError, StepOptions, StepReport,
+    StepStatus, UnilateralContact, WarmStart,
 };
 use rover_core::law::newton_impact::rebound;
 use rover_core::nalgebra::{DMatrix, DVector};
@@ -121,7 +122,7 @@ impl<K> Reserve<K> {
 type Reached<S> = (<S as Dynamics>::Configuration, Vec<f64>, Reserve<KeyOf<S>>);
 
 /// One step's view: system, options and the solver's scratch.
-struct Run<'a, S: MechanicalSystem> {
+struct Run<'a, S: Whole> {
     system: &'a mut S,
     options: &'a StepOptions,
     solver: &'a mut SolverWorkspace,
@@ -129,7 +130,7 @@ struct Run<'a, S: MechanicalSystem> {
     status: StepStatus,
 }
 
-impl<S: MechanicalSystem> Run<'_, S> {
+impl<S: Whole> Run<'_, S> {
     /// Bisects for the event that ends the motion from (q, v) before `end`, a time from there, s,
     /// and what is reached then.
     fn locate(
@@ -454,7 +455,7 @@ impl<S: MechanicalSystem> Run<'_, S> {
     }
 }
 
-impl<S: MechanicalSystem> Integrator<S> for EventDriven {
+impl<S: Whole> Integrator<S> for EventDriven {
     /// # Panics
     /// If the contacts have two tangents.
     fn step(
@@ -540,7 +541,7 @@ impl<S: MechanicalSystem> Integrator<S> for EventDriven {
 
 /// Takes a slip below the event's accuracy out of v, so that the contact may stick; a contact that
 /// still slides is left alone.
-fn stop_slip<S: MechanicalSystem>(
+fn stop_slip<S: Whole>(
     run: &mut Run<'_, S>,
     motion: &mut Motion<S::Contact>,
     q: &mut S::Configuration,

@@ -7,7 +7,9 @@
 //! an attitude, spins in its own axes, and touches the plane with its corners.
 
 use rover_core::contact::{Activation, ContactFrame};
-use rover_core::integrator::{Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact};
+use rover_core::integrator::{
+    Dynamics, Forces, MechanicalSystem, Start, StepOptions, UnilateralContact,
+};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact};
 use rover_core::system::grains::grid::Grid;
@@ -386,7 +388,17 @@ impl Forces for SphereSystem<'_> {
     }
 }
 
-impl Contacting for SphereSystem<'_> {
+impl MechanicalSystem for SphereSystem<'_> {
+    type Machine = Self;
+
+    fn machine(&self) -> &Self {
+        self
+    }
+
+    fn machine_mut(&mut self) -> &mut Self {
+        self
+    }
+
     type Contact = SphereContact;
 
     const DIMENSION: Dimension = Dimension::Three;

@@ -20,9 +20,10 @@
 
 use std::cell::RefCell;
 
+use crate::whole::Whole;
 use rover_core::integrator::{
-    Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, StateMut, StepError, StepOptions,
-    StepReport, StepStatus, WarmStart,
+    Integrator, KeyOf, Probe, ScratchOf, StateMut, StepError, StepOptions, StepReport, StepStatus,
+    WarmStart,
 };
 use rover_core::law::newton_impact::rebound;
 use rover_core::solver::{SolveReport, SolverWorkspace};
@@ -90,7 +91,7 @@ impl Coefficients {
 }
 
 /// The end of the step as far as it is iterated.
-struct Iterate<S: MechanicalSystem> {
+struct Iterate<S: Whole> {
     contacts: Vec<S::Contact>,
     /// ã⁺ and a⁺.
     rate: Vec<f64>,
@@ -105,7 +106,7 @@ struct Iterate<S: MechanicalSystem> {
     u_before: Vec<f64>,
 }
 
-impl<S: MechanicalSystem> Iterate<S> {
+impl<S: Whole> Iterate<S> {
     /// From where the last step ended, near some contacts.
     fn new(memory: &Memory, q: &S::Configuration, contacts: Vec<S::Contact>) -> Self {
         let nv = memory.rate.len();
@@ -186,7 +187,7 @@ impl<S: MechanicalSystem> Iterate<S> {
     }
 }
 
-impl<S: MechanicalSystem> Integrator<S> for GeneralisedAlpha {
+impl<S: Whole> Integrator<S> for GeneralisedAlpha {
     fn step(
         &self,
         system: &mut S,

@@ -31,6 +31,7 @@ pub mod scheme;
 pub mod slab;
 pub mod sphere_scenes;
 pub mod sphere_simulation;
+mod whole;
 
 pub use error::MeasureError;
 pub use event_driven::EventDriven;

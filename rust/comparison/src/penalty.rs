@@ -10,9 +10,10 @@
 //! `v_s tan α/√(μ² − tan² α)`, and the step is bounded by 2/√(k/m) whatever happens in the scene.
 //! As h tends to 0 the error against rigid Coulomb contact does not.
 
+use crate::whole::Whole;
 use rover_core::integrator::{
-    Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, StateMut, StepError, StepOptions,
-    StepReport, UnilateralContact, WarmStart,
+    Integrator, KeyOf, Probe, ScratchOf, StateMut, StepError, StepOptions, StepReport,
+    UnilateralContact, WarmStart,
 };
 
 use crate::acceleration::{find, free_acceleration, friction, response};
@@ -47,7 +48,7 @@ impl Penalty {
     }
 }
 
-impl<S: MechanicalSystem> Integrator<S> for Penalty {
+impl<S: Whole> Integrator<S> for Penalty {
     fn step(
         &self,
         system: &mut S,

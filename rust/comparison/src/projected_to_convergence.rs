@@ -18,9 +18,10 @@
 
 use std::cell::RefCell;
 
+use crate::whole::Whole;
 use rover_core::integrator::{
-    Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, StateMut, StepError, StepOptions,
-    StepReport, StepStatus, UnilateralContact, Variant, WarmStart,
+    Integrator, KeyOf, Probe, ScratchOf, StateMut, StepError, StepOptions, StepReport, StepStatus,
+    UnilateralContact, Variant, WarmStart,
 };
 use rover_core::solver::SolverWorkspace;
 
@@ -66,7 +67,7 @@ impl Memory {
     }
 }
 
-impl<S: MechanicalSystem> Integrator<S> for ProjectedToConvergence {
+impl<S: Whole> Integrator<S> for ProjectedToConvergence {
     fn step(
         &self,
         system: &mut S,

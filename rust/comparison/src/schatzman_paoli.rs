@@ -20,9 +20,10 @@
 
 use std::cell::RefCell;
 
+use crate::whole::Whole;
 use rover_core::integrator::{
-    Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, Start, StateMut, StepError, StepOptions,
-    StepReport, StepStatus, UnilateralContact, WarmStart,
+    Integrator, KeyOf, Probe, ScratchOf, Start, StateMut, StepError, StepOptions, StepReport,
+    StepStatus, UnilateralContact, WarmStart,
 };
 use rover_core::solver::{SolveReport, SolverWorkspace};
 
@@ -54,7 +55,7 @@ struct Memory {
 }
 
 /// The contacts of a step, and their impulses as far as they are iterated.
-struct Touching<S: MechanicalSystem> {
+struct Touching<S: Whole> {
     contacts: Vec<S::Contact>,
     /// Where their gaps are measured.
     q_star: S::Configuration,
@@ -65,7 +66,7 @@ struct Touching<S: MechanicalSystem> {
     change: Vec<f64>,
 }
 
-impl<S: MechanicalSystem> Touching<S> {
+impl<S: Whole> Touching<S> {
     fn new(contacts: Vec<S::Contact>, q: &S::Configuration) -> Self {
         let n = S::DIMENSION.components() * contacts.len();
         Self {
@@ -114,7 +115,7 @@ impl<S: MechanicalSystem> Touching<S> {
 }
 
 /// Iterates on v_{k+½} and the impulses in `touching`. `start.v` is v_{k−½}.
-fn iterate<S: MechanicalSystem>(
+fn iterate<S: Whole>(
     system: &mut S,
     options: &StepOptions,
     start: Start<'_, S::Configuration>,
@@ -168,7 +169,7 @@ fn iterate<S: MechanicalSystem>(
     v_end
 }
 
-impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
+impl<S: Whole> Integrator<S> for SchatzmanPaoli {
     fn step(
         &self,
         system: &mut S,

@@ -1,8 +1,9 @@
 //! The list of schemes that are compared.
 
+use crate::whole::Whole;
 use rover_core::integrator::{
-    Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, Stabilisation, StateMut, StepError,
-    StepOptions, StepReport, Variant, WarmStart,
+    Integrator, KeyOf, Probe, ScratchOf, Stabilisation, StateMut, StepError, StepOptions,
+    StepReport, Variant, WarmStart,
 };
 
 use crate::{EventDriven, GeneralisedAlpha, Penalty, ProjectedToConvergence, SchatzmanPaoli};
@@ -136,7 +137,7 @@ pub enum Stepper {
     Penalty(Penalty),
 }
 
-impl<S: MechanicalSystem> Integrator<S> for Stepper {
+impl<S: Whole> Integrator<S> for Stepper {
     fn step(
         &self,
         system: &mut S,

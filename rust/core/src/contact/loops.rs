@@ -649,10 +649,14 @@ fn projector<'a>(model: &'a Model, factor: &'a Factor<f64>) -> Projector<'a, f64
     }
 }
 
-/// The impulses p (3 n_c) of a single machine, by contact.
-pub(crate) fn each(p: &[f64]) -> impl Iterator<Item = (usize, bool, Triple<f64>)> + Clone {
+/// The impulses p (3 n_c) in all lanes, by contact.
+pub(crate) fn each<T: Lane>(
+    token: T::Token,
+    p: &[T],
+) -> impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone {
+    let here = T::mask(token, u32::MAX >> (32 - T::LANES));
     let all = p.chunks_exact(3).map(|p| [p[0], p[1], p[2]]);
-    all.enumerate().map(|(contact, p)| (contact, true, p))
+    all.enumerate().map(move |(contact, p)| (contact, here, p))
 }
 
 /// The factor of a machine's mass matrix M.

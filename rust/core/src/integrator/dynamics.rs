@@ -133,7 +133,7 @@ pub trait Dynamics {
     fn half_solve(&self, impulse: &mut [Self::T]);
 
     /// Changes `y` so that the step from `v_begin` to `v + F⁻¹ y` obeys the system's closed loops.
-    /// [`super::Contacting::add_impulses`] keeps that. By default there are none.
+    /// [`super::MechanicalSystem::add_impulses`] keeps that. By default there are none.
     fn close_velocity(
         &mut self,
         _options: &StepOptions,

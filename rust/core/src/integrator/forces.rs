@@ -141,10 +141,6 @@ pub trait Forces: Dynamics {
     /// By default nothing is recorded.
     fn accept(&mut self, _lanes: MaskOf<Self>) {}
 
-    /// Called before the iterations of a Newton variant: stores what it needs of the start. By
-    /// default nothing.
-    fn begin_balance(&mut self, _start: StartOf<'_, Self>) {}
-
     /// [`Self::load`] for the iterate `v_end`: implicit forces enter with their value there. By
     /// default there are none.
     fn load_at_end(

@@ -13,9 +13,9 @@
 //! has what that needs of a step that was taken; `crate::system::tangent` differentiates.
 
 use super::contact_modes::{Answer, HeldLaw};
-use super::contacting::UnilateralContact;
+use super::dynamics::Dynamics;
 use super::local::Local;
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{MechanicalSystem, UnilateralContact};
 use super::options::{Stabilisation, StepOptions};
 use super::scratch::ScratchOf;
 use crate::law::compliance::Yielding;
@@ -132,14 +132,14 @@ impl Projection {
 
 /// `M̂⁻¹ H` (nv, size), row-major.
 fn response<S: MechanicalSystem>(system: &S, size: usize) -> Vec<f64> {
-    let nv = system.nv();
+    let nv = system.machine().nv();
     let mut response = vec![0.0; nv * size];
     let (mut p, mut y) = (vec![0.0; size], vec![0.0; nv]);
     for i in 0..size {
         p[i] = 1.0;
         y.fill(0.0);
         system.add_impulses(&p, &mut y);
-        system.half_solve_back(&mut y);
+        system.machine().half_solve_back(&mut y);
         for (row, y) in response.chunks_exact_mut(size).zip(&y) {
             row[i] = *y;
         }

@@ -1,12 +1,13 @@
 //! One system with its contacts in a list, as the only lane of [`Systems`].
 
-use super::contacting::{KeyOf, LocalOf, UnilateralContact};
 use super::data::Data;
 use super::dynamics::Dynamics;
 use super::grouped::Grouped;
 use super::island::Island;
 use super::local::Local;
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{
+    ConfigurationOf, KeyOf, LocalOf, MechanicalSystem, UnilateralContact,
+};
 use super::options::StepOptions;
 use super::report::StepReport;
 use super::systems::{MemoryOf, Systems};
@@ -67,7 +68,7 @@ pub(super) struct Posed<L> {
 pub(super) type PosedOf<S> = Posed<LocalOf<S>>;
 
 /// The data of a system's step.
-pub(super) type ListedData<S> = Data<f64, <S as Dynamics>::Configuration, LocalOf<S>, KeyOf<S>>;
+pub(super) type ListedData<S> = Data<f64, ConfigurationOf<S>, LocalOf<S>, KeyOf<S>>;
 
 impl<L: Local<f64>> Posed<L> {
     pub fn resize(&mut self, n: usize) {
@@ -126,7 +127,7 @@ impl<C: UnilateralContact> List<C> {
 impl<S: MechanicalSystem> Listed<'_, S> {
     /// Finds which clusters the contacts join.
     fn find_groups(&mut self) {
-        let n = self.system.n_clusters();
+        let n = self.system.machine().n_clusters();
         let list = &mut *self.list;
         list.leaders.clear();
         list.leaders.extend(0..n);
@@ -191,8 +192,8 @@ impl<S: MechanicalSystem> Listed<'_, S> {
 
 impl<S: MechanicalSystem> Systems for Listed<'_, S> {
     type T = f64;
-    type Configuration = S::Configuration;
-    type Machine = S;
+    type Configuration = ConfigurationOf<S>;
+    type Machine = S::Machine;
     type Local = LocalOf<S>;
     type Key = KeyOf<S>;
     type Contacts = List<S::Contact>;
@@ -200,12 +201,12 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
 
     const RELISTS: bool = true;
 
-    fn machine(&self) -> &S {
-        self.system
+    fn machine(&self) -> &S::Machine {
+        self.system.machine()
     }
 
-    fn machine_mut(&mut self) -> &mut S {
-        self.system
+    fn machine_mut(&mut self) -> &mut S::Machine {
+        self.system.machine_mut()
     }
 
     fn gravity(&self) -> Vec3<f64> {
@@ -223,7 +224,7 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
     fn detect(
         &mut self,
         options: &StepOptions,
-        _: (&S::Configuration, &S::Configuration),
+        _: (&ConfigurationOf<S>, &ConfigurationOf<S>),
         v: &[f64],
         _: bool,
     ) -> bool {

@@ -5,11 +5,11 @@
 
 use super::audit::note_energies;
 use super::balance::{GAIN, Limits};
-use super::contacting::KeyOf;
 use super::data::{MOST_TURN, Obstacle};
+use super::dynamics::Dynamics;
 use super::error::StepError;
 use super::listed::{Listed, ListedData, PosedOf};
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{ConfigurationOf, KeyOf, MechanicalSystem};
 use super::options::{Stabilisation, StepOptions};
 use super::probe::{Phase, Probe};
 use super::projection::{measure, set_gaps};
@@ -29,7 +29,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         &self,
         system: &mut S,
         options: &StepOptions,
-        mut state: StateMut<'_, S::Configuration>,
+        mut state: StateMut<'_, ConfigurationOf<S>>,
         warm_start: &mut WarmStart<KeyOf<S>>,
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
@@ -88,7 +88,9 @@ impl Part<'_> {
     ) -> Result<StepReport, StepError> {
         let d = &mut scratch.data;
         d.is_gyroscopic.fill(false);
-        let turning = system.turning(self.options, &d.v, &mut d.is_gyroscopic);
+        let turning = system
+            .machine_mut()
+            .turning(self.options, &d.v, &mut d.is_gyroscopic);
         let turn = self.options.time_step * turning.unwrap_or(0.0);
         if self.depth == 0 && turn > MOST_TURN {
             let n = (turn / MOST_TURN).min(MOST_PARTS).ceil();

@@ -21,14 +21,14 @@
 
 use super::balance::{GAIN, Limits};
 use super::closing::close_end;
-use super::contacting::KeyOf;
+use super::dynamics::Dynamics;
 use super::error::StepError;
-use super::forces::{MOST_REVISIONS, Start};
+use super::forces::{Forces, MOST_REVISIONS, Start};
 use super::impacts::{find_impacts, weigh_contacts};
 use super::listed::{Listed, ListedData, PosedOf};
 use super::load::correct_impulse;
 use super::local::Local;
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{ConfigurationOf, KeyOf, MechanicalSystem};
 use super::moreau_jean::{advance, begin, project_and_accept};
 use super::options::StepOptions;
 use super::probe::{Phase, Probe};
@@ -61,7 +61,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         &self,
         system: &mut S,
         options: &StepOptions,
-        mut state: StateMut<'_, S::Configuration>,
+        mut state: StateMut<'_, ConfigurationOf<S>>,
         warm_start: &mut WarmStart<KeyOf<S>>,
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
@@ -113,10 +113,12 @@ fn conclude<S: MechanicalSystem>(
     forget_bounces(s, d);
     d.reports[0] = report;
     find_mean(s, d);
-    (s.system).set_moved(&d.start, &d.v_mean, s.options.time_step, &mut d.end);
+    s.system
+        .machine()
+        .set_moved(&d.start, &d.v_mean, s.options.time_step, &mut d.end);
     close_end(s, d, true);
     let is_solved = d.reports[0].is_converged();
-    s.system.normalise(&mut d.end);
+    s.system.machine().normalise(&mut d.end);
     find_impacts(s, d);
     weigh_contacts(s, d);
     let limits = Limits {
@@ -198,7 +200,7 @@ fn settle<S: MechanicalSystem>(
                 s.list.leaves_open = false;
                 continue;
             }
-            if revisions < MOST_REVISIONS && s.system.revise(true, &d.v, &d.v_end) {
+            if revisions < MOST_REVISIONS && s.system.machine_mut().revise(true, &d.v, &d.v_end) {
                 revisions += 1;
                 last_change = f64::INFINITY;
                 continue;
@@ -219,8 +221,8 @@ fn begin_iteration<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedDat
     d.obstacles[0] = None;
     d.shares.clear();
     d.is_gyroscopic.fill(false);
-    s.system.choose_branches(&d.v);
-    s.system.begin_balance(Start {
+    s.system.machine_mut().choose_branches(&d.v);
+    s.system.begin_residual(Start {
         configuration: &d.start,
         v: &d.v,
     });
@@ -229,10 +231,13 @@ fn begin_iteration<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedDat
 
 /// Fraction of the kinetic energy that free flight may gain or lose in the step.
 fn drift<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>) -> f64 {
-    let turning = s.system.turning(s.options, &d.v, &mut d.is_gyroscopic);
+    let turning = s
+        .system
+        .machine_mut()
+        .turning(s.options, &d.v, &mut d.is_gyroscopic);
     d.is_gyroscopic.fill(false); // the balance is at the end of the step
     let turn = s.options.time_step * turning.unwrap_or(0.0);
-    if s.system.conserves_momenta() && turn <= MOST_TURN {
+    if s.system.machine().conserves_momenta() && turn <= MOST_TURN {
         turn * turn * turn
     } else {
         0.0
@@ -251,10 +256,14 @@ fn iterate<S: MechanicalSystem>(
     let options = s.options;
     let (h, theta) = (options.time_step, options.theta);
     find_mean(s, d);
-    (s.system).set_moved(&d.start, &d.v_mean, theta * h, &mut d.middle);
-    (s.system).set_moved(&d.start, &d.v_mean, h, &mut d.end);
-    s.system.place_middle(&d.middle);
-    s.system.place_end(&d.end);
+    s.system
+        .machine()
+        .set_moved(&d.start, &d.v_mean, theta * h, &mut d.middle);
+    s.system
+        .machine()
+        .set_moved(&d.start, &d.v_mean, h, &mut d.end);
+    s.system.machine_mut().place_middle(&d.middle);
+    s.system.machine_mut().place_end(&d.end);
     probe.end(Phase::Kinematics);
     if iteration == 0 {
         // The set of contacts of a step is decided once, by the forecast.
@@ -266,16 +275,18 @@ fn iterate<S: MechanicalSystem>(
     }
     s.system.relocate(&mut s.list.contacts);
     probe.end(Phase::Detection);
-    s.system.update_mass_matrix(options, true, true);
+    s.system
+        .machine_mut()
+        .update_mass_matrix(options, true, true);
     probe.end(Phase::MassMatrix);
     let start = Start {
         configuration: &d.start,
         v: &d.v,
     };
     let (v_end, v_mean) = (&d.v_end, &d.v_mean);
-    (s.system).balance(options, start, v_end, v_mean, &mut d.foreseen, &mut d.y);
+    (s.system).residual(options, start, v_end, v_mean, &mut d.foreseen, &mut d.y);
     probe.end(Phase::Bias);
-    if !s.system.factorise(options) {
+    if !s.system.machine_mut().factorise(options) {
         return false;
     }
     probe.end(Phase::Factor);
@@ -287,7 +298,9 @@ fn iterate<S: MechanicalSystem>(
     }
     correct_impulse(s, d, is_any);
     probe.end(Phase::Delassus);
-    s.system.close_velocity(options, &d.v, &d.v_end, &mut d.y);
+    s.system
+        .machine_mut()
+        .close_velocity(options, &d.v, &d.v_end, &mut d.y);
     s.system.local(&d.y, Local::flat_mut(&mut d.u));
     let u = Local::flat_mut(&mut d.u);
     (s.system).add_local_of_velocity(&s.list.contacts, &d.v_end, u);
@@ -299,7 +312,7 @@ fn iterate<S: MechanicalSystem>(
     remove_shifts(s, d);
     s.add_impulses(true, &d.p, &mut d.y);
     s.add_moments(&mut d.y);
-    s.system.half_solve_back(&mut d.y);
+    s.system.machine().half_solve_back(&mut d.y);
     for (v, change) in d.v_end.iter_mut().zip(&d.y) {
         *v += change;
     }

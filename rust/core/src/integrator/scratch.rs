@@ -1,11 +1,10 @@
 //! The state that a step of one system advances, and its scratch.
 
-use super::contacting::{Contacting, KeyOf, UnilateralContact};
 use super::data::Data;
 use super::dynamics::Dynamics;
 use super::listed::{List, Posed};
 use super::local::Local;
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{ConfigurationOf, KeyOf, MechanicalSystem, UnilateralContact};
 use super::report::StepReport;
 use super::warm_start::WarmStart;
 use crate::scalar::Single;
@@ -37,7 +36,7 @@ pub struct Scratch<Q, C: UnilateralContact> {
 }
 
 /// Scratch of a system's steps.
-pub type ScratchOf<S> = Scratch<<S as Dynamics>::Configuration, <S as Contacting>::Contact>;
+pub type ScratchOf<S> = Scratch<ConfigurationOf<S>, <S as MechanicalSystem>::Contact>;
 
 /// The contacts of all parts of a step that was taken in parts; empty otherwise.
 #[derive(Clone, Debug)]
@@ -107,12 +106,16 @@ impl<Q: Clone, C: UnilateralContact + Clone> Scratch<Q, C> {
         state: &StateMut<'_, Q>,
         memory: &WarmStart<KeyOf<S>>,
     ) where
-        S: MechanicalSystem<Configuration = Q, Contact = C>,
+        S: MechanicalSystem<Contact = C>,
+        S::Machine: Dynamics<Configuration = Q>,
         Q: PartialEq,
     {
-        let n = system.n_clusters();
-        if self.is_fresh() || self.data.v.len() != system.nv() || self.data.n_clusters() != n {
-            self.data = Data::new(Single::Baseline, state.configuration, system);
+        let n = system.machine().n_clusters();
+        if self.is_fresh()
+            || self.data.v.len() != system.machine().nv()
+            || self.data.n_clusters() != n
+        {
+            self.data = Data::new(Single::Baseline, state.configuration, system.machine());
             self.data.is_new = true;
         }
         let d = &mut self.data;

@@ -7,11 +7,11 @@
 use super::audit::{audit, correct, find_work, weigh, weigh_ends};
 use super::balance::Limits;
 use super::closing::close_end;
-use super::contacting::LocalOf;
-use super::forces::Start;
+use super::dynamics::Dynamics;
+use super::forces::{Forces, Start};
 use super::listed::{Listed, ListedData, PosedOf};
 use super::local::Local;
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{LocalOf, MechanicalSystem};
 use super::work::Work;
 
 /// Fraction of the kinetic energy after a step that may be removed by scaling the velocity alone.
@@ -34,7 +34,7 @@ pub(super) fn judge_at_last<S: MechanicalSystem>(
     problems: &PosedOf<S>,
     limits: Limits,
 ) -> bool {
-    if !s.system.is_audited() {
+    if !s.system.machine().is_audited() {
         find_work(s, d);
         return true;
     }
@@ -119,9 +119,9 @@ fn shorten_both<S: MechanicalSystem>(
     let way = s.options.theta * s.options.time_step;
     d.y.copy_from_slice(&d.v_end);
     let mut end = d.middle.clone();
-    (s.system).set_moved(&d.middle, &d.y, way, &mut end);
-    s.system.normalise(&mut end);
-    s.system.take(
+    s.system.machine().set_moved(&d.middle, &d.y, way, &mut end);
+    s.system.machine().normalise(&mut end);
+    s.system.machine().take(
         |cluster| shares[s.list.leader_of(cluster)] < 1.0,
         &end,
         &mut d.end,
@@ -146,7 +146,9 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
     }
     let mut works = vec![Work::default(); is_own.len()];
     let start = Start::at(&d.start, &d.v[..]);
-    (s.system).work(s.options, start, &d.v_end, &mut works);
+    s.system
+        .machine_mut()
+        .work(s.options, start, &d.v_end, &mut works);
     let own = works
         .into_iter()
         .zip(&is_own)
@@ -160,11 +162,13 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
     let (q_kept, v_kept) = (d.end.clone(), d.v_end.clone());
     for k in 0..MOST_SHORTENINGS {
         let mut after = 0.0;
-        (s.system).energies(s.options, &d.end, &d.v_end, |cluster, energy, _| {
-            if is_own[cluster] {
-                after += energy[0] + energy[1];
-            }
-        });
+        s.system
+            .machine_mut()
+            .energies(s.options, &d.end, &d.v_end, |cluster, energy, _| {
+                if is_own[cluster] {
+                    after += energy[0] + energy[1];
+                }
+            });
         let excess = after - before - share * supplied;
         if excess <= 0.0 {
             break;
@@ -178,10 +182,14 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
         } else {
             0.0
         };
-        (s.system).set_moved(&d.start, &d.v_mean, share * h, &mut d.end);
+        s.system
+            .machine()
+            .set_moved(&d.start, &d.v_mean, share * h, &mut d.end);
         close_end(s, d, true);
-        s.system.normalise(&mut d.end);
-        (s.system).take(|cluster| !is_own[cluster], &q_kept, &mut d.end);
+        s.system.machine().normalise(&mut d.end);
+        s.system
+            .machine()
+            .take(|cluster| !is_own[cluster], &q_kept, &mut d.end);
         for (v, (kept, cluster)) in d.v_end.iter_mut().zip(v_kept.iter().zip(&d.cluster_of)) {
             if !is_own[*cluster] {
                 *v = *kept;
@@ -199,7 +207,7 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
     }
     let [start, end] = &mut d.energies.stored;
     end.fill(0.0);
-    s.system.stored(&d.end, end);
+    s.system.machine().stored(&d.end, end);
     let stored = (start.iter().zip(&*end).zip(&is_own)).filter(|(_, is_own)| **is_own);
     let balance = &mut d.balances[leader];
     balance.stored = stored.map(|((start, end), _)| end - start).sum();

@@ -1,8 +1,7 @@
 //! The interface of a time-stepping scheme.
 
-use super::contacting::KeyOf;
 use super::error::StepError;
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{ConfigurationOf, KeyOf, MechanicalSystem};
 use super::options::StepOptions;
 use super::probe::Probe;
 use super::report::StepReport;
@@ -20,7 +19,7 @@ pub trait Integrator<S: MechanicalSystem> {
         &self,
         system: &mut S,
         options: &StepOptions,
-        state: StateMut<'_, S::Configuration>,
+        state: StateMut<'_, ConfigurationOf<S>>,
         warm_start: &mut WarmStart<KeyOf<S>>,
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,

@@ -1,8 +1,7 @@
 //! The scheme of each variant.
 
-use super::contacting::KeyOf;
 use super::error::StepError;
-use super::mechanical_system::MechanicalSystem;
+use super::mechanical_system::{ConfigurationOf, KeyOf, MechanicalSystem};
 use super::moreau_jean::MoreauJean;
 use super::moreau_jean_newton::MoreauJeanNewton;
 use super::options::{StepOptions, Variant};
@@ -19,7 +18,7 @@ impl<S: MechanicalSystem> Integrator<S> for Variant {
         &self,
         system: &mut S,
         options: &StepOptions,
-        state: StateMut<'_, S::Configuration>,
+        state: StateMut<'_, ConfigurationOf<S>>,
         warm_start: &mut WarmStart<KeyOf<S>>,
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,

@@ -1,8 +1,8 @@
 //! Warm start: the impulses of one step, by contact, for the next.
 
+use super::mechanical_system::UnilateralContact;
 use serde::{Deserialize, Serialize};
 
-use super::contacting::UnilateralContact;
 use crate::contact::ContactKey;
 
 /// Number of remembered contacts from which bisection is tried before a linear search.

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::active_contact::{ActiveContact, LocatedContact};
 use super::state::{Moved, State};
 use crate::integrator::{
-    MechanicalSystem, Probe, Scratch, StepOptions, StepReport, UnilateralContact, WarmStart,
+    Dynamics, MechanicalSystem, Probe, Scratch, StepOptions, StepReport, UnilateralContact,
+    WarmStart,
 };
 use crate::multibody::Energy;
 
@@ -35,7 +36,7 @@ pub trait Scene: Clone {
     /// Scratch of its matrices. It holds no state: a fresh one gives the same bits.
     type Parts: Clone;
     /// The scene as a step sees it.
-    type System<'a>: MechanicalSystem<Configuration = Self::Moved, Contact = Self::Contact>
+    type System<'a>: MechanicalSystem<Machine: Dynamics<Configuration = Self::Moved>, Contact = Self::Contact>
     where
         Self: 'a;
 

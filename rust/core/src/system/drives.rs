@@ -184,15 +184,11 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Adds the impulses and work of the part of a step that was tried last, in all lanes.
-    pub fn accept_part(&mut self) {
-        for (done, tried) in self
-            .done
-            .iter_mut()
-            .flatten()
-            .zip(self.tried.as_flattened())
-        {
-            *done += *tried;
+    /// Adds the impulses and work of the part of a step that was tried last, in the lanes of a mask.
+    pub fn accept_part(&mut self, lanes: T::Mask) {
+        let done = self.done.iter_mut().flatten();
+        for (done, tried) in done.zip(self.tried.as_flattened()) {
+            *done = T::select(lanes, *done + *tried, *done);
         }
     }
 

@@ -8,7 +8,7 @@ use super::fitted_theta::implicit_weight;
 use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
-    Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
+    Dynamics, Forces, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::multibody::MotorLine;
 use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
@@ -359,7 +359,17 @@ impl Forces for PlanarSystem<'_> {
     }
 }
 
-impl Contacting for PlanarSystem<'_> {
+impl MechanicalSystem for PlanarSystem<'_> {
+    type Machine = Self;
+
+    fn machine(&self) -> &Self {
+        self
+    }
+
+    fn machine_mut(&mut self) -> &mut Self {
+        self
+    }
+
     const DIMENSION: Dimension = Dimension::Two;
 
     type Contact = PlanarContact;

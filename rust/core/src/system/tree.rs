@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::command::Command;
 use super::momentum_balance::BalanceScene;
+use super::tree_lanes::TreeLanes;
 use super::tree_scratch::TreeScratch;
 use crate::contact::body_motion::Still;
 use crate::contact::detection::{Moving, detect_parts};
@@ -19,15 +20,13 @@ use crate::contact::{
     generalized_impulse, joint_friction, list_friction, relocate_limit,
 };
 use crate::geometry::Terrain;
-use crate::integrator::{
-    Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
-};
+use crate::integrator::{Dynamics, MechanicalSystem, Start, StepOptions, UnilateralContact};
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::multibody::{LaneConfiguration, Model};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::sand::SandState;
-use crate::scalar::Vec3;
+use crate::scalar::Single;
 
 impl UnilateralContact for Contact {
     type Key = ContactKey;
@@ -126,7 +125,7 @@ impl<'a> TreeSystem<'a> {
     }
 
     /// Rows of contacts at the end of the step, and of touches at its middle, as
-    /// [`Contacting::assemble`] builds them. W stays what it was.
+    /// [`MechanicalSystem::assemble`] builds them. W stays what it was.
     pub(super) fn assemble_rows(&mut self, contacts: &[Contact], touches: &[Contact], v: &[f64]) {
         let mechanism = self.model.mechanism();
         let TreeScratch { tree, system, .. } = &mut *self.parts;
@@ -142,263 +141,20 @@ impl<'a> TreeSystem<'a> {
     }
 }
 
-impl Dynamics for TreeSystem<'_> {
-    type T = f64;
-    type Configuration = LaneConfiguration<f64>;
-
-    fn nv(&self) -> usize {
-        self.model.nv()
-    }
-
-    fn n_clusters(&self) -> usize {
-        self.parts.tree.n_clusters()
-    }
-
-    fn cluster_of_velocity(&self, k: usize) -> usize {
-        self.parts.tree.cluster_of_velocity(k)
-    }
-
-    fn is_held(&self, cluster: usize) -> bool {
-        self.parts.tree.is_held(cluster)
-    }
-
-    fn take(
-        &self,
-        lanes: impl Fn(usize) -> bool,
-        from: &LaneConfiguration<f64>,
-        to: &mut LaneConfiguration<f64>,
-    ) {
-        self.parts.tree.take(lanes, from, to);
-    }
-
-    fn set_moved(
-        &self,
-        from: &LaneConfiguration<f64>,
-        v: &[f64],
-        h: f64,
-        to: &mut LaneConfiguration<f64>,
-    ) {
-        self.parts.tree.set_moved(from, v, h, to);
-    }
-
-    fn advance(&self, q: &mut LaneConfiguration<f64>, v: &[f64], h: f64) {
-        self.parts.tree.advance(q, v, h);
-    }
-
-    fn is_finite(&self, q: &LaneConfiguration<f64>) -> bool {
-        q.is_finite()
-    }
-
-    fn normalise(&self, q: &mut LaneConfiguration<f64>) {
-        q.normalise();
-    }
-
-    fn place_middle(&mut self, q: &LaneConfiguration<f64>) {
-        self.parts.tree.place_middle(q);
-    }
-
-    fn place_end(&mut self, q: &LaneConfiguration<f64>) {
-        self.parts.tree.place_end(q);
-        self.parts.joints_end.clone_from(&q.joints);
-    }
-
-    fn update_mass_matrix(&mut self, options: &StepOptions, going: bool, is_first: bool) {
-        self.parts.tree.update_mass_matrix(options, going, is_first);
-    }
-
-    fn factorise(&mut self, options: &StepOptions) -> bool {
-        let tree = &mut self.parts.tree;
-        tree.factorise(options)
-            || tree.drop_tangents() && {
-                tree.update_mass_matrix(options, true, false);
-                tree.factorise(options)
-            }
-    }
-
-    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        self.parts.tree.multiply_mass(v, out);
-    }
-
-    fn turning(
-        &mut self,
-        options: &StepOptions,
-        v: &[f64],
-        is_gyroscopic: &mut [bool],
-    ) -> Option<f64> {
-        self.parts.tree.turning(options, v, is_gyroscopic)
-    }
-
-    fn translation_axis(&self, velocity: usize) -> Option<usize> {
-        self.parts.tree.translation_axis(velocity)
-    }
-
-    fn conserves_momenta(&self) -> bool {
-        self.model.is_free_tree() && self.model.loops().is_empty()
-    }
-
-    fn is_audited(&self) -> bool {
-        self.parts.tree.is_audited
-    }
-
-    fn energies(
-        &mut self,
-        options: &StepOptions,
-        q: &LaneConfiguration<f64>,
-        v: &[f64],
-        each: impl FnMut(usize, [f64; 2], Vec3<f64>),
-    ) {
-        self.parts.tree.energies(options, q, v, each);
-    }
-
-    fn mass(&self, cluster: usize) -> Option<f64> {
-        self.parts.tree.mass(cluster)
-    }
-
-    fn half_solve(&self, y: &mut [f64]) {
-        self.parts.tree.half_solve(y);
-    }
-
-    fn half_solve_back(&self, y: &mut [f64]) {
-        self.parts.tree.half_solve_back(y);
-    }
-
-    fn close_velocity(&mut self, options: &StepOptions, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
-        self.parts.tree.close_velocity(options, v_begin, v, y);
-    }
-
-    fn add_loop_impulse(&mut self, out: &mut [f64]) {
-        self.parts.tree.add_loop_impulse(out);
-    }
-
-    fn close_end(
-        &mut self,
-        lanes: bool,
-        p: &[f64],
-        q: &mut LaneConfiguration<f64>,
-        v: &mut [f64],
-    ) -> Option<f64> {
-        if let Some(loops) = &mut self.parts.tree.loops {
-            loops.find_impulses(&each(p));
-        }
-        self.parts.tree.close_end(lanes, p, q, v)
-    }
-
-    fn tolerated(&self, options: &StepOptions, cluster: usize) -> f64 {
-        self.parts.tree.tolerated(options, cluster)
-    }
-
-    fn displacement(&self, y: &[f64], cluster: usize) -> f64 {
-        self.parts.tree.displacement(y, cluster)
-    }
-}
-
 /// A start of a step.
 type At<'a> = Start<'a, LaneConfiguration<f64>>;
 
-impl Forces for TreeSystem<'_> {
-    fn begin_load(&mut self, options: &StepOptions, start: At<'_>) {
-        self.parts.tree.begin_load(options, start);
+impl MechanicalSystem for TreeSystem<'_> {
+    type Machine = TreeLanes<f64>;
+
+    fn machine(&self) -> &TreeLanes<f64> {
+        &self.parts.tree
     }
 
-    fn load(&mut self, options: &StepOptions, start: At<'_>, v_mean: &[f64], y: &mut [f64]) {
-        self.parts.tree.load(options, start, v_mean, y);
+    fn machine_mut(&mut self) -> &mut TreeLanes<f64> {
+        &mut self.parts.tree
     }
 
-    fn add_given(&self, options: &StepOptions, impulse: &mut [f64]) {
-        self.parts.tree.add_given(options, impulse);
-    }
-
-    fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [f64]) {
-        self.parts.tree.begin_gyroscopic(options, scratch);
-    }
-
-    fn load_gyroscopic(
-        &mut self,
-        options: &StepOptions,
-        start: At<'_>,
-        v_mean: &[f64],
-        impulse: &[f64],
-        y: &mut [f64],
-    ) {
-        let tree = &mut self.parts.tree;
-        tree.load_gyroscopic(options, start, v_mean, impulse, y);
-    }
-
-    fn choose_branches(&mut self, v: &[f64]) {
-        self.parts.tree.choose_branches(v);
-    }
-
-    fn may_revise(&self) -> bool {
-        self.parts.tree.may_revise()
-    }
-
-    fn most_revisions(&self, lane: usize) -> usize {
-        self.parts.tree.most_revisions(lane)
-    }
-
-    fn unsettled(&mut self, lanes: bool, v_end: &[f64]) -> bool {
-        self.parts.tree.unsettled(lanes, v_end)
-    }
-
-    fn revise(&mut self, lanes: bool, v: &[f64], v_end: &[f64]) -> bool {
-        self.parts.tree.revise(lanes, v, v_end)
-    }
-
-    fn work(&mut self, options: &StepOptions, start: At<'_>, v_end: &[f64], out: &mut [Work]) {
-        self.parts.tree.work(options, start, v_end, out);
-    }
-
-    fn stored(&self, q: &LaneConfiguration<f64>, out: &mut [f64]) {
-        self.parts.tree.stored(q, out);
-    }
-
-    fn work_of_displacement(
-        &mut self,
-        options: &StepOptions,
-        start: At<'_>,
-        v_end: &[f64],
-        displacement: &[f64],
-    ) -> Option<f64> {
-        let tree = &mut self.parts.tree;
-        tree.work_of_displacement(options, start, v_end, displacement)
-    }
-
-    fn accept(&mut self, lanes: bool) {
-        if lanes {
-            self.parts.tree.accept_part();
-        }
-    }
-
-    fn begin_balance(&mut self, start: At<'_>) {
-        let TreeScratch { tree, balance, .. } = &mut *self.parts;
-        tree.place_middle(start.configuration);
-        balance.begin(self.model, &tree.poses_middle, start.v);
-    }
-
-    /// In momentum form, exact at both ends; see [`crate::integrator::moreau_jean_newton`].
-    fn balance(
-        &mut self,
-        options: &StepOptions,
-        start: At<'_>,
-        v_end: &[f64],
-        _v_mean: &[f64],
-        _scratch: &mut [f64],
-        y: &mut [f64],
-    ) {
-        let TreeScratch { tree, balance, .. } = &mut *self.parts;
-        let scene = BalanceScene {
-            model: self.model,
-            poses: [&tree.poses_middle, &tree.poses_end],
-            gravity: &options.gravity,
-            h: options.time_step,
-            theta: options.theta,
-        };
-        balance.residual(&scene, start, v_end, y);
-        tree.actuate(options, start, v_end, y);
-    }
-}
-
-impl Contacting for TreeSystem<'_> {
     const DIMENSION: Dimension = Dimension::Three;
 
     type Contact = Contact;
@@ -441,7 +197,7 @@ impl Contacting for TreeSystem<'_> {
         let (model, end) = (&**self.model, self.end(&[]));
         for contact in contacts {
             if contact.key.opposite == Opposite::Stop {
-                relocate_limit(model, &end, &self.parts.joints_end, contact);
+                relocate_limit(model, &end, &self.parts.tree.joints_end, contact);
             } else {
                 relocate_to(model, &end, &**self.terrain, contact);
             }
@@ -508,7 +264,7 @@ impl Contacting for TreeSystem<'_> {
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
         self.parts.system.add_impulses(self.model, p, y);
         if let Some(loops) = &self.parts.tree.loops {
-            loops.answer(&each(p), y);
+            loops.answer(&each(Single::best(), p), y);
         }
     }
 
@@ -526,6 +282,34 @@ impl Contacting for TreeSystem<'_> {
         mu: &'a [f64],
     ) -> Option<FrictionContactProblem<'a>> {
         Some(self.problem(q, mu))
+    }
+
+    fn begin_residual(&mut self, start: At<'_>) {
+        let TreeScratch { tree, balance, .. } = &mut *self.parts;
+        tree.place_middle(start.configuration);
+        balance.begin(self.model, &tree.poses_middle, start.v);
+    }
+
+    /// In momentum form, exact at both ends; see [`crate::integrator::moreau_jean_newton`].
+    fn residual(
+        &mut self,
+        options: &StepOptions,
+        start: At<'_>,
+        v_end: &[f64],
+        _v_mean: &[f64],
+        _scratch: &mut [f64],
+        y: &mut [f64],
+    ) {
+        let TreeScratch { tree, balance, .. } = &mut *self.parts;
+        let scene = BalanceScene {
+            model: self.model,
+            poses: [&tree.poses_middle, &tree.poses_end],
+            gravity: &options.gravity,
+            h: options.time_step,
+            theta: options.theta,
+        };
+        balance.residual(&scene, start, v_end, y);
+        tree.actuate(options, start, v_end, y);
     }
 
     fn lever(&self, contact: &Contact) -> f64 {

@@ -20,8 +20,6 @@ pub struct TreeScratch {
     pub(super) pairs: PairSearch,
     /// Found by the last detection, x and z, m.
     pub(super) unknown_ground: Option<[f64; 2]>,
-    /// Joint coordinates at the end of the step (n_joints).
-    pub(super) joints_end: Vec<f64>,
     pub(super) system: ContactSystem,
     /// Joints with dry friction, and W's entry of their normals.
     friction: Vec<(usize, f64)>,
@@ -40,13 +38,12 @@ impl TreeScratch {
         let wheels = model.wheels().iter().map(PlacedWheel::of).collect();
         let (mechanism, loops) = (model.mechanism(), model.loops());
         let mut tree = TreeLanes::new(Single::best(), mechanism, loops, wheels, 0);
-        tree.may_turn = true;
+        tree.is_thorough = true;
         Self {
             tree,
             balance: MomentumBalance::new(model.bodies().len()),
             pairs: PairSearch::new(model),
             unknown_ground: None,
-            joints_end: vec![0.0; model.n_joints()],
             system: ContactSystem::with_capacity(model.nv(), n),
             friction: Vec::with_capacity(model.rubbing_joints().len()),
         }

@@ -238,13 +238,6 @@ impl Model {
         self.mechanism.n_rotations
     }
 
-    /// Whether the model is a single tree on a free base, like a rover.
-    #[inline]
-    #[must_use]
-    pub fn is_free_tree(&self) -> bool {
-        self.trees.len() == 1 && self.trees[0].is_free
-    }
-
     /// Whether all trees are on free bases.
     #[must_use]
     pub fn is_free(&self) -> bool {

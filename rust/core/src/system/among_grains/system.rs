@@ -5,7 +5,7 @@ use super::parts::CompositeScratch;
 use super::touches;
 use crate::contact::{Activation, Contact, generalized_impulse};
 use crate::integrator::{
-    Contacting, Dynamics, Forces, Start, StepOptions, UnilateralContact, Work,
+    Dynamics, Forces, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
 use crate::multibody::LaneConfiguration;
@@ -132,19 +132,19 @@ impl Dynamics for TreeAmongGrains<'_> {
     type Configuration = Both;
 
     fn nv(&self) -> usize {
-        self.bed.nv() + self.tree.nv()
+        self.bed.nv() + self.tree.machine().nv()
     }
 
     fn set_moved(&self, from: &Both, v: &[f64], h: f64, to: &mut Both) {
         let (v_a, v_b) = self.halves(v);
         self.bed.set_moved(&from.0, v_a, h, &mut to.0);
-        self.tree.set_moved(&from.1, v_b, h, &mut to.1);
+        self.tree.machine().set_moved(&from.1, v_b, h, &mut to.1);
     }
 
     fn advance(&self, q: &mut Both, v: &[f64], h: f64) {
         let (v_a, v_b) = self.halves(v);
         self.bed.advance(&mut q.0, v_a, h);
-        self.tree.advance(&mut q.1, v_b, h);
+        self.tree.machine().advance(&mut q.1, v_b, h);
     }
 
     fn take(&self, lanes: impl Fn(usize) -> bool, from: &Both, to: &mut Both) {
@@ -154,36 +154,38 @@ impl Dynamics for TreeAmongGrains<'_> {
     }
 
     fn is_finite(&self, q: &Both) -> bool {
-        self.bed.is_finite(&q.0) && self.tree.is_finite(&q.1)
+        self.bed.is_finite(&q.0) && self.tree.machine().is_finite(&q.1)
     }
 
     fn normalise(&self, q: &mut Both) {
-        self.tree.normalise(&mut q.1);
+        self.tree.machine().normalise(&mut q.1);
     }
 
     fn place_middle(&mut self, q: &Both) {
         self.bed.place_middle(&q.0);
-        self.tree.place_middle(&q.1);
+        self.tree.machine_mut().place_middle(&q.1);
     }
 
     fn place_end(&mut self, q: &Both) {
         self.bed.place_end(&q.0);
-        self.tree.place_end(&q.1);
+        self.tree.machine_mut().place_end(&q.1);
     }
 
     fn update_mass_matrix(&mut self, options: &StepOptions, going: bool, is_first: bool) {
         self.bed.update_mass_matrix(options, going, is_first);
-        self.tree.update_mass_matrix(options, going, is_first);
+        self.tree
+            .machine_mut()
+            .update_mass_matrix(options, going, is_first);
     }
 
     fn factorise(&mut self, options: &StepOptions) -> bool {
-        self.bed.factorise(options) && self.tree.factorise(options)
+        self.bed.factorise(options) && self.tree.machine_mut().factorise(options)
     }
 
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
         let ((v_a, v_b), (out_a, out_b)) = (self.halves(v), self.halves_mut(out));
         self.bed.multiply_mass(v_a, out_a);
-        self.tree.multiply_mass(v_b, out_b);
+        self.tree.machine().multiply_mass(v_b, out_b);
     }
 
     fn turning(
@@ -192,9 +194,9 @@ impl Dynamics for TreeAmongGrains<'_> {
         v: &[f64],
         is_gyroscopic: &mut [bool],
     ) -> Option<f64> {
-        let mut of_trees = vec![false; self.tree.n_clusters()];
+        let mut of_trees = vec![false; self.tree.machine().n_clusters()];
         let (_, v) = v.split_at(self.bed.nv());
-        let turning = self.tree.turning(options, v, &mut of_trees);
+        let turning = self.tree.machine_mut().turning(options, v, &mut of_trees);
         is_gyroscopic[0] = of_trees.contains(&true);
         turning
     }
@@ -202,38 +204,44 @@ impl Dynamics for TreeAmongGrains<'_> {
     fn half_solve(&self, y: &mut [f64]) {
         let (y_a, y_b) = self.halves_mut(y);
         self.bed.half_solve(y_a);
-        self.tree.half_solve(y_b);
+        self.tree.machine().half_solve(y_b);
     }
 
     fn half_solve_back(&self, y: &mut [f64]) {
         let (y_a, y_b) = self.halves_mut(y);
         self.bed.half_solve_back(y_a);
-        self.tree.half_solve_back(y_b);
+        self.tree.machine().half_solve_back(y_b);
     }
 
     fn close_velocity(&mut self, options: &StepOptions, v_begin: &[f64], v: &[f64], y: &mut [f64]) {
         let n = self.bed.nv();
-        (self.tree).close_velocity(options, &v_begin[n..], &v[n..], &mut y[n..]);
+        self.tree
+            .machine_mut()
+            .close_velocity(options, &v_begin[n..], &v[n..], &mut y[n..]);
     }
 
     fn add_loop_impulse(&mut self, out: &mut [f64]) {
-        self.tree.add_loop_impulse(&mut out[self.bed.nv()..]);
+        self.tree
+            .machine_mut()
+            .add_loop_impulse(&mut out[self.bed.nv()..]);
     }
 
     fn close_end(&mut self, lanes: bool, p: &[f64], q: &mut Both, v: &mut [f64]) -> Option<f64> {
         let [_, p] = self.parts.split(p);
-        (self.tree).close_end(lanes, p, &mut q.1, &mut v[self.bed.nv()..])
+        self.tree
+            .machine_mut()
+            .close_end(lanes, p, &mut q.1, &mut v[self.bed.nv()..])
     }
 
     fn mass(&self, _cluster: usize) -> Option<f64> {
-        let clusters = 0..self.tree.n_clusters();
-        clusters.map(|own| self.tree.mass(own)).sum()
+        let clusters = 0..self.tree.machine().n_clusters();
+        clusters.map(|own| self.tree.machine().mass(own)).sum()
     }
 
     fn displacement(&self, y: &[f64], _cluster: usize) -> f64 {
         let (y_a, y_b) = self.halves(y);
-        let clusters = 0..self.tree.n_clusters();
-        let of_trees = clusters.map(|own| self.tree.displacement(y_b, own));
+        let clusters = 0..self.tree.machine().n_clusters();
+        let of_trees = clusters.map(|own| self.tree.machine().displacement(y_b, own));
         of_trees.fold(self.bed.displacement(y_a, 0), f64::max)
     }
 }
@@ -242,7 +250,7 @@ impl Forces for TreeAmongGrains<'_> {
     fn begin_load(&mut self, options: &StepOptions, start: Start<'_, Both>) {
         let (start_a, start_b) = self.starts(start);
         self.bed.begin_load(options, start_a);
-        self.tree.begin_load(options, start_b);
+        self.tree.machine_mut().begin_load(options, start_b);
     }
 
     fn load(
@@ -255,15 +263,19 @@ impl Forces for TreeAmongGrains<'_> {
         let (start_a, start_b) = self.starts(start);
         let ((v_a, v_b), (y_a, y_b)) = (self.halves(v_mean), self.halves_mut(y));
         self.bed.load(options, start_a, v_a, y_a);
-        self.tree.load(options, start_b, v_b, y_b);
+        self.tree.machine_mut().load(options, start_b, v_b, y_b);
     }
 
     fn add_given(&self, options: &StepOptions, impulse: &mut [f64]) {
-        self.tree.add_given(options, &mut impulse[self.bed.nv()..]);
+        self.tree
+            .machine()
+            .add_given(options, &mut impulse[self.bed.nv()..]);
     }
 
     fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [f64]) {
-        (self.tree).begin_gyroscopic(options, &mut scratch[self.bed.nv()..]);
+        self.tree
+            .machine_mut()
+            .begin_gyroscopic(options, &mut scratch[self.bed.nv()..]);
     }
 
     fn load_gyroscopic(
@@ -278,30 +290,34 @@ impl Forces for TreeAmongGrains<'_> {
         let ((v_a, v_b), (y_a, y_b)) = (self.halves(v_mean), self.halves_mut(y));
         let (own, theirs) = self.halves(impulse);
         (self.bed).load_gyroscopic(options, start_a, v_a, own, y_a);
-        (self.tree).load_gyroscopic(options, start_b, v_b, theirs, y_b);
+        self.tree
+            .machine_mut()
+            .load_gyroscopic(options, start_b, v_b, theirs, y_b);
     }
 
     fn choose_branches(&mut self, v: &[f64]) {
         let (v_a, v_b) = self.halves(v);
         self.bed.choose_branches(v_a);
-        self.tree.choose_branches(v_b);
+        self.tree.machine_mut().choose_branches(v_b);
     }
 
     fn most_revisions(&self, lane: usize) -> usize {
-        let (of_bed, of_tree) = (&self.bed, &self.tree);
+        let (of_bed, of_tree) = (&self.bed, self.tree.machine());
         of_bed
             .most_revisions(lane)
             .max(of_tree.most_revisions(lane))
     }
 
     fn unsettled(&mut self, lanes: bool, v_end: &[f64]) -> bool {
-        self.tree.unsettled(lanes, &v_end[self.bed.nv()..])
+        self.tree
+            .machine_mut()
+            .unsettled(lanes, &v_end[self.bed.nv()..])
     }
 
     fn revise(&mut self, lanes: bool, v: &[f64], v_end: &[f64]) -> bool {
         let ((v_a, v_b), (end_a, end_b)) = (self.halves(v), self.halves(v_end));
         let has_struck = self.bed.revise(lanes, v_a, end_a);
-        self.tree.revise(lanes, v_b, end_b) || has_struck
+        self.tree.machine_mut().revise(lanes, v_b, end_b) || has_struck
     }
 
     fn work(
@@ -313,39 +329,30 @@ impl Forces for TreeAmongGrains<'_> {
     ) {
         let (_, start) = self.starts(start);
         let (_, v_end) = self.halves(v_end);
-        let mut of_clusters = vec![Work::default(); self.tree.n_clusters()];
-        self.tree.work(options, start, v_end, &mut of_clusters);
+        let mut of_clusters = vec![Work::default(); self.tree.machine().n_clusters()];
+        self.tree
+            .machine_mut()
+            .work(options, start, v_end, &mut of_clusters);
         let whole = of_clusters.into_iter().reduce(|a, b| a + b);
         out.fill(whole.unwrap_or_default());
     }
 
     fn accept(&mut self, lanes: bool) {
-        self.tree.accept(lanes);
-    }
-
-    fn begin_balance(&mut self, start: Start<'_, Both>) {
-        let (_, start) = self.starts(start);
-        self.tree.begin_balance(start);
-    }
-
-    fn balance(
-        &mut self,
-        options: &StepOptions,
-        start: Start<'_, Both>,
-        v_end: &[f64],
-        v_mean: &[f64],
-        scratch: &mut [f64],
-        y: &mut [f64],
-    ) {
-        let (start_a, start_b) = self.starts(start);
-        let ((end_a, end_b), (v_a, v_b)) = (self.halves(v_end), self.halves(v_mean));
-        let ((own, theirs), (y_a, y_b)) = (self.halves_mut(scratch), self.halves_mut(y));
-        (self.bed).balance(options, start_a, end_a, v_a, own, y_a);
-        (self.tree).balance(options, start_b, end_b, v_b, theirs, y_b);
+        self.tree.machine_mut().accept(lanes);
     }
 }
 
-impl Contacting for TreeAmongGrains<'_> {
+impl MechanicalSystem for TreeAmongGrains<'_> {
+    type Machine = Self;
+
+    fn machine(&self) -> &Self {
+        self
+    }
+
+    fn machine_mut(&mut self) -> &mut Self {
+        self
+    }
+
     type Contact = CompositeContact;
 
     const DIMENSION: Dimension = Dimension::Three;
@@ -566,6 +573,27 @@ impl Contacting for TreeAmongGrains<'_> {
             &(self.bed).solve_step(free, (q_a, mu_a), options, p_a, u_a, workspace),
             &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
         )
+    }
+
+    fn begin_residual(&mut self, start: Start<'_, Both>) {
+        let (_, start) = self.starts(start);
+        self.tree.begin_residual(start);
+    }
+
+    fn residual(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Both>,
+        v_end: &[f64],
+        v_mean: &[f64],
+        scratch: &mut [f64],
+        y: &mut [f64],
+    ) {
+        let (start_a, start_b) = self.starts(start);
+        let ((end_a, end_b), (v_a, v_b)) = (self.halves(v_end), self.halves(v_mean));
+        let ((own, theirs), (y_a, y_b)) = (self.halves_mut(scratch), self.halves_mut(y));
+        (self.bed).residual(options, start_a, end_a, v_a, own, y_a);
+        (self.tree).residual(options, start_b, end_b, v_b, theirs, y_b);
     }
 
     fn add_moments(&self, y: &mut [f64]) {

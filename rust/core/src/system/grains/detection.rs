@@ -34,7 +34,7 @@ impl<const D: usize> GrainSystem<'_, D>
 where
     BodyPairs<D>: Swept<D>,
 {
-    /// See [`crate::integrator::Contacting::detect`].
+    /// See [`crate::integrator::MechanicalSystem::detect`].
     pub(super) fn find_contacts(
         &mut self,
         v: &[f64],

@@ -15,7 +15,7 @@ use super::slabs::Slabs;
 use super::struck_pairs::{MOST_REPETITIONS, Struck};
 use crate::contact::Activation;
 use crate::geometry::Facing;
-use crate::integrator::{Contacting, Dynamics, Forces, Stabilisation, Start, StepOptions};
+use crate::integrator::{Dynamics, Forces, MechanicalSystem, Stabilisation, Start, StepOptions};
 use crate::law::newton_impact::{rebound_at_gap, slow_approach};
 use crate::planar::{PlanarPoses, PlanarTree};
 use crate::problem::{
@@ -469,10 +469,20 @@ where
     }
 }
 
-impl<const D: usize> Contacting for GrainSystem<'_, D>
+impl<const D: usize> MechanicalSystem for GrainSystem<'_, D>
 where
     BodyPairs<D>: Swept<D>,
 {
+    type Machine = Self;
+
+    fn machine(&self) -> &Self {
+        self
+    }
+
+    fn machine_mut(&mut self) -> &mut Self {
+        self
+    }
+
     type Contact = GrainContact<D>;
 
     const DIMENSION: Dimension = dimension(D);

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use crate::contact::Contact;
 use crate::integrator::held_step::HeldStep;
-use crate::integrator::{Contacting, Dynamics, StepOptions};
+use crate::integrator::{Dynamics, MechanicalSystem, StepOptions};
 use crate::sand::memory::rate;
 use crate::sand::{Derivatives, Memory, Soil, Twist, WheelPose};
 use crate::system::sand::SandContact;
@@ -139,7 +139,7 @@ impl TreeSystem<'_> {
             probe.hold(kept, numbers)
         });
         let (wheels, slopes): (Vec<HeldWheel>, Vec<[Six<f64>; SIX]>) = held.unzip();
-        let (nv, n) = (self.nv(), wheels.len());
+        let (nv, n) = (self.model.nv(), wheels.len());
         let mut response = vec![0.0; nv * SIX * n];
         let mut matrix = DMatrix::identity(SIX * n, SIX * n);
         let mut feedback = DMatrix::zeros(SIX * n, nv);
@@ -193,17 +193,17 @@ impl TreeSystem<'_> {
     ) -> [Vec<f64>; 2] {
         let mut unit = [0.0; SIX];
         unit[component] = 1.0;
-        let mut y = vec![0.0; self.nv()];
+        let mut y = vec![0.0; self.model.nv()];
         if let Some(sand) = self.parts.tree.sand() {
             (sand.patches[wheel].map).add_impulse(&unit, options.time_step, &mut y);
         }
-        self.half_solve(&mut y);
+        self.machine().half_solve(&mut y);
         if let Some(loops) = &self.parts.tree.loops {
             loops.restrict(&mut y);
         }
         let mut du = vec![0.0; step.law.p.len()];
         self.local(&y, &mut du);
-        self.half_solve_back(&mut y);
+        self.machine().half_solve_back(&mut y);
         let sum = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
         let dp: Vec<f64> = step.answer.rows().map(|(row, _)| sum(row, &du)).collect();
         let mut whole = y.clone();

@@ -6,7 +6,7 @@ use super::held_sand::HeldSand;
 use crate::contact::contact_slope::ContactSlope;
 use crate::contact::{Contact, Opposite, Part};
 use crate::integrator::held_step::HeldStep;
-use crate::integrator::{Contacting, Dynamics, ScratchOf, Start, StepOptions};
+use crate::integrator::{Dynamics, MechanicalSystem, ScratchOf, Start, StepOptions};
 use crate::multibody::{Configuration, LaneConfiguration, Model};
 use crate::scalar::Single;
 use crate::system::TreeSystem;
@@ -63,8 +63,8 @@ impl TreeSystem<'_> {
         }
         let mut q = LaneConfiguration::new(Single::best(), self.model.mechanism());
         q.set_lane(0, start.configuration);
-        self.advance(&mut q, start.v, options.time_step);
-        self.place_end(&q);
+        self.machine().advance(&mut q, start.v, options.time_step);
+        self.machine_mut().place_end(&q);
         let end = self.end(&[]);
         let contacts = step.contacts.iter().enumerate().map(|(i, contact)| {
             let joint = match contact.part {

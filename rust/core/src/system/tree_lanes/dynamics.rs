@@ -1,7 +1,7 @@
 //! The dynamics of trees in lanes.
 
 use super::TreeLanes;
-use crate::contact::loops::Projector;
+use crate::contact::loops::{Projector, each};
 use crate::integrator::{Dynamics, StepOptions};
 use crate::multibody::LaneConfiguration;
 use crate::multibody::energy::energies;
@@ -26,6 +26,25 @@ impl<T: Lane> TreeLanes<T> {
         if let Some(sand) = &mut self.sand {
             sand.add_to_mass(machine, mass_matrix);
         }
+    }
+
+    fn factorise_once(&mut self, options: &StepOptions) -> T::Mask {
+        self.add_implicit(options);
+        let (mechanism, mass_matrix) = (&*self.mechanism, &mut self.mass_matrix);
+        let is_definite = if self.turns | self.is_thorough {
+            mass_matrix.factorise(mechanism, &mut self.factor)
+        } else {
+            mass_matrix.factorise_in_place(mechanism, &mut self.factor)
+        };
+        if let Some(loops) = &mut self.loops {
+            let placed = Placed {
+                mechanism: &self.mechanism,
+                poses: &self.poses_middle,
+                joints: &self.joints_middle,
+            };
+            loops.begin(&placed, &self.factor, self.n_places);
+        }
+        is_definite
     }
 }
 
@@ -104,6 +123,7 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
 
     fn place_end(&mut self, q: &LaneConfiguration<T>) {
         self.poses_end.update(&self.mechanism, &self.inertias, q);
+        self.joints_end.copy_from_slice(&q.joints);
     }
 
     fn update_mass_matrix(&mut self, options: &StepOptions, going: T::Mask, is_first: bool) {
@@ -122,20 +142,11 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
     }
 
     fn factorise(&mut self, options: &StepOptions) -> T::Mask {
-        self.add_implicit(options);
-        let (mechanism, mass_matrix) = (&*self.mechanism, &mut self.mass_matrix);
-        let is_definite = if self.turns | self.may_turn {
-            mass_matrix.factorise(mechanism, &mut self.factor)
-        } else {
-            mass_matrix.factorise_in_place(mechanism, &mut self.factor)
-        };
-        if let Some(loops) = &mut self.loops {
-            let placed = Placed {
-                mechanism: &self.mechanism,
-                poses: &self.poses_middle,
-                joints: &self.joints_middle,
-            };
-            loops.begin(&placed, &self.factor, self.n_places);
+        let mut is_definite = self.factorise_once(options);
+        let all = T::mask(self.token, u32::MAX >> (32 - T::LANES));
+        if self.is_thorough && (all & !is_definite).any() && self.drop_tangents() {
+            self.update_mass_matrix(options, all, false);
+            is_definite = self.factorise_once(options);
         }
         is_definite
     }
@@ -161,6 +172,11 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
             most = most.max(turning.of_frames());
         }
         Some(most)
+    }
+
+    fn conserves_momenta(&self) -> bool {
+        let trees = &self.mechanism.trees;
+        trees.len() == 1 && trees[0].is_free && self.loops.is_none()
     }
 
     #[inline(always)]
@@ -216,11 +232,14 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
     fn close_end(
         &mut self,
         lanes: T::Mask,
-        _p: &[T],
+        p: &[T],
         q: &mut LaneConfiguration<T>,
         v: &mut [T],
     ) -> Option<T> {
         let loops = self.loops.as_mut()?;
+        if self.is_thorough {
+            loops.find_impulses(&each(self.token, p));
+        }
         let with = Projector {
             mechanism: &self.mechanism,
             inertias: &self.inertias,

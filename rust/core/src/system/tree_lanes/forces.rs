@@ -7,17 +7,6 @@ use crate::multibody::bias::bias;
 use crate::scalar::Lane;
 use crate::system::gyroscopic::{Gyroscopic, Turned};
 
-impl TreeLanes<f64> {
-    /// A part of the step becomes the state: its impulses and work are added to those of the parts
-    /// before it.
-    pub fn accept_part(&mut self) {
-        self.drives.accept_part();
-        if let Some(sand) = &mut self.sand {
-            sand.accept(true);
-        }
-    }
-}
-
 impl<T: Lane> TreeLanes<T> {
     /// Adds the impulse of drives, sand and wrenches over a step that ends with the iterate
     /// `v_end`.
@@ -197,7 +186,11 @@ impl<T: Lane> Forces for TreeLanes<T> {
 
     #[inline(always)]
     fn accept(&mut self, lanes: T::Mask) {
-        self.drives.accept(lanes);
+        if self.is_thorough {
+            self.drives.accept_part(lanes);
+        } else {
+            self.drives.accept(lanes);
+        }
         if let Some(sand) = &mut self.sand {
             sand.accept(lanes);
         }

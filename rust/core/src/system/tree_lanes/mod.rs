@@ -30,7 +30,7 @@ use crate::scalar::{Lane, MAX_LANES, Vec3};
 
 /// Trees of one mechanism: their descriptions, commands, and the matrices of a step.
 #[derive(Clone)]
-pub(crate) struct TreeLanes<T: Lane> {
+pub struct TreeLanes<T: Lane> {
     pub token: T::Token,
     pub mechanism: Arc<Mechanism>,
     pub models: [Option<Arc<Model>>; MAX_LANES],
@@ -55,16 +55,18 @@ pub(crate) struct TreeLanes<T: Lane> {
     pub is_audited: bool,
     pub poses_middle: Poses<T>,
     pub poses_end: Poses<T>,
-    /// Coordinates of the joints at the midpoint.
+    /// Coordinates of the joints at the midpoint and at the predicted end.
     pub joints_middle: Vec<T>,
+    pub joints_end: Vec<T>,
     pub mass_matrix: MassMatrix<T>,
     pub factor: Factor<T>,
     bias_scratch: BiasScratch<T>,
     implicit: Option<Box<Implicit<T>>>,
-    /// Whether a tree may need implicit gyroscopic terms in the present step, and whether any step
-    /// may: M̂ is then kept beside its factor.
+    /// Whether a tree may need implicit gyroscopic terms in the present step: M̂ is then kept beside
+    /// its factor.
     turns: bool,
-    pub may_turn: bool,
+    /// Whether steps are taken with all effort, which may ask for implicit terms at any time.
+    pub is_thorough: bool,
     energy_scratch: EnergyScratch<T>,
     /// Closed loops, which number the contacts by their places, and how many there are.
     pub loops: Option<Box<Loops<T>>>,
@@ -83,7 +85,7 @@ struct Implicit<T: Lane> {
 
 impl<T: Lane> TreeLanes<T> {
     /// Room for trees with these closed loops and wheels, and `n_places` for contacts.
-    pub fn new(
+    pub(crate) fn new(
         token: T::Token,
         mechanism: &Arc<Mechanism>,
         loops: &[Loop],
@@ -110,12 +112,13 @@ impl<T: Lane> TreeLanes<T> {
             poses_middle: Poses::new(token, mechanism),
             poses_end: Poses::new(token, mechanism),
             joints_middle: vec![zero; mechanism.joints.len()],
+            joints_end: vec![zero; mechanism.joints.len()],
             mass_matrix: MassMatrix::new(token, mechanism),
             factor: Factor::new(token, mechanism),
             bias_scratch: BiasScratch::new(token, mechanism),
             implicit: None,
             turns: false,
-            may_turn: false,
+            is_thorough: false,
             energy_scratch: EnergyScratch::new(token, mechanism),
             loops: Loops::new(token, mechanism, loops, 0),
             n_places,

@@ -69,7 +69,7 @@ impl<T: Lane> TreeLanes<T> {
     }
 
     /// The sand; none before a tree stood on soft ground.
-    pub fn sand(&self) -> Option<&SandContact<T>> {
+    pub(crate) fn sand(&self) -> Option<&SandContact<T>> {
         self.sand.as_deref()
     }
 
@@ -168,7 +168,7 @@ impl<T: Lane> TreeLanes<T> {
         layers
     }
 
-    pub fn sand_scene(&self) -> SandScene<'_, T> {
+    pub(crate) fn sand_scene(&self) -> SandScene<'_, T> {
         SandScene {
             mechanism: &self.mechanism,
             poses: &self.poses_middle,
