@@ -1,8 +1,8 @@
 //! Delassus operator `W = Hᵀ M̂⁻¹ H` of the contacts of one machine, and the map from impulses to
 //! velocities.
 //!
-//! The rows of a contact (page `rows`) are kept over all velocities, zero off the paths of its
-//! bodies.
+//! The rows of a contact (page `rows`) are kept along the path of its body, and over all velocities
+//! between two bodies and where loops restrict them.
 
 use super::body_motion::Still;
 use super::jacobian::{for_each_row, relative_velocity};
@@ -11,7 +11,7 @@ use super::limit;
 use super::pair::Contact;
 use super::part::Part;
 use super::rollers;
-use super::rows::{Triple, add_product, add_scaled, along, close_stop};
+use super::rows::{Triple, add_product, add_scaled, along, close_stop, product};
 use crate::multibody::{Factor, Mechanism, Model, Poses};
 
 /// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.
@@ -22,8 +22,9 @@ pub struct ContactSystem {
     /// Local velocity `Hᵀ v` before the step (3 n_c), m/s.
     pub u: Vec<f64>,
     nv: usize,
-    /// Z (n_c, nv), row-major.
+    /// Z along the path of each contact, from its start on.
     Z: Vec<Triple<f64>>,
+    starts: Vec<usize>,
     /// Body of each contact that moves along the path of one body; none between two bodies.
     bodies: Vec<Option<usize>>,
     /// All velocities, ascending.
@@ -47,6 +48,7 @@ impl ContactSystem {
             u: Vec::with_capacity(3 * n),
             nv,
             Z: Vec::with_capacity(n * nv),
+            starts: Vec::with_capacity(n + 1),
             bodies: Vec::with_capacity(n),
             all: (0..nv).collect(),
             beyond: Vec::with_capacity(n),
@@ -88,6 +90,8 @@ impl ContactSystem {
         self.Z.clear();
         self.u.clear();
         self.bodies.clear();
+        self.starts.clear();
+        self.starts.push(0);
         self.beyond.clear();
         for (motion, contacts) in placed {
             for contact in *contacts {
@@ -99,25 +103,36 @@ impl ContactSystem {
     fn push(&mut self, model: &Model, factor: &Factor<f64>, motion: &Still<'_>, contact: &Contact) {
         let mechanism = model.mechanism();
         let (c, first) = (self.n_contacts(), self.Z.len());
-        self.Z.resize(first + self.nv, [0.0; 3]);
-        let rows = &mut self.Z[first..];
-        if let Some((k, sign, row)) = limit::joint_row(model, contact) {
-            rows[k][row] = sign;
-        } else {
-            for_each_row(motion, contact, |k, row| {
-                add_scaled(&mut rows[k], &row, 1.0)
-            });
-        }
         self.bodies.push(match contact.other {
             None => Some(contact.body),
             Some(_) => None,
         });
         let path = along_path(mechanism, &self.all, self.bodies[c]);
-        let mut u = [0.0; 3];
-        for &k in path {
-            add_scaled(&mut u, &rows[k], motion.v[k]);
+        self.Z.resize(first + path.len(), [0.0; 3]);
+        self.starts.push(self.Z.len());
+        let rows = &mut self.Z[first..];
+        if let Some((_, sign, row)) = limit::joint_row(model, contact) {
+            rows[path.len() - 1][row] = sign;
+        } else if contact.other.is_none() {
+            let mut next = rows.iter_mut();
+            for_each_row(motion, contact, |_, row| {
+                if let Some(own) = next.next() {
+                    *own = row;
+                }
+            });
+        } else {
+            for_each_row(motion, contact, |k, row| {
+                add_scaled(&mut rows[k], &row, 1.0)
+            });
         }
-        factor.half_solve_columns(mechanism, path.iter().copied(), rows);
+        let mut u = [0.0; 3];
+        for (row, &k) in rows.iter().zip(path) {
+            add_scaled(&mut u, row, motion.v[k]);
+        }
+        match contact.other {
+            None => factor.half_solve_path(mechanism, contact.body, rows),
+            Some(_) => factor.half_solve_columns(mechanism, 0..self.nv, rows),
+        }
         self.u.extend(u);
         self.beyond.push([0.0; 3]);
         let close: fn(&mut [f64; 9]) = match contact.part {
@@ -132,17 +147,40 @@ impl ContactSystem {
         self.beyond[c] = [0, 4, 8].map(|k| closed[k] - own[k]);
     }
 
-    /// Z of a contact (nv).
-    pub(crate) fn rows(&self, c: usize) -> &[Triple<f64>] {
-        &self.Z[c * self.nv..][..self.nv]
+    /// Z of a contact along its path.
+    fn rows(&self, c: usize) -> &[Triple<f64>] {
+        &self.Z[self.starts[c]..self.starts[c + 1]]
     }
 
-    /// Z of a contact without the motions that would open a loop (nv).
-    pub(crate) fn free_rows(&self, c: usize) -> &[Triple<f64>] {
+    /// Calls `each` with the velocities of a contact, ascending, and its entries of Z.
+    fn for_each<'a>(
+        &'a self,
+        model: &'a Model,
+        c: usize,
+        mut each: impl FnMut(usize, &Triple<f64>),
+    ) {
+        let path = along_path(model.mechanism(), &self.all, self.bodies[c]);
+        for (&k, z) in path.iter().zip(self.rows(c)) {
+            each(k, z);
+        }
+    }
+
+    /// Z of a contact over all velocities, without the motions that would open a loop, as the rows
+    /// of n, t and b (3 nv) at the end of `out`.
+    pub(crate) fn push_rows(&self, model: &Model, c: usize, out: &mut Vec<f64>) {
+        let (first, nv) = (out.len(), self.nv);
+        out.resize(first + 3 * nv, 0.0);
+        let out = &mut out[first..];
+        let mut push = |k: usize, z: &Triple<f64>| {
+            for i in 0..3 {
+                out[i * nv + k] = z[i];
+            }
+        };
         if self.restricted.is_empty() {
-            self.rows(c)
+            self.for_each(model, c, push);
         } else {
-            &self.restricted[c * self.nv..][..self.nv]
+            let rows = &self.restricted[c * nv..][..nv];
+            rows.iter().enumerate().for_each(|(k, z)| push(k, z));
         }
     }
 
@@ -175,15 +213,20 @@ impl ContactSystem {
 
     /// The block of W for two contacts, without what is beyond the squares of Z.
     fn block(&self, model: &Model, c: usize, d: usize) -> [f64; 9] {
-        let (x, y) = (self.free_rows(c), self.free_rows(d));
-        let path = match [self.bodies[c], self.bodies[d]] {
-            _ if !self.restricted.is_empty() => &self.all[..],
-            [Some(a), Some(b)] => &model.path(a)[..model.common_path(a, b)],
-            [own, None] | [None, own] => along_path(model.mechanism(), &self.all, own),
-        };
+        if !self.restricted.is_empty() {
+            let [x, y] = [c, d].map(|c| &self.restricted[c * self.nv..][..self.nv]);
+            return product(0.0, x, y);
+        }
+        let (x, y) = (self.rows(c), self.rows(d));
         let mut block = [0.0; 9];
-        for &k in path {
-            add_product(&mut block, &x[k], &y[k]);
+        match [self.bodies[c], self.bodies[d]] {
+            [Some(a), Some(b)] => {
+                let shared = model.common_path(a, b);
+                return product(0.0, &x[..shared], &y[..shared]);
+            }
+            [None, None] => return product(0.0, x, y),
+            [Some(_), None] => self.for_each(model, c, |k, x| add_product(&mut block, x, &y[k])),
+            [None, Some(_)] => self.for_each(model, d, |k, y| add_product(&mut block, &x[k], y)),
         }
         block
     }
@@ -210,9 +253,14 @@ impl ContactSystem {
         }
     }
 
-    /// Begins with the rows as they are without loops.
-    pub(crate) fn begin_restriction(&mut self) {
-        self.restricted.clone_from(&self.Z);
+    /// Begins with the rows as they are without loops, over all velocities.
+    pub(crate) fn begin_restriction(&mut self, model: &Model) {
+        let mut restricted = std::mem::take(&mut self.restricted);
+        restricted.resize(self.n_contacts() * self.nv, [0.0; 3]);
+        for (c, rows) in restricted.chunks_exact_mut(self.nv).enumerate() {
+            self.for_each(model, c, |k, z| rows[k] = *z);
+        }
+        self.restricted = restricted;
     }
 
     /// The rows of a contact that loops restrict (nv).
@@ -228,8 +276,11 @@ impl ContactSystem {
         if !held.contains(&true) {
             return;
         }
-        let own = c * self.nv..(c + 1) * self.nv;
-        for z in (self.Z[own.clone()].iter_mut()).chain(&mut self.restricted[own]) {
+        let own = &mut self.Z[self.starts[c]..self.starts[c + 1]];
+        for z in own
+            .iter_mut()
+            .chain(&mut self.restricted[c * self.nv..][..self.nv])
+        {
             for k in 0..3 {
                 z[k] = if held[k] { 0.0 } else { z[k] };
             }
@@ -248,11 +299,8 @@ impl ContactSystem {
     /// `out = Zᵀ y` (3 n_c): local velocities of a velocity change `y` in factor coordinates.
     pub fn local(&self, model: &Model, y: &[f64], out: &mut [f64]) {
         for (c, values) in out.as_chunks_mut().0.iter_mut().enumerate() {
-            let rows = self.rows(c);
             *values = [0.0; 3];
-            for &k in along_path(model.mechanism(), &self.all, self.bodies[c]) {
-                add_scaled(values, &rows[k], y[k]);
-            }
+            self.for_each(model, c, |k, z| add_scaled(values, z, y[k]));
         }
     }
 
@@ -280,10 +328,7 @@ impl ContactSystem {
     /// `y += Z p`: velocity change, in factor coordinates, due to impulses `p`.
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
         for (c, p) in p.as_chunks().0.iter().enumerate() {
-            let rows = self.rows(c);
-            for &k in along_path(model.mechanism(), &self.all, self.bodies[c]) {
-                y[k] += along(&rows[k], p);
-            }
+            self.for_each(model, c, |k, z| y[k] += along(z, p));
         }
     }
 }

@@ -612,20 +612,20 @@ impl Loops<f64> {
     }
 
     /// Computes B, and projects the rows of contacts; those that the loops hold are then zero.
-    pub(crate) fn project_contacts(&mut self, system: &mut ContactSystem) {
+    pub(crate) fn project_contacts(&mut self, model: &Model, system: &mut ContactSystem) {
         let n = system.n_contacts();
         self.set_size(n);
-        system.begin_restriction();
+        system.begin_restriction(model);
         for c in 0..n {
+            let rows = system.restricted_mut(c);
             for row in 0..self.m() {
                 let mut b = [0.0; 3];
-                for (z, q) in system.rows(c).iter().zip(self.q(row)) {
+                for (z, q) in rows.iter().zip(self.q(row)) {
                     add_scaled(&mut b, z, *q);
                 }
                 *self.product_mut(row, c) = b;
             }
-            let free = squares(system.rows(c));
-            let rows = system.restricted_mut(c);
+            let free = squares(rows);
             self.project_rows(c, rows);
             let held = Self::holds(&free, &squares(rows), ROUNDED_SQUARE);
             self.hold(c, held);

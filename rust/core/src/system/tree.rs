@@ -135,7 +135,7 @@ impl<'a> TreeSystem<'a> {
         ];
         system.assemble(self.model, &tree.factor, &placed);
         if let Some(loops) = &mut tree.loops {
-            loops.project_contacts(system);
+            loops.project_contacts(self.model, system);
         }
         self.parts.note_friction(contacts);
     }

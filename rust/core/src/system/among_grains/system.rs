@@ -100,10 +100,7 @@ impl TreeAmongGrains<'_> {
         pairs.width = model.nv();
         pairs.n_coordinates = pairs.machine_at + pairs.width;
         for c in 0..pairs.machine.len() {
-            let rows = self.tree.parts.system.free_rows(c);
-            for k in 0..3 {
-                pairs.rows.extend(rows.iter().map(|z| z[k]));
-            }
+            (self.tree.parts.system).push_rows(model, c, &mut pairs.rows);
         }
         self.push_diagonal(pairs);
     }
