@@ -5,13 +5,13 @@
 //! between two bodies and where loops restrict them.
 
 use super::body_motion::Still;
-use super::jacobian::{for_each_row, relative_velocity};
+use super::jacobian::{for_each_row, relative_velocity, write_rows};
 use super::joint_friction;
 use super::limit;
 use super::pair::Contact;
 use super::part::Part;
 use super::rollers;
-use super::rows::{Triple, add_product, add_scaled, along, close_stop, product};
+use super::rows::{Path, Triple, add_product, add_scaled, along, close_stop, product, square};
 use crate::multibody::{Factor, Mechanism, Model, Poses};
 
 /// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.
@@ -111,28 +111,26 @@ impl ContactSystem {
         self.Z.resize(first + path.len(), [0.0; 3]);
         self.starts.push(self.Z.len());
         let rows = &mut self.Z[first..];
-        if let Some((_, sign, row)) = limit::joint_row(model, contact) {
-            rows[path.len() - 1][row] = sign;
-        } else if contact.other.is_none() {
-            let mut next = rows.iter_mut();
-            for_each_row(motion, contact, |_, row| {
-                if let Some(own) = next.next() {
-                    *own = row;
-                }
-            });
-        } else {
+        let u = if contact.other.is_some() {
             for_each_row(motion, contact, |k, row| {
                 add_scaled(&mut rows[k], &row, 1.0)
             });
-        }
-        let mut u = [0.0; 3];
-        for (row, &k) in rows.iter().zip(path) {
-            add_scaled(&mut u, row, motion.v[k]);
-        }
-        match contact.other {
-            None => factor.half_solve_path(mechanism, contact.body, rows),
-            Some(_) => factor.half_solve_columns(mechanism, 0..self.nv, rows),
-        }
+            let mut u = [0.0; 3];
+            for (row, v) in rows.iter().zip(motion.v) {
+                add_scaled(&mut u, row, *v);
+            }
+            factor.half_solve_columns(mechanism, 0..self.nv, rows);
+            u
+        } else {
+            let u = match limit::joint_row(model, contact) {
+                Some((_, sign, row)) => {
+                    Path::of(mechanism, contact.body).write_joint(row, sign, motion.v, rows)
+                }
+                None => write_rows(motion, contact, rows),
+            };
+            factor.half_solve_path(mechanism, contact.body, rows);
+            u
+        };
         self.u.extend(u);
         self.beyond.push([0.0; 3]);
         let close: fn(&mut [f64; 9]) = match contact.part {
@@ -141,7 +139,7 @@ impl ContactSystem {
             Part::Wheel(_) if rollers::has_a_row_of_its_own(model, contact) => rollers::close,
             Part::Wheel(_) | Part::Box(_) | Part::Sphere(_) | Part::Collider(_) => return,
         };
-        let own = self.block(model, c, c);
+        let own = self.own_block(c);
         let mut closed = own;
         close(&mut closed);
         self.beyond[c] = [0, 4, 8].map(|k| closed[k] - own[k]);
@@ -200,7 +198,7 @@ impl ContactSystem {
                     }
                 }
             }
-            let mut own = self.block(model, c, c);
+            let mut own = self.own_block(c);
             for k in 0..3 {
                 own[4 * k] += self.beyond[c][k];
             }
@@ -211,7 +209,16 @@ impl ContactSystem {
         self.W = W;
     }
 
-    /// The block of W for two contacts, without what is beyond the squares of Z.
+    /// The block of W for a contact with itself, without what is beyond the squares of Z.
+    fn own_block(&self, c: usize) -> [f64; 9] {
+        if self.restricted.is_empty() {
+            square(0.0, self.rows(c))
+        } else {
+            square(0.0, &self.restricted[c * self.nv..][..self.nv])
+        }
+    }
+
+    /// The block of W for two contacts.
     fn block(&self, model: &Model, c: usize, d: usize) -> [f64; 9] {
         if !self.restricted.is_empty() {
             let [x, y] = [c, d].map(|c| &self.restricted[c * self.nv..][..self.nv]);

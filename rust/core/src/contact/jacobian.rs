@@ -35,6 +35,17 @@ pub(crate) fn relative_velocity(motion: &impl BodyMotion, contact: &Contact) -> 
     velocity - motion.point_velocity(other.body, &x)
 }
 
+/// Rows of Hᵀ of a contact without another body, along the path of its own, and `Hᵀ v`.
+pub(super) fn write_rows(
+    motion: &Still<'_>,
+    contact: &Contact,
+    rows: &mut [Triple<f64>],
+) -> Triple<f64> {
+    let place = place_at(motion, contact, contact.body);
+    let path = Path::of(motion.mechanism, contact.body);
+    path.write(|m| motion.motion(m), &place, motion.v, rows)
+}
+
 /// Calls `act` with each velocity that moves a contact and its entries of the rows of Hᵀ. One that
 /// moves both bodies comes twice, with opposite entries.
 pub(crate) fn for_each_row(
