@@ -71,7 +71,7 @@ def test_joints_and_forces_of_every_kind_step_in_lanes(changes: dict[str, Any]) 
     bogie.update(changes)
     simulation = Simulation(RoverModel.from_dict(description))
     simulation.step(200)
-    simulation.set_wheel_torques(20.0)
+    simulation.set_wheel_torques([20.0] * 6)
     assert simulation.step(20).fallbacks == 0
 
 

@@ -117,8 +117,8 @@ fn a_rover_moves_as_it_would_alone() {
     }
 }
 
-/// Where firm hills rise out of the sand a step takes the usual effort, and is what all effort makes
-/// of the same state.
+/// Where firm hills rise out of the sand a step takes the usual effort, and is what all effort
+/// makes of the same state.
 #[test]
 fn firm_hills_beside_sand_are_met_with_the_usual_effort() {
     let model = wide("open-rover", 0.08, 1.0);

@@ -25,9 +25,9 @@
 //! Source: Gear et al. 1985, for constraints on both levels; Featherstone 2008, ch. 8, for loops
 //! closed on a tree.
 //!
-//! Written over the scalar: one rover, those of a block ([`super::slots`]), or dual numbers of one rover
-//! with a direction a lane. A row that some lanes leave
-//! out is zero there, so that no lane depends on its neighbours.
+//! Written over the scalar: one rover, those of a block, or dual numbers of one rover with a
+//! direction a lane. A row that some lanes leave out is zero there, so that no lane depends on its
+//! neighbours.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::ContactSystem;

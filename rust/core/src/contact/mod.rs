@@ -15,8 +15,8 @@
 //! Jacobian and the products with them, [`jacobian`] and [`delassus`] assemble the matrices, and
 //! [`loops`] restricts them to what the closed loops of a machine let move.
 //!
-//! These are the contacts of one machine, in a list. [`slots`] has those of machines in the lanes of
-//! a register, and asks this page for what is rare. `placed_wheel` is a wheel as sand meets it.
+//! These are the contacts of one machine, in a list. [`slots`] has those of machines in lanes, and
+//! asks this page for what is rare. `placed_wheel` is a wheel as sand meets it.
 //!
 //! # One call
 //!

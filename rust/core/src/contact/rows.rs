@@ -5,9 +5,8 @@
 //! Delassus operator is `W = Hᵀ M̂⁻¹ H = Zᵀ Z`. A block of W is a product over the velocities that
 //! two contacts share; no dense product is formed.
 //!
-//! Rows are stored by velocity: three numbers, along n, t and b. The general step keeps them of one
-//! contact after another ([`super::delassus`]), a block of rovers of one slot after another
-//! (`crate::contact::slots::rows`).
+//! Rows are stored by velocity: three numbers, along n, t and b. [`super::delassus`] keeps them of
+//! one contact after another, [`super::slots`] of one slot after another.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::multibody::Motion;

@@ -127,7 +127,7 @@ impl<C: UnilateralContact> List<C> {
 impl<S: MechanicalSystem> Listed<'_, S> {
     /// Finds which clusters the contacts join.
     fn find_groups(&mut self) {
-        let n = self.system.machine().n_clusters();
+        let n = self.machine().n_clusters();
         let list = &mut *self.list;
         list.leaders.clear();
         list.leaders.extend(0..n);

@@ -62,8 +62,8 @@ pub type LocalOf<S> = <<S as MechanicalSystem>::Contact as UnilateralContact>::L
 /// Configuration of a system.
 pub type ConfigurationOf<S> = <<S as MechanicalSystem>::Machine as Dynamics>::Configuration;
 
-/// Contacts with d components each (2 or 3, [`MechanicalSystem::DIMENSION`]): local vectors run contact
-/// by contact `normal, tangent, (tangent)`.
+/// A system with unilateral contacts, of d components each (2 or 3, [`Self::DIMENSION`]): local
+/// vectors run contact by contact `normal, tangent, (tangent)`.
 pub trait MechanicalSystem {
     /// What moves, with its forces.
     type Machine: Forces<T = f64, Configuration: PartialEq>;
@@ -210,8 +210,8 @@ pub trait MechanicalSystem {
         None
     }
 
-    /// Called before the iterations of a Newton variant: stores what [`Self::residual`] needs of the
-    /// start. By default nothing.
+    /// Called before the iterations of a Newton variant: stores what [`Self::residual`] needs of
+    /// the start. By default nothing.
     fn begin_residual(&mut self, _start: StartOf<'_, Self::Machine>) {}
 
     /// Residual of the balance of the step without contacts, see [`Forces::balance`], the default.

@@ -113,12 +113,11 @@ fn conclude<S: MechanicalSystem>(
     forget_bounces(s, d);
     d.reports[0] = report;
     find_mean(s, d);
-    s.system
-        .machine()
+    s.machine()
         .set_moved(&d.start, &d.v_mean, s.options.time_step, &mut d.end);
     close_end(s, d, true);
     let is_solved = d.reports[0].is_converged();
-    s.system.machine().normalise(&mut d.end);
+    s.machine().normalise(&mut d.end);
     find_impacts(s, d);
     weigh_contacts(s, d);
     let limits = Limits {
@@ -200,7 +199,7 @@ fn settle<S: MechanicalSystem>(
                 s.list.leaves_open = false;
                 continue;
             }
-            if revisions < MOST_REVISIONS && s.system.machine_mut().revise(true, &d.v, &d.v_end) {
+            if revisions < MOST_REVISIONS && s.machine_mut().revise(true, &d.v, &d.v_end) {
                 revisions += 1;
                 last_change = f64::INFINITY;
                 continue;
@@ -221,7 +220,7 @@ fn begin_iteration<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedDat
     d.obstacles[0] = None;
     d.shares.clear();
     d.is_gyroscopic.fill(false);
-    s.system.machine_mut().choose_branches(&d.v);
+    s.machine_mut().choose_branches(&d.v);
     s.system.begin_residual(Start {
         configuration: &d.start,
         v: &d.v,
@@ -237,7 +236,7 @@ fn drift<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>) -> f
         .turning(s.options, &d.v, &mut d.is_gyroscopic);
     d.is_gyroscopic.fill(false); // the balance is at the end of the step
     let turn = s.options.time_step * turning.unwrap_or(0.0);
-    if s.system.machine().conserves_momenta() && turn <= MOST_TURN {
+    if s.machine().conserves_momenta() && turn <= MOST_TURN {
         turn * turn * turn
     } else {
         0.0
@@ -256,14 +255,11 @@ fn iterate<S: MechanicalSystem>(
     let options = s.options;
     let (h, theta) = (options.time_step, options.theta);
     find_mean(s, d);
-    s.system
-        .machine()
+    s.machine()
         .set_moved(&d.start, &d.v_mean, theta * h, &mut d.middle);
-    s.system
-        .machine()
-        .set_moved(&d.start, &d.v_mean, h, &mut d.end);
-    s.system.machine_mut().place_middle(&d.middle);
-    s.system.machine_mut().place_end(&d.end);
+    s.machine().set_moved(&d.start, &d.v_mean, h, &mut d.end);
+    s.machine_mut().place_middle(&d.middle);
+    s.machine_mut().place_end(&d.end);
     probe.end(Phase::Kinematics);
     if iteration == 0 {
         // The set of contacts of a step is decided once, by the forecast.
@@ -275,9 +271,7 @@ fn iterate<S: MechanicalSystem>(
     }
     s.system.relocate(&mut s.list.contacts);
     probe.end(Phase::Detection);
-    s.system
-        .machine_mut()
-        .update_mass_matrix(options, true, true);
+    s.machine_mut().update_mass_matrix(options, true, true);
     probe.end(Phase::MassMatrix);
     let start = Start {
         configuration: &d.start,
@@ -286,7 +280,7 @@ fn iterate<S: MechanicalSystem>(
     let (v_end, v_mean) = (&d.v_end, &d.v_mean);
     (s.system).residual(options, start, v_end, v_mean, &mut d.foreseen, &mut d.y);
     probe.end(Phase::Bias);
-    if !s.system.machine_mut().factorise(options) {
+    if !s.machine_mut().factorise(options) {
         return false;
     }
     probe.end(Phase::Factor);
@@ -298,8 +292,7 @@ fn iterate<S: MechanicalSystem>(
     }
     correct_impulse(s, d, is_any);
     probe.end(Phase::Delassus);
-    s.system
-        .machine_mut()
+    s.machine_mut()
         .close_velocity(options, &d.v, &d.v_end, &mut d.y);
     s.system.local(&d.y, Local::flat_mut(&mut d.u));
     let u = Local::flat_mut(&mut d.u);
@@ -312,7 +305,7 @@ fn iterate<S: MechanicalSystem>(
     remove_shifts(s, d);
     s.add_impulses(true, &d.p, &mut d.y);
     s.add_moments(&mut d.y);
-    s.system.machine().half_solve_back(&mut d.y);
+    s.machine().half_solve_back(&mut d.y);
     for (v, change) in d.v_end.iter_mut().zip(&d.y) {
         *v += change;
     }

@@ -45,7 +45,7 @@ pub struct StepReport {
     /// Repeated steps: a motor changed its branch, the energy audit required it, or Newton's law of
     /// restitution had no solution.
     pub retaken: usize,
-    /// Steps of a machine that the general step took, since the fast one does not take them.
+    /// Steps that took more than the usual effort.
     pub fallbacks: usize,
     /// Largest energy gain in a step beyond the work of gravity and actuators, as a fraction of its
     /// kinetic energy.

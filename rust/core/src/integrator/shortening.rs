@@ -12,6 +12,7 @@ use super::forces::{Forces, Start};
 use super::listed::{Listed, ListedData, PosedOf};
 use super::local::Local;
 use super::mechanical_system::{LocalOf, MechanicalSystem};
+use super::systems::Systems;
 use super::work::Work;
 
 /// Fraction of the kinetic energy after a step that may be removed by scaling the velocity alone.
@@ -34,7 +35,7 @@ pub(super) fn judge_at_last<S: MechanicalSystem>(
     problems: &PosedOf<S>,
     limits: Limits,
 ) -> bool {
-    if !s.system.machine().is_audited() {
+    if !s.machine().is_audited() {
         find_work(s, d);
         return true;
     }
@@ -119,9 +120,9 @@ fn shorten_both<S: MechanicalSystem>(
     let way = s.options.theta * s.options.time_step;
     d.y.copy_from_slice(&d.v_end);
     let mut end = d.middle.clone();
-    s.system.machine().set_moved(&d.middle, &d.y, way, &mut end);
-    s.system.machine().normalise(&mut end);
-    s.system.machine().take(
+    s.machine().set_moved(&d.middle, &d.y, way, &mut end);
+    s.machine().normalise(&mut end);
+    s.machine().take(
         |cluster| shares[s.list.leader_of(cluster)] < 1.0,
         &end,
         &mut d.end,
@@ -134,7 +135,8 @@ fn shorten_both<S: MechanicalSystem>(
 /// The largest fraction σ of the displacement that the energy allows is kept; σ = 0 is always
 /// allowed. The work and what contacts that yield give off are those over it.
 fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, leader: usize) {
-    let (h, theta) = (s.options.time_step, s.options.theta);
+    let options = s.options;
+    let (h, theta) = (options.time_step, options.theta);
     let clusters = 0..d.n_clusters();
     let is_own: Vec<bool> = clusters
         .map(|own| s.list.leader_of(own) == leader)
@@ -146,9 +148,7 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
     }
     let mut works = vec![Work::default(); is_own.len()];
     let start = Start::at(&d.start, &d.v[..]);
-    s.system
-        .machine_mut()
-        .work(s.options, start, &d.v_end, &mut works);
+    s.machine_mut().work(options, start, &d.v_end, &mut works);
     let own = works
         .into_iter()
         .zip(&is_own)
@@ -162,9 +162,8 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
     let (q_kept, v_kept) = (d.end.clone(), d.v_end.clone());
     for k in 0..MOST_SHORTENINGS {
         let mut after = 0.0;
-        s.system
-            .machine_mut()
-            .energies(s.options, &d.end, &d.v_end, |cluster, energy, _| {
+        s.machine_mut()
+            .energies(options, &d.end, &d.v_end, |cluster, energy, _| {
                 if is_own[cluster] {
                     after += energy[0] + energy[1];
                 }
@@ -182,13 +181,11 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
         } else {
             0.0
         };
-        s.system
-            .machine()
+        s.machine()
             .set_moved(&d.start, &d.v_mean, share * h, &mut d.end);
         close_end(s, d, true);
-        s.system.machine().normalise(&mut d.end);
-        s.system
-            .machine()
+        s.machine().normalise(&mut d.end);
+        s.machine()
             .take(|cluster| !is_own[cluster], &q_kept, &mut d.end);
         for (v, (kept, cluster)) in d.v_end.iter_mut().zip(v_kept.iter().zip(&d.cluster_of)) {
             if !is_own[*cluster] {
@@ -207,7 +204,7 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
     }
     let [start, end] = &mut d.energies.stored;
     end.fill(0.0);
-    s.system.machine().stored(&d.end, end);
+    s.machine().stored(&d.end, end);
     let stored = (start.iter().zip(&*end).zip(&is_own)).filter(|(_, is_own)| **is_own);
     let balance = &mut d.balances[leader];
     balance.stored = stored.map(|((start, end), _)| end - start).sum();

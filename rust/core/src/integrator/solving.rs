@@ -8,6 +8,7 @@ use super::mechanical_system::{LocalOf, MechanicalSystem};
 use super::options::StepOptions;
 use super::projection::FARTHEST;
 use super::report::StepReport;
+use super::systems::Systems;
 use crate::law::compliance::Yielding;
 use crate::problem::{FrictionContactProblem, Operator};
 use crate::solver::{SolveReport, SolveStatus, SolverOptions, solve};
@@ -240,7 +241,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         let size = gaps.map(|gap| gap * gap).sum::<f64>().sqrt();
         let clusters = 0..self.list.n_clusters();
         let clusters = clusters.filter(|own| self.list.leader_of(*own) == leader);
-        let tolerated = clusters.map(|own| self.system.machine().tolerated(self.options, own));
+        let tolerated = clusters.map(|own| self.machine().tolerated(self.options, own));
         let tolerated = tolerated.fold(f64::INFINITY, f64::min);
         own.max((EXACT * tolerated / size).min(EXACT))
     }
@@ -295,7 +296,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
     fn size(&self, d: &mut ListedData<S>, problems: &PosedOf<S>, leader: usize) -> f64 {
         d.y.fill(0.0);
         self.system.add_impulses(Local::flat(&problems.p), &mut d.y);
-        self.system.machine().half_solve_back(&mut d.y);
+        self.machine().half_solve_back(&mut d.y);
         let mut most = 0.0_f64;
         for (i, (u, q)) in problems.u.iter().zip(&problems.q).enumerate() {
             if self.list.home_of(i) == leader {
@@ -307,7 +308,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         }
         let clusters = 0..self.list.n_clusters();
         let own = clusters.filter(|own| self.list.leader_of(*own) == leader);
-        own.map(|own| self.system.machine().displacement(&d.y, own))
+        own.map(|own| self.machine().displacement(&d.y, own))
             .fold(most, f64::max)
     }
 }

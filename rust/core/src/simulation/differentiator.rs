@@ -180,8 +180,8 @@ impl Differentiator {
 
     /// Takes a real step from a state with the command of the copy, and returns the state after it.
     ///
-    /// The contact problem may have several solutions. The fast step finds that of a simulation,
-    /// and the general step, which leaves its matrices, begins with it.
+    /// The contact problem may have several solutions. A step with the usual effort finds that of a
+    /// simulation, and one with all effort, which leaves its matrices, begins with it.
     fn step(&mut self, state: &[f64]) -> Result<Vec<f64>, LinearisationError> {
         if self.sim.memory.sand.is_some() {
             return self.step_in_sand(state);

@@ -176,11 +176,11 @@ impl<S: Scene> Snapshot<S> {
 /// What came of a step with the usual effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Usual {
-    /// There is no such step.
+    /// The scene has no such steps.
     None,
-    /// It takes more effort; nothing has changed.
+    /// The step takes more effort; nothing has changed.
     Refused,
-    /// It was taken.
+    /// The step was taken.
     Taken(StepReport),
 }
 

@@ -184,7 +184,7 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Adds the impulses and work of the part of a step that was tried last, in the lanes of a mask.
+    /// Adds the impulses and work of the part of a step that was tried last, in some lanes.
     pub fn accept_part(&mut self, lanes: T::Mask) {
         let done = self.done.iter_mut().flatten();
         for (done, tried) in done.zip(self.tried.as_flattened()) {

@@ -88,8 +88,8 @@ pub struct SolverOptions {
     /// Rounding of the free velocity q, m/s; default 0. Bodies that move together have a q that is
     /// the difference of larger velocities, known to the rounding of these.
     ///
-    /// Where a stage of [`Method::Auto`] misses the tolerances, an answer whose violation is at most
-    /// this at any contact counts as converged.
+    /// Where a stage of [`Method::Auto`] misses the tolerances, an answer whose violation is at
+    /// most this at any contact counts as converged.
     pub rounding: f64,
     /// Most Newton steps of a stage, counting every linear solve; default 500.
     pub max_newton_steps: usize,

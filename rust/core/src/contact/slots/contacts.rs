@@ -99,7 +99,7 @@ struct Heights<T> {
 
 /// The contacts of a rover's problem in the order of detection.
 #[derive(Clone, Copy, Debug)]
-pub struct Listed {
+pub struct ContactList {
     /// Their number, at most [`MAX_CONTACTS`].
     pub n: usize,
     /// Slot of each.
@@ -140,7 +140,7 @@ pub struct Contacts<T: Lane> {
     /// Lanes in which clusters touch each other.
     joined: u32,
     /// Contacts of each problem, at `cluster * T::LANES + lane`.
-    lists: Vec<Listed>,
+    lists: Vec<ContactList>,
     /// Whether every slot in use is active in all lanes.
     is_full: bool,
     /// Problem of each slot's contact in each lane, and the contact's place in that problem.
@@ -266,7 +266,7 @@ impl<T: Lane> Contacts<T> {
                 .collect(),
             factored: 0,
             joined: 0,
-            lists: vec![Listed::NONE; machine.n_problems() * T::LANES],
+            lists: vec![ContactList::NONE; machine.n_problems() * T::LANES],
             is_full: false,
             homes: vec![[0; MAX_LANES]; n_slots],
             places: vec![[0; MAX_LANES]; n_slots],
@@ -448,7 +448,7 @@ impl<T: Lane> Contacts<T> {
     /// The contacts of a problem.
     #[inline(always)]
     #[must_use]
-    pub fn list(&self, problem: usize) -> &Listed {
+    pub fn list(&self, problem: usize) -> &ContactList {
         &self.lists[problem]
     }
 
@@ -1149,7 +1149,7 @@ const NO_KEY: ContactKey = ContactKey {
     opposite: Opposite::Stop,
 };
 
-impl Listed {
+impl ContactList {
     const NONE: Self = Self {
         n: 0,
         slots: [0; MAX_CONTACTS],

@@ -1,4 +1,4 @@
-//! Contacts that are found lane by lane, as the general step finds them ([`crate::contact`]): those
+//! Contacts that are found lane by lane, as those of one machine ([`crate::contact`]): those
 //! of boxes and balls, of bodies with each other, and of wheels that touch more than a plane or a
 //! few spheres. They take free slots whose path of velocities begins with their body's.
 

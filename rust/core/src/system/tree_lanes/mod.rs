@@ -62,8 +62,8 @@ pub struct TreeLanes<T: Lane> {
     pub factor: Factor<T>,
     bias_scratch: BiasScratch<T>,
     implicit: Option<Box<Implicit<T>>>,
-    /// Whether a tree may need implicit gyroscopic terms in the present step: M̂ is then kept beside
-    /// its factor.
+    /// Whether a tree may need implicit gyroscopic terms in the present step: M̂ is then kept
+    /// beside its factor.
     turns: bool,
     /// Whether steps are taken with all effort, which may ask for implicit terms at any time.
     pub is_thorough: bool,

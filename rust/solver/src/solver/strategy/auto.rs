@@ -24,9 +24,8 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
 /// Newton steps of a short attempt with the proximal point method.
 const ATTEMPT: usize = 100;
 
-/// Attempts to pivot at random after the first attempt with the proximal point method, and after
-/// each other.
-const FEW_AT_RANDOM: usize = 3;
+/// Attempts to pivot at random after an attempt with the proximal point method. After the first one
+/// there are none: they may find another answer than that which the next attempts are nearer to.
 const AT_RANDOM: usize = 6;
 
 /// Residual below which few contacts get a second proximal point run, from the best answer, and
@@ -287,7 +286,7 @@ fn pivot_from_attempt<const D: usize>(
     }
     scratch.start.copy_from_slice(p);
     let found = pivot_from_start::<D>(data, ladder, p, u, scratch, iterations);
-    if found.is_some() || scratch.work.is_exhausted {
+    if found.is_some() || scratch.work.is_exhausted || at_random == 0 {
         return found;
     }
     let options = ladder.options;
@@ -315,7 +314,7 @@ fn descend_many<const D: usize>(
         ..*options
     };
     let attempts = [
-        (false, &brief, FEW_AT_RANDOM),
+        (false, &brief, 0),
         (true, &brief, AT_RANDOM),
         (false, options, AT_RANDOM),
     ];
