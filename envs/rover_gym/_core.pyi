@@ -696,8 +696,8 @@ class SoftGround(Terrain):
     """Sand, into which wheels sink. All other parts of a machine touch its surface as rigid ground.
 
     The ruts belong to a simulation and are part of its snapshots. For rocks on sand, use a `Union`
-    of both. Beside firm ground other than spheres a simulation always uses the general step, see
-    `Simulation.fallback_reason`.
+    of both. Beside firm ground other than spheres, contacts are found one rover at a time, which is
+    slower in a batch.
 
     Args:
         surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
@@ -1082,10 +1082,11 @@ class StepReport:
         """
     @property
     def fallbacks(self) -> int:
-        """Number of steps that used the general step instead of the fast one.
+        """Number of steps that took more than the usual effort.
 
-        Always 0 for planar machines and grains, which have no fast step.
-        `Simulation.fallback_reason` tells whether a simulation has fast steps.
+        Such a step is taken alone, with every means of solving its contacts, and in halves where
+        that fails. Always 0 for planar machines, for grains and for the variant "newton", whose
+        steps all are.
         """
     @property
     def energy_gain(self) -> float:
@@ -1594,14 +1595,8 @@ class Simulation(AnySimulation):
     def lanes(self) -> Literal[1, 4, 8]:
         """Number of rovers that a batch steps together in one SIMD register of this computer.
 
-        Either 8, 4 or 1. Always 1 if the simulation uses the general step: see `fallback_reason`.
-        """
-    @property
-    def fallback_reason(self) -> str | None:
-        """Reason why this simulation always uses the general step; None if it uses the fast one.
-
-        The fast step handles several rovers per SIMD register. Single steps may still need the
-        general step; `StepReport.fallbacks` counts them.
+        Either 8, 4 or 1; always 1 for the variant "newton". A step that takes more than the usual
+        effort is taken alone: `StepReport.fallbacks` counts them.
         """
     @property
     def q(self) -> _Array:

@@ -35,7 +35,8 @@ def test_the_law_holds_and_velocities_are_the_known_ones(name: str) -> None:
     # The independent measure weighs contacts a little differently.
     assert relative <= 2.0 * BOUNDS["aim"]
     assert violation <= 2.0 * BOUNDS["aim"]
-    if velocities is not None:
+    # Coulomb's law has several answers there: two that obey it to 2e-12 differ by 2 mm/s.
+    if velocities is not None and name not in BOUNDS["several_answers"]:
         np.testing.assert_allclose(problem.W @ impulses + problem.q, velocities, rtol=0.0, atol=VELOCITY)
 
 

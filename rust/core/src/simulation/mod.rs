@@ -5,9 +5,9 @@
 //! - [`state`], [`active_contact`]: its state, its contacts; [`any_snapshot`]: what files keep,
 //!   [`sealed`] with a checksum;
 //! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
-//!   [controls](rover_controls), its [contacts](rover_contacts), its own block of lanes (`own_block`, `rover_lanes`), its
-//!   [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a step by a [`differentiator`],
-//!   with `steps_in_sand` whose forces are exact;
+//!   [controls](rover_controls), its [contacts](rover_contacts), its block (`own_block`,
+//!   `rover_lanes`), its [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a
+//!   step by a [`differentiator`], with `steps_in_sand` whose forces are exact;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;

@@ -24,8 +24,9 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
 /// Newton steps of a short attempt with the proximal point method.
 const ATTEMPT: usize = 100;
 
-/// Attempts to pivot at random after an attempt with the proximal point method. After the first one
-/// there are none: they may find another answer than that which the next attempts are nearer to.
+/// Attempts to pivot at random after the first attempt with the proximal point method, and after
+/// each other.
+const FEW_AT_RANDOM: usize = 3;
 const AT_RANDOM: usize = 6;
 
 /// Residual below which few contacts get a second proximal point run, from the best answer, and
@@ -286,7 +287,7 @@ fn pivot_from_attempt<const D: usize>(
     }
     scratch.start.copy_from_slice(p);
     let found = pivot_from_start::<D>(data, ladder, p, u, scratch, iterations);
-    if found.is_some() || scratch.work.is_exhausted || at_random == 0 {
+    if found.is_some() || scratch.work.is_exhausted {
         return found;
     }
     let options = ladder.options;
@@ -314,7 +315,7 @@ fn descend_many<const D: usize>(
         ..*options
     };
     let attempts = [
-        (false, &brief, 0),
+        (false, &brief, FEW_AT_RANDOM),
         (true, &brief, AT_RANDOM),
         (false, options, AT_RANDOM),
     ];
