@@ -2,8 +2,8 @@
 //!
 //! If the spin or the energy audit ([`super::audit`]) requires it, the gyroscopic terms are
 //! implicit: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)`, where Δv includes the impulses of persistent
-//! contact. C is frozen at the mean velocity v_m of explicit terms. The scheme is of second order and
-//! stable at any spin and any step.
+//! contact. C is frozen at the mean velocity v_m of explicit terms. The scheme is of second order
+//! and stable at any spin and any step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::data::DataOf;

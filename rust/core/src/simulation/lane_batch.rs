@@ -1,9 +1,9 @@
 //! Rovers that one thread steps together, several to a register.
 //!
 //! Rovers of one machine with alike options fill the lanes of blocks ([`crate::system::block`]).
-//! The contact problems of all blocks wait in one queue; a block goes on to its next step as soon as
-//! its own are solved, whatever the others do. A lane whose step takes more than the usual effort is
-//! taken alone, and comes back. Every rover moves as it would alone, to the last bit.
+//! The contact problems of all blocks wait in one queue; a block goes on to its next step as soon
+//! as its own are solved, whatever the others do. A lane whose step takes more than the usual
+//! effort is taken alone, and comes back. Every rover moves as it would alone, to the last bit.
 
 use std::sync::Arc;
 
