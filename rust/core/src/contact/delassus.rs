@@ -113,7 +113,7 @@ impl ContactSystem {
         let rows = &mut self.Z[first..];
         let u = if contact.other.is_some() {
             for_each_row(motion, contact, |k, row| {
-                add_scaled(&mut rows[k], &row, 1.0)
+                add_scaled(&mut rows[k], &row, 1.0);
             });
             let mut u = [0.0; 3];
             for (row, v) in rows.iter().zip(motion.v) {
