@@ -13,7 +13,7 @@ use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
 /// Updates point, frame and gap of a contact to the poses of `kinematics`. For a joint's stop use
-/// [`super::relocate_limit`]; one with a grain stays as it is.
+/// `super::limit`; one with a grain stays as it is.
 pub fn relocate(
     model: &Model,
     kinematics: &Kinematics,

@@ -1,7 +1,7 @@
 //! A multibody tree on a terrain as a mechanical system: a rover whose step is taken with all
 //! effort, or among grains.
 //!
-//! What moves is [`super::tree_lanes`], in the only lane of `f64`; its contacts are a list.
+//! What moves is `super::tree_lanes`, in the only lane of `f64`; its contacts are a list.
 
 use std::sync::Arc;
 
