@@ -12,8 +12,8 @@ use crate::geometry::query::{dispatch, pairs};
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
-/// Updates point, frame and gap of a contact to the poses of `kinematics`. For a joint's stop use
-/// `super::limit`; one with a grain stays as it is.
+/// Updates point, frame and gap of a contact to the poses of `kinematics`. A joint's stop and a
+/// contact with a grain stay as they are.
 pub fn relocate(
     model: &Model,
     kinematics: &Kinematics,
