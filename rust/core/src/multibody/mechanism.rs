@@ -54,7 +54,6 @@ pub struct Mechanism {
     /// Body of each velocity, and the number of entries of the body's path up to and including the
     /// velocity.
     pub(super) up_to: Vec<(usize, usize)>,
-    pub(super) longest_path: usize,
     /// Whether a base or a loop passes the momentum of each cluster on to the world. A cluster is a
     /// set of trees that closed loops tie together.
     pub(super) clusters: Vec<bool>,
@@ -300,12 +299,6 @@ impl Mechanism {
     pub(crate) fn velocity_path(&self, k: usize) -> &[usize] {
         let (b, length) = self.up_to[k];
         &self.path(b)[..length]
-    }
-
-    /// Length of the longest path; at least 1.
-    #[inline]
-    pub(super) fn longest_path(&self) -> usize {
-        self.longest_path
     }
 
     /// First velocity of the free root of body `b`'s tree.

@@ -38,7 +38,6 @@ pub(super) fn mechanism_of(
         n_poses,
         n_rotations,
         n_motions: paths.n_motions,
-        longest_path: (paths.of.iter().map(|path| path.velocities.len())).fold(1, usize::max),
         ..Mechanism::default()
     };
     let mut pose = 0;

@@ -312,13 +312,6 @@ impl Model {
         self.mechanism.path(b)
     }
 
-    /// Length of the longest path: the stride of all arrays stored along paths.
-    #[inline]
-    #[must_use]
-    pub fn path_stride(&self) -> usize {
-        self.mechanism.longest_path()
-    }
-
     /// Number of leading path entries that two bodies share.
     #[inline]
     #[must_use]
