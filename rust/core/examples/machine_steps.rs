@@ -3,8 +3,8 @@
 //! machine and `general`, `alone` or `batch` it takes only such steps, for counting instructions:
 //! `valgrind --tool=callgrind --toggle-collect='*counted*'`.
 //!
-//! Steps of 5 ms on a plane, or for a name that ends in `-hills` on a rough map, with torques that
-//! change every ten steps.
+//! Steps of 5 ms on a plane, for a name that ends in `-hills` on a rough map, and for `flying` and
+//! `turning` high above the plane, with torques that change every ten steps.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
 
@@ -40,11 +40,17 @@ const EFFORT: f64 = 0.2;
 const APART: f64 = 3.0;
 const PUSHED: f64 = 2.0;
 
+/// Height of a rover in free flight, m, and how fast "turning" turns, rad/s.
+const HEIGHT: f64 = 500.0;
+const SPIN: [f64; 3] = [22.5, -17.5, 20.0];
+
 /// Cells of the rough map, m.
 const CELL: f64 = 0.25;
 
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 16] = [
     "rover",
+    "flying",
+    "turning",
     "mecanum",
     "dry",
     "open-rover",
@@ -83,7 +89,7 @@ fn hitch() -> LoopDescription {
 fn description(name: &str) -> ModelDescription {
     let open = || ModelDescription::named("open-rover").unwrap();
     match name.trim_end_matches("-hills") {
-        "rover" => ModelDescription::rover(),
+        "rover" | "flying" | "turning" => ModelDescription::rover(),
         "two" | "push" => joined(2, Vec::new()),
         "three" => joined(3, Vec::new()),
         "tow" => joined(2, vec![hitch()]),
@@ -171,10 +177,17 @@ fn start(name: &str) -> RoverSimulation {
             q[machine.velocities.start + 1] += 0.1;
         }
     }
+    let mut v = vec![0.0; model.nv()];
+    if let "flying" | "turning" = name {
+        q[1] += HEIGHT;
+    }
+    if name == "turning" {
+        v[3..6].copy_from_slice(&SPIN);
+    }
     let q = coordinates::from_public(&model, &q).unwrap();
     let options = StepOptions::default();
     let mut sim = RoverSimulation::new(Arc::clone(&model), ground, options).unwrap();
-    sim.set_state(q, vec![0.0; model.nv()]);
+    sim.set_state(q, v);
     sim.step(STEPS_AT_REST).unwrap();
     sim
 }

@@ -2,7 +2,6 @@
 //! differences of the poses.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use rover_core::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
 use rover_core::multibody::{Configuration, Factor, Kinematics, MassMatrix, Model};
 use rover_core::scalar::Single;
 
@@ -100,19 +99,14 @@ fn the_factor_solves_what_the_mass_matrix_multiplies() {
     }
 }
 
-/// `C v` equals the bias, and `C + Cᵀ` the rate of the mass matrix.
+/// `C v` and the bias of gravity add up to the bias, and `C + Cᵀ` is the rate of the mass matrix.
 #[test]
 fn the_coriolis_matrix_has_both_of_its_properties() {
     for root in ROOTS {
         let model = menagerie(root);
-        let nv = model.nv();
         let (q, v) = somewhere(&model, 1.9);
         let kinematics = Kinematics::of(&model, &q);
-        let mut C = DMatrix::zeros(nv, nv);
-        let mut scratch = CoriolisScratch::new(Single::best());
-        let (mechanism, inertias) = (model.mechanism(), model.inertias());
-        let (poses, out) = (kinematics.poses(), C.as_mut_slice());
-        coriolis_matrix(mechanism, inertias, poses, &v, &mut scratch, out);
+        let (C, weight) = kinematics.coriolis(&model, &v, &GRAVITY);
         let rate = (mass_matrix(&model, &moved(&model, &q, &v, H))
             - mass_matrix(&model, &moved(&model, &q, &v, -H)))
             / (2.0 * H);
@@ -121,12 +115,17 @@ fn the_coriolis_matrix_has_both_of_its_properties() {
             "{root:?} {}",
             (&C + C.transpose() - &rate).norm() / rate.norm()
         );
-        let expected = DVector::from_vec(kinematics.bias(&model, &v, &Vector3::zeros()));
         let product = &C * DVector::from_column_slice(&v);
-        assert!(
-            (&product - &expected).norm() < 1e-12 * expected.norm(),
-            "{root:?} {product} {expected}"
-        );
+        for (gravity, sum) in [
+            (Vector3::zeros(), product.clone()),
+            (GRAVITY, product + DVector::from_vec(weight)),
+        ] {
+            let expected = DVector::from_vec(kinematics.bias(&model, &v, &gravity));
+            assert!(
+                (&sum - &expected).norm() < 1e-12 * expected.norm(),
+                "{root:?} {sum} {expected}"
+            );
+        }
     }
 }
 

@@ -13,7 +13,8 @@ use crate::geometry::query::{
     SurfacePoint, box_sphere, disc_triangle, dispatch, is_lowest, roller_sphere, sphere_sphere,
 };
 use crate::geometry::{
-    Coverage, Disc, Neighbourhood, PlacedShape, Primitive, Roller, Sphere, SupportMap, Terrain,
+    Coverage, Disc, Neighbourhood, PlacedShape, Primitive, Roller, Roundness, Sphere, SupportMap,
+    Terrain,
 };
 use crate::multibody::{Kinematics, Model};
 
@@ -105,18 +106,17 @@ pub fn deepest_overlap(model: &Model, kinematics: &Kinematics, terrain: &dyn Ter
 ///
 /// A forecast follows material points, but only motion of the shape brings it to the ground: a
 /// wheel that spins about its axle stays where it is, and a ball however it turns.
-pub(super) fn fastest_way<S: BodyMotion>(shape: &PlacedShape<'_>, body: usize, motion: &S) -> f64 {
+pub(crate) fn fastest_way<S: BodyMotion>(shape: &PlacedShape<'_>, body: usize, motion: &S) -> f64 {
     let centre = shape.centre();
     let velocity = motion.point_velocity(body, &centre);
     let beside = |arm: Vector3<f64>| {
         (motion.point_velocity(body, &(centre + arm)) - velocity).norm_squared()
     };
-    let square = match shape {
-        PlacedShape::Disc(disc) => beside(disc.axle),
-        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => beside(roller.core.axle),
-        PlacedShape::Sphere(_) => 0.0,
+    let square = match shape.roundness() {
+        Roundness::Ball => 0.0,
+        Roundness::About(axle) => beside(axle),
         // Of ω × e along three axes.
-        PlacedShape::Box(_) | PlacedShape::Ellipsoid(_) | PlacedShape::Hull(_) => {
+        Roundness::None => {
             let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
             0.5 * axes.into_iter().map(beside).sum::<f64>()
         }
@@ -243,14 +243,12 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
     let (half_way, motion) = if gate.can_be_passed {
         let (R_end, r_end) = end.pose(body);
         let half_way = end.origin(body) - base + (r_end + R_end * part.centre(model)) - centre;
-        let turning = match &placed.shape {
-            // Wheels and balls are treated as round; the sweep of others includes their rotation.
-            PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => 0.0,
-            PlacedShape::Cylinder(own) => {
-                let axle = &own.core.axle;
-                (R_end * R.tr_mul(axle) - axle).norm() * bound
-            }
-            _ => (R_end - R).norm() * bound,
+        let turning = match placed.shape.roundness() {
+            // Wheels are treated as balls; the sweep of others includes their rotation.
+            Roundness::Ball => 0.0,
+            Roundness::About(_) if placed.shape.wheel().is_some() => 0.0,
+            Roundness::About(axle) => (R_end * R.tr_mul(&axle) - axle).norm() * bound,
+            Roundness::None => (R_end - R).norm() * bound,
         };
         (half_way, half_way.norm() + turning)
     } else {
@@ -275,7 +273,10 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
         }
         Primitive::Sphere(sphere) => {
             let between = sphere.centre - base - centre;
-            if is_far(&placed.shape, &between, sphere.radius + gate.reach + motion) {
+            if placed
+                .shape
+                .is_beyond(&between, sphere.radius + gate.reach + motion)
+            {
                 return;
             }
             let near = dispatch::point_on_sphere(&placed.shape, sphere, base);
@@ -391,29 +392,6 @@ fn on_surface(point: &SurfacePoint) -> SurfacePoint {
     SurfacePoint {
         feature: point.feature | ON_SURFACE,
         ..*point
-    }
-}
-
-/// Whether a sphere's centre, relative to a shape's centre, is further than `within` from the
-/// shape, by an inexpensive bound.
-#[inline]
-fn is_far(shape: &PlacedShape<'_>, between: &Vector3<f64>, within: f64) -> bool {
-    match shape {
-        PlacedShape::Disc(disc) => disc.axle.dot(between).abs() > within,
-        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
-            let beside = roller.core.axle.dot(between).abs();
-            beside > within + roller.half + roller.rounding
-        }
-        PlacedShape::Box(solid) => {
-            let local = solid.R.tr_mul(between);
-            let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
-            outside.norm_squared() > within * within
-        }
-        PlacedShape::Sphere(_) => false,
-        PlacedShape::Ellipsoid(_) | PlacedShape::Hull(_) => {
-            let reach = within + shape.bound();
-            between.norm_squared() > reach * reach
-        }
     }
 }
 

@@ -62,22 +62,17 @@ impl ContactFrame {
     #[inline]
     #[must_use]
     pub fn on_ground(shape: &PlacedShape<'_>, point: &SurfacePoint) -> Self {
-        match shape {
-            PlacedShape::Disc(disc) => Self::of_wheel(&point.n, &disc.axle, &point.rolling),
-            PlacedShape::Roller(roller) => {
-                Self::of_wheel(&point.n, &roller.core.axle, &point.rolling)
-            }
-            _ => Self::of_normal(&point.n),
+        match shape.wheel() {
+            Some(disc) => Self::of_wheel(&point.n, &disc.axle, &point.rolling),
+            None => Self::of_normal(&point.n),
         }
     }
 
     /// Frame of a shape, the second of its pair, in contact with another.
     #[must_use]
     pub fn of_pair(shape: &PlacedShape<'_>, point: &PairPoint) -> Self {
-        let disc = match shape {
-            PlacedShape::Disc(disc) => disc,
-            PlacedShape::Roller(roller) => &roller.core,
-            _ => return Self::of_normal(&point.n),
+        let Some(disc) = shape.wheel() else {
+            return Self::of_normal(&point.n);
         };
         // A disc in contact on its face rolls along its rim.
         let along_rim = disc.axle.cross(&(point.point - disc.centre));

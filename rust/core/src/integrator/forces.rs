@@ -37,9 +37,16 @@ pub type StartOf<'a, S> = Start<'a, <S as Dynamics>::Configuration, <S as Dynami
 
 /// The impulse of the forces over a step, their branches and their work.
 pub trait Forces: Dynamics {
-    /// Finds at the beginning of [`Self::load`] what does not depend on the mean velocity. By
-    /// default nothing.
-    fn begin_load(&mut self, _options: &StepOptions, _start: StartOf<'_, Self>) {}
+    /// [`Self::load`] at the velocity before the step, from which the mean velocity follows; the
+    /// first of the loads in a step and in each repetition of it.
+    fn begin_load(
+        &mut self,
+        options: &StepOptions,
+        start: StartOf<'_, Self>,
+        impulse: &mut [Self::T],
+    ) {
+        self.load(options, start, start.v, impulse);
+    }
 
     /// `impulse = h F(q_m, v_mean)` (nv), N s and N m s: the impulse of all forces except contact
     /// forces over the step.
@@ -56,9 +63,6 @@ pub trait Forces: Dynamics {
     /// Adds to the impulse of [`Self::load`] (nv) what does not act on the mean velocity. By
     /// default nothing.
     fn add_given(&self, _options: &StepOptions, _impulse: &mut [Self::T]) {}
-
-    /// Begins [`Self::load_gyroscopic`]; `scratch` (nv) is overwritten. By default nothing.
-    fn begin_gyroscopic(&mut self, _options: &StepOptions, _scratch: &mut [Self::T]) {}
 
     /// [`Self::load`] with implicit gyroscopic terms.
     ///

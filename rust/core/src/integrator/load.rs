@@ -9,7 +9,7 @@
 use super::data::DataOf;
 use super::dynamics::Dynamics;
 use super::forces::{Forces, Start};
-use super::systems::{MaskOf, Systems};
+use super::systems::Systems;
 use super::yielding::add_shifts;
 use crate::scalar::{Lane, LaneMask};
 
@@ -19,20 +19,21 @@ use crate::scalar::{Lane, LaneMask};
 pub(super) fn load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     let persists = d.any(&d.persists);
     let is_any = (persists & d.going).any();
-    S::run(
-        d.token,
-        #[inline(always)]
-        || push_and_drive(s, d, is_any, persists),
-    );
+    if is_any {
+        S::run(
+            d.token,
+            #[inline(always)]
+            || s.generalized_impulse(persists, &d.p_last, &mut d.pushed),
+        );
+    }
     let start = Start::at(&d.start, &d.v[..]);
-    (s.machine_mut()).load(&d.options, start, &d.v, &mut d.y);
+    (s.machine_mut()).begin_load(&d.options, start, &mut d.y);
     S::run(
         d.token,
         #[inline(always)]
         || find_mean(s, d, is_any),
     );
     if d.is_any_implicit() {
-        s.machine_mut().begin_gyroscopic(&d.options, &mut d.y);
         let start = Start::at(&d.start, &d.v[..]);
         let (v_mean, foreseen) = (&d.v_mean, &d.foreseen);
         (s.machine_mut()).load_gyroscopic(&d.options, start, v_mean, foreseen, &mut d.y);
@@ -60,15 +61,6 @@ fn correct<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
         #[inline(always)]
         || correct_impulse(s, d, is_any),
     );
-}
-
-#[inline(always)]
-fn push_and_drive<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool, persists: MaskOf<S>) {
-    if is_any {
-        s.generalized_impulse(persists, &d.p_last, &mut d.pushed);
-    }
-    let start = Start::at(&d.start, &d.v[..]);
-    s.machine_mut().begin_load(&d.options, start);
 }
 
 /// The mean velocity that follows from the forces at v and the impulses that persist. With implicit

@@ -163,14 +163,6 @@ impl<T: Lane> Momentum<T> {
         }
     }
 
-    #[inline(always)]
-    pub(super) fn plus(&self, other: &Self) -> Self {
-        Self {
-            linear: self.linear + other.linear,
-            angular: self.angular + other.angular,
-        }
-    }
-
     /// Products of the momentum with the six motions of the base.
     #[inline(always)]
     pub(super) fn entries(&self) -> [T; BASE] {

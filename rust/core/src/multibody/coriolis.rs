@@ -1,207 +1,280 @@
 //! Coriolis matrix `C(q, v)` with `C v = N(q, v) v` and `C + Cᵀ = Ṁ`, used for implicit gyroscopic
 //! terms.
 //!
-//! With the inertia I of a body, its spatial velocity V, and `B = ½ (V×* I + (I V)×̄* − I V×)`,
+//! Its points x, of mass m, move at `J_k v_k` with `J_k = S_k x`; `C_jk = Σ m J_j · J̇_k` is a sum over
+//! all of them. Over a body with the inertia I and the spatial velocity V it is
 //!
 //! ```text
 //! C_jk = Σ S_jᵀ (I Ṡ_k + B S_k)      over the bodies that both j and k move
 //! ```
 //!
-//! Spatial vectors are (angular, linear) at the origin of the tree's places, world axes. A velocity
-//! that several joints share, as coupled ones do, has a screw of each; their products add. `B + Bᵀ
-//! = İ` and `B V = V×* I V`, which gives both properties.
+//! with `B + Bᵀ = İ` and `B V = V×* I V`, which gives both properties. Spatial vectors are (angular,
+//! linear) at the origin of the tree's places, world axes. A velocity that several joints share, as
+//! coupled ones do, has a screw of each; their products add.
 //!
-//! With V = (ω, v), mass m, first moment m c and inertia J about that origin, and the momentum I V
-//! = (n, f)
+//! With V = (ω, v), mass m, first moment s and inertia J about that origin, and `f = m v + ω × s`
 //!
 //! ```text
-//! I = [ J     m c× ]        B = [ K − ½ n×   0 ]
-//!     [ −m c×  m 1 ]            [ −f×        0 ]
-//!
-//! K = ½ (ω× J + (ω× J)ᵀ − m (c vᵀ + v cᵀ)) + m (c·v) 1
+//! I = [ J    s× ]        B = [ K    0 ]        K = ω× (J − ½ tr J 1) + (s·v) 1 − v sᵀ
+//!     [ −s×  m 1 ]           [ −f×  0 ]
 //! ```
 //!
-//! so that the sums over a composite body consist of a few 3-vectors and symmetric matrices.
+//! so that the sums over a composite body consist of two matrices and two vectors.
+//!
+//! The translation of a free root does not enter C: velocities are taken relative to its origin,
+//! where the screws of its base have no rates, and the columns of its translations are zero.
 //!
 //! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and
 //! Christoffel symbols for rigid-body systems*, J. Comput. Nonlinear Dynam. 16, 091004.
 
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use std::ops::Range;
+use std::cmp::Ordering;
 
-use super::composite::{Composite, Momentum, Symmetric};
+use super::composite::{BLOCK, Composite, Momentum};
 use super::inertias::Inertias;
-use super::joint::{Joint, JointModel, Motion, free};
-use super::mechanism::Mechanism;
+use super::joint::{Joint, JointModel, Motion};
+use super::mechanism::{BASE, Mechanism};
+use super::path_matrix::PathMatrix;
 use super::poses::Poses;
-use crate::scalar::{Lane, Vec3};
+use crate::scalar::{Lane, Mat3, Vec3};
 
-/// Scratch of [`coriolis_matrix`], allocated once for a mechanism.
+/// Scratch of [`coriolis_matrix`].
 #[derive(Clone, Debug)]
-pub struct CoriolisScratch<T: Lane> {
+pub(crate) struct CoriolisScratch<T: Lane> {
     token: T::Token,
+    /// Velocity of each body.
     velocity: Vec<Motion<T>>,
-    turning: Vec<Turning<T>>,
-    screws: Vec<Screw<T>>,
-    /// The screws of each body's joint.
-    own: Vec<Range<usize>>,
-}
-
-/// The screw of a velocity at a body's own joint, and its rate.
-#[derive(Clone, Copy, Debug)]
-struct Screw<T> {
-    velocity: usize,
-    S: Motion<T>,
-    S_dot: Motion<T>,
+    /// I and B of what each body carries.
+    carried: Vec<Turning<T>>,
+    /// Ṡ of each motion.
+    rates: Vec<Motion<T>>,
+    /// The shares of coupled joints.
+    coupled: Vec<Share<T>>,
 }
 
 /// I and B of a composite body.
 #[derive(Clone, Copy, Debug)]
 struct Turning<T> {
     I: Composite<T>,
-    K: Symmetric<T>,
-    /// I V.
-    P: Momentum<T>,
+    K: Mat3<T>,
+    f: Vec3<T>,
 }
 
-/// `C(q, v)` (nv, nv) at the poses of a step, without gravity, column after column; `out` is
-/// overwritten.
+/// What a composite body adds to C by the screw S of the joint that carries it.
+#[derive(Clone, Copy, Debug)]
+struct Share<T> {
+    /// `I Ṡ + B S`.
+    column: Momentum<T>,
+    /// `I S`.
+    row: Momentum<T>,
+    /// `Bᵀ S`, whose linear part is zero.
+    turned: Vec3<T>,
+}
+
+/// `C(q, v)` and the bias `G` of gravity (nv) at the poses of a step; both are overwritten.
 ///
-/// `v`: (nv). Times a velocity it gives N and N m.
+/// `v`: (nv); `gravity`: m/s². C times a velocity, and G, are in N and N m.
 ///
 /// # Panics
 /// If an argument is of another mechanism.
-pub fn coriolis_matrix<T: Lane>(
+pub(crate) fn coriolis_matrix<T: Lane>(
     mechanism: &Mechanism,
-    inertias: &Inertias<T>,
-    poses: &Poses<T>,
+    (inertias, poses): (&Inertias<T>, &Poses<T>),
     v: &[T],
+    gravity: Vec3<T>,
     scratch: &mut CoriolisScratch<T>,
-    out: &mut [T],
+    (C, G): (&mut PathMatrix<T>, &mut [T]),
 ) {
     T::vectorize(
         scratch.token,
         #[inline(always)]
         || {
-            scratch.find_screws(mechanism, inertias, poses, v);
-            scratch.multiply(mechanism, v.len(), out);
+            scratch.find_rates(mechanism, poses, v);
+            scratch.multiply(mechanism, (inertias, poses), gravity, (C, G));
         },
     );
 }
 
 impl<T: Lane> CoriolisScratch<T> {
-    /// Empty.
-    #[must_use]
-    pub fn new(token: T::Token) -> Self {
-        Self {
-            token,
-            velocity: Vec::new(),
-            turning: Vec::new(),
-            screws: Vec::new(),
-            own: Vec::new(),
-        }
-    }
-
-    /// The screws of all velocities, and I and B of each body alone.
-    #[inline(always)]
-    fn find_screws(
-        &mut self,
-        mechanism: &Mechanism,
-        inertias: &Inertias<T>,
-        poses: &Poses<T>,
-        v: &[T],
-    ) {
-        self.velocity.clear();
-        self.turning.clear();
-        self.screws.clear();
-        self.own.clear();
-        let none = Vec3::splat(self.token, [0.0; 3]);
+    /// Room for a mechanism.
+    pub(crate) fn new(token: T::Token, mechanism: &Mechanism) -> Self {
+        let none = Vec3::splat(token, [0.0; 3]);
         let still = Motion {
             axis: none,
             swing: none,
         };
+        let nothing = Turning::of(Composite::zero(none.x), &still);
+        let n_coupled = mechanism.coupled.len();
+        Self {
+            token,
+            velocity: vec![still; mechanism.n_bodies()],
+            carried: vec![nothing; mechanism.n_bodies()],
+            rates: vec![still; mechanism.n_motions()],
+            coupled: vec![nothing.share(&still, &still); n_coupled],
+        }
+    }
+
+    /// Velocities of the bodies, relative to the origins of free roots, and rates of the screws.
+    #[inline(always)]
+    fn find_rates(&mut self, mechanism: &Mechanism, poses: &Poses<T>, v: &[T]) {
+        let none = Vec3::splat(self.token, [0.0; 3]);
         for (b, link) in mechanism.links.iter().enumerate() {
-            let first = self.screws.len();
-            let velocity = if let Joint::Free(_) = link.joint {
-                self.add_free(link.velocity, v)
+            let mut velocity = if link.parent == b {
+                Motion {
+                    axis: none,
+                    swing: none,
+                }
             } else {
-                let carrier = if link.parent == b {
-                    still
-                } else {
-                    self.velocity[link.parent]
-                };
-                let mut velocity = carrier;
-                for i in 0..link.joint.n_motions() {
-                    let (S, k) = (poses.motions[link.motion + i], link.velocity + i);
-                    velocity.axis += S.axis * v[k];
-                    velocity.swing += S.swing * v[k];
-                    self.screws.push(Screw {
-                        velocity: k,
-                        S,
-                        S_dot: carrier.rate_of(&S),
-                    });
-                }
-                velocity
+                self.velocity[link.parent]
             };
-            self.velocity.push(velocity);
-            self.own.push(first..self.screws.len());
-            let own = Composite::of(link, &inertias.bodies[b], &poses.bodies[b]);
-            self.turning.push(Turning::of(own, &velocity));
+            if let Joint::Free(_) = link.joint {
+                let turn = &v[link.velocity + 3..][..3];
+                velocity.axis = Vec3::new(turn[0], turn[1], turn[2]);
+            }
+            let carrier = velocity;
+            for i in 0..link.joint.n_motions() {
+                let S = &poses.motions[link.motion + i];
+                self.rates[link.motion + i] = carrier.rate_of(S);
+                velocity.axis += S.axis * v[link.velocity + i];
+                velocity.swing += S.swing * v[link.velocity + i];
+            }
+            self.velocity[b] = velocity;
         }
     }
 
-    /// Adds the six screws of a free body and returns its velocity.
+    /// The matrix and the bias from the rates, from the leaves to the roots.
     #[inline(always)]
-    fn add_free(&mut self, first: usize, v: &[T]) -> Motion<T> {
-        let base = free::velocity(&v[first..]);
-        for (k, [S, S_dot]) in free::screws_and_rates(&base).into_iter().enumerate() {
-            self.screws.push(Screw {
-                velocity: first + k,
-                S,
-                S_dot,
-            });
-        }
-        base
-    }
-
-    /// The matrix from the screws, from the leaves to the roots.
-    #[inline(always)]
-    fn multiply(&mut self, mechanism: &Mechanism, nv: usize, out: &mut [T]) {
-        out.fill(T::splat(self.token, 0.0));
-        for (b, link) in mechanism.links.iter().enumerate().rev() {
-            let turning = self.turning[b];
-            for t in self.own[b].clone() {
-                let Screw {
-                    velocity: k,
-                    S,
-                    S_dot,
-                } = &self.screws[t];
-                let F1 = turning.I.momentum(S_dot).plus(&turning.B_times(S));
-                let F2 = turning.I.momentum(S);
-                let F3 = turning.B_transposed_times(S);
-                let mut a = b;
-                loop {
-                    for before in self.screws[self.own[a].clone()]
-                        .iter()
-                        .take_while(|x| a < b || x.velocity < *k)
-                    {
-                        let i = before.velocity;
-                        out[k * nv + i] += F1.along(&before.S);
-                        out[i * nv + k] += F2.along(&before.S_dot) + before.S.axis.dot(F3);
-                    }
-                    let parent = mechanism.links[a].parent;
-                    if parent == a {
-                        break;
-                    }
-                    a = parent;
+    fn multiply(
+        &mut self,
+        mechanism: &Mechanism,
+        (inertias, poses): (&Inertias<T>, &Poses<T>),
+        gravity: Vec3<T>,
+        (C, G): (&mut PathMatrix<T>, &mut [T]),
+    ) {
+        let (n, n_entries) = (mechanism.links.len(), mechanism.column_motions.len());
+        let (links, bodies) = (&mechanism.links[..n], &poses.bodies[..n]);
+        let (inertias, velocity) = (&inertias.bodies[..n], &self.velocity[..n]);
+        let carried = &mut self.carried[..n];
+        let columns = &mechanism.column_motions[..];
+        let (motions, rates) = (&poses.motions[..], &self.rates[..]);
+        let lower = &mut C.lower.joints[..n_entries];
+        let upper = &mut C.upper.joints[..n_entries];
+        let mut n_coupled = mechanism.coupled.len();
+        for (t, tree) in mechanism.trees.iter().enumerate().rev() {
+            let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
+            let mut row = tree.rows.end;
+            for b in (root..end).rev() {
+                let link = &links[b];
+                let own = Composite::of(link, &inertias[b], &bodies[b]);
+                let mut turning = Turning::of(own, &velocity[b]);
+                if !link.is_leaf {
+                    turning = turning.plus(&carried[b]);
                 }
-                out[k * nv + k] += F1.along(S);
-            }
-            if link.parent != b {
-                self.turning[link.parent] = self.turning[link.parent].plus(&turning);
+                if b == root && tree.is_free {
+                    [C.lower.blocks[t], C.upper.blocks[t]] = turning.blocks();
+                    G[tree.velocities.start..][..BASE]
+                        .copy_from_slice(&turning.weight(gravity).entries());
+                    continue;
+                }
+                if b > root {
+                    let carried = &mut carried[link.parent];
+                    *carried = if link.is_last {
+                        turning
+                    } else {
+                        carried.plus(&turning)
+                    };
+                }
+                if b > root && link.is_coupled() {
+                    n_coupled -= 1;
+                    let m = link.motion;
+                    self.coupled[n_coupled] = turning.share(&motions[m], &rates[m]);
+                }
+                for i in (0..link.n_rows).rev() {
+                    row -= 1;
+                    let m = link.motion + i;
+                    let share = turning.share(&motions[m], &rates[m]);
+                    [C.lower.base[row], C.upper.base[row]] = share.base();
+                    let (start, last) = (mechanism.rows[row].start, mechanism.rows[row].end - 1);
+                    let (columns, n) = (&columns[start..last], last - start);
+                    let (lower, upper) = (&mut lower[start..=last], &mut upper[start..last]);
+                    for p in 0..n {
+                        let column = columns[p];
+                        [lower[p], upper[p]] = share.with(&motions[column], &rates[column]);
+                    }
+                    lower[n] = share.column.along(&motions[m]);
+                    G[link.velocity + i] = -gravity.dot(share.row.linear);
+                }
             }
         }
+        let zero = gravity.x.like(0.0);
+        for (t, tree) in (mechanism.trees.iter().enumerate()).filter(|(_, tree)| !tree.is_free) {
+            for half in [&mut C.lower, &mut C.upper] {
+                half.blocks[t] = [zero; BLOCK];
+                half.base[tree.rows.clone()].fill([zero; BASE]);
+            }
+        }
+        for (number, &b) in mechanism.coupled.iter().enumerate() {
+            self.add_coupled(mechanism, (b, number), motions, C);
+            let link = &mechanism.links[b];
+            G[link.velocity] -= gravity.dot(self.coupled[number].row.linear);
+        }
+    }
+
+    /// Adds the products of a coupled joint's screw with all screws that move its carrier, and with
+    /// itself; as in the mass matrix.
+    #[inline(always)]
+    fn add_coupled(
+        &self,
+        mechanism: &Mechanism,
+        (b, number): (usize, usize),
+        motions: &[Motion<T>],
+        C: &mut PathMatrix<T>,
+    ) {
+        let (link, share) = (&mechanism.links[b], &self.coupled[number]);
+        let k = link.velocity;
+        let diagonal = mechanism.diagonals[k];
+        let with = |m: usize| share.with(&motions[m], &self.rates[m]);
+        C.lower.joints[diagonal] += with(link.motion)[1];
+        let row = mechanism.row_of(k);
+        let first = mechanism.rows[row].start;
+        for (half, of_base) in [&mut C.lower, &mut C.upper].into_iter().zip(share.base()) {
+            for (entry, x) in half.base[row].iter_mut().zip(of_base) {
+                *entry += x;
+            }
+        }
+        for (p, mover) in mechanism.movers(link.parent).iter().enumerate() {
+            let [lower, upper] = with(mover.motion);
+            match mover.velocity.cmp(&k) {
+                Ordering::Less => {
+                    C.lower.joints[first + p] += lower;
+                    C.upper.joints[first + p] += upper;
+                }
+                Ordering::Equal => C.lower.joints[diagonal] += lower + upper,
+                Ordering::Greater => {
+                    let below = mechanism.rows[mechanism.row_of(mover.velocity)].start;
+                    C.lower.joints[below + (diagonal - first)] += upper;
+                    C.upper.joints[below + (diagonal - first)] += lower;
+                }
+            }
+        }
+    }
+}
+
+impl<T: Lane> Share<T> {
+    /// The entries of C with another screw S and its rate: in the row of this screw, and in its
+    /// column.
+    #[inline(always)]
+    fn with(&self, S: &Motion<T>, S_dot: &Motion<T>) -> [T; 2] {
+        let in_row = self.row.along(S_dot) + S.axis.dot(self.turned);
+        [in_row, self.column.along(S)]
+    }
+
+    /// The entries with the screws of a free root.
+    #[inline(always)]
+    fn base(&self) -> [[T; BASE]; 2] {
+        let (Vec3 { x, y, z }, zero) = (self.turned, self.turned.x.like(0.0));
+        [[zero, zero, zero, x, y, z], self.column.entries()]
     }
 }
 
@@ -210,117 +283,76 @@ impl<T: Lane> Turning<T> {
     #[inline(always)]
     fn of(I: Composite<T>, V: &Motion<T>) -> Self {
         let (J, w, v, s) = (&I.inertia, V.axis, V.swing, I.moment);
-        let half = I.mass.like(0.5);
-        let x = w.cross(Vec3::new(J.xx, J.xy, J.xz));
-        let y = w.cross(Vec3::new(J.xy, J.yy, J.yz));
-        let z = w.cross(Vec3::new(J.xz, J.yz, J.zz));
+        let half = I.mass.like(0.5) * (J.xx + J.yy + J.zz);
         let along = s.dot(v);
-        let K = Symmetric {
-            xx: x.x - s.x * v.x + along,
-            yy: y.y - s.y * v.y + along,
-            zz: z.z - s.z * v.z + along,
-            xy: half * (x.y + y.x - s.x * v.y - s.y * v.x),
-            xz: half * (x.z + z.x - s.x * v.z - s.z * v.x),
-            yz: half * (y.z + z.y - s.y * v.z - s.z * v.y),
+        let mut K = Mat3 {
+            x: w.cross(Vec3::new(J.xx - half, J.xy, J.xz)) - v * s.x,
+            y: w.cross(Vec3::new(J.xy, J.yy - half, J.yz)) - v * s.y,
+            z: w.cross(Vec3::new(J.xz, J.yz, J.zz - half)) - v * s.z,
         };
-        Self {
-            I,
-            K,
-            P: I.momentum(V),
+        K.x.x += along;
+        K.y.y += along;
+        K.z.z += along;
+        let f = v * I.mass + w.cross(s);
+        Self { I, K, f }
+    }
+
+    /// What it adds by a screw with a rate.
+    #[inline(always)]
+    fn share(&self, S: &Motion<T>, S_dot: &Motion<T>) -> Share<T> {
+        let Momentum { linear, angular } = self.I.momentum(S_dot);
+        Share {
+            column: Momentum {
+                linear: linear - self.f.cross(S.axis),
+                angular: angular + self.K.times(S.axis),
+            },
+            row: self.I.momentum(S),
+            turned: self.K.transpose_times(S.axis) + self.f.cross(S.swing),
         }
     }
 
-    /// `B S`.
+    /// Force and moment in balance with its weight.
     #[inline(always)]
-    fn B_times(&self, S: &Motion<T>) -> Momentum<T> {
-        let half = self.I.mass.like(0.5);
+    fn weight(&self, gravity: Vec3<T>) -> Momentum<T> {
         Momentum {
-            angular: self.K.times(S.axis) - self.P.angular.cross(S.axis) * half,
-            linear: -self.P.linear.cross(S.axis),
+            linear: -gravity * self.I.mass,
+            angular: gravity.cross(self.I.moment),
         }
     }
 
-    /// `Bᵀ S`, whose linear part is zero.
+    /// The block of a free root: B about its origin, as lower and transposed upper triangle.
     #[inline(always)]
-    fn B_transposed_times(&self, S: &Motion<T>) -> Vec3<T> {
-        let (P, half) = (&self.P, self.I.mass.like(0.5));
-        self.K.times(S.axis) + P.angular.cross(S.axis) * half + P.linear.cross(S.swing)
+    fn blocks(&self) -> [[T; BLOCK]; 2] {
+        let (Mat3 { x, y, z }, f, o) = (self.K, self.f, self.I.mass.like(0.0));
+        let lower = [
+            o, //
+            o, o, //
+            o, o, o, //
+            o, o, o, x.x, //
+            o, o, o, x.y, y.y, //
+            o, o, o, x.z, y.z, z.z,
+        ];
+        let upper = [
+            o, //
+            o, o, //
+            o, o, o, //
+            o, -f.z, f.y, x.x, //
+            f.z, o, -f.x, y.x, y.y, //
+            -f.y, f.x, o, z.x, z.y, z.z,
+        ];
+        [lower, upper]
     }
 
     #[inline(always)]
     fn plus(&self, other: &Self) -> Self {
         Self {
             I: self.I.plus(&other.I),
-            K: self.K.plus(&other.K),
-            P: self.P.plus(&other.P),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::{DMatrix, DVector, Vector3};
-
-    use super::*;
-    use crate::multibody::{Configuration, Kinematics, Model};
-    use crate::scalar::Single;
-
-    fn somewhere(model: &Model) -> (Configuration, Vec<f64>) {
-        let mut q = Configuration::zero(model);
-        let v: Vec<f64> = (0..model.nv()).map(|k| (1.7 * k as f64).sin()).collect();
-        let turn: Vec<f64> = (0..model.nv()).map(|k| (0.3 + k as f64).cos()).collect();
-        q.advance(model, &turn, 1.0);
-        (q, v)
-    }
-
-    /// The rover, and the rover with welded joints, whose bodies have their mass centres off their
-    /// origins.
-    fn models() -> [Model; 2] {
-        let rover = Model::rover();
-        let joints = [
-            ("right_bogie".to_owned(), 0.3),
-            ("steering_FL".to_owned(), -0.4),
-        ];
-        let welded = rover.with_locked_joints(&joints).unwrap();
-        [rover, welded]
-    }
-
-    fn matrix(model: &Model, kinematics: &Kinematics, v: &[f64]) -> DMatrix<f64> {
-        let mut C = DMatrix::zeros(model.nv(), model.nv());
-        let mut scratch = CoriolisScratch::new(Single::best());
-        let (mechanism, inertias) = (model.mechanism(), model.inertias());
-        let (poses, out) = (kinematics.poses(), C.as_mut_slice());
-        coriolis_matrix(mechanism, inertias, poses, v, &mut scratch, out);
-        C
-    }
-
-    #[test]
-    fn times_the_velocity_it_is_the_bias_of_newton_and_euler() {
-        for model in models() {
-            let (q, v) = somewhere(&model);
-            let kinematics = Kinematics::of(&model, &q);
-            let C = matrix(&model, &kinematics, &v);
-            let product = &C * DVector::from_column_slice(&v);
-            let expected = kinematics.bias(&model, &v, &Vector3::zeros());
-            let expected = DVector::from_vec(expected);
-            assert!((product - &expected).norm() < 1e-12 * expected.norm());
-        }
-    }
-
-    #[test]
-    fn with_its_transpose_it_is_the_rate_of_the_mass_matrix() {
-        for model in models() {
-            let (q, v) = somewhere(&model);
-            let kinematics = Kinematics::of(&model, &q);
-            let C = matrix(&model, &kinematics, &v);
-            let h = 1e-5;
-            let mass_matrix_at = |time: f64| {
-                let mut moved = q.clone();
-                moved.advance(&model, &v, time);
-                Kinematics::of(&model, &moved).mass_matrix(&model)
-            };
-            let rate = (mass_matrix_at(h) - mass_matrix_at(-h)) / (2.0 * h);
-            assert!((&C + C.transpose() - &rate).norm() < 1e-8 * rate.norm());
+            K: Mat3 {
+                x: self.K.x + other.K.x,
+                y: self.K.y + other.K.y,
+                z: self.K.z + other.K.z,
+            },
+            f: self.f + other.f,
         }
     }
 }

@@ -2,6 +2,8 @@
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 8 (branch-induced sparsity).
 
+use std::ops::Range;
+
 use super::composite::BLOCK;
 use super::mechanism::{BASE, Mechanism, TreeSpan};
 use crate::scalar::Lane;
@@ -25,6 +27,32 @@ impl<T: Lane> Rows<T> {
             base: vec![[zero; BASE]; mechanism.rows.len()],
             joints: vec![zero; mechanism.columns.len()],
         }
+    }
+
+    /// `M + a C`.
+    #[inline(always)]
+    pub(super) fn set_sum(&mut self, M: &Self, a: T, C: &Self) {
+        let blocks = (M.blocks.as_flattened(), C.blocks.as_flattened());
+        let base = (M.base.as_flattened(), C.base.as_flattened());
+        for (own, (M, C)) in [
+            (self.blocks.as_flattened_mut(), blocks),
+            (self.base.as_flattened_mut(), base),
+            (&mut self.joints[..], (&M.joints[..], &C.joints[..])),
+        ] {
+            for (own, (M, C)) in own.iter_mut().zip(M.iter().zip(C)) {
+                *own = *M + a * *C;
+            }
+        }
+    }
+
+    /// Entries of a tree's rows with its base, and the first `n` of all entries with joints.
+    #[inline(always)]
+    pub(super) fn of_tree(
+        &mut self,
+        rows: &Range<usize>,
+        n: usize,
+    ) -> (&mut [[T; BASE]], &mut [T]) {
+        (&mut self.base[rows.clone()], &mut self.joints[..n])
     }
 
     /// Gives a tree a base that nothing moves.
@@ -330,7 +358,7 @@ impl<T: Lane> Factor<T> {
 
 /// The entries with the base of a tree, and all others. A tree without one has `nothing`.
 #[inline(always)]
-fn split_base<'a, T>(
+pub(super) fn split_base<'a, T>(
     y: &'a mut [T],
     nothing: &'a mut [T; BASE],
     is_free: bool,
@@ -346,7 +374,7 @@ fn split_base<'a, T>(
 
 /// `x −= a y`.
 #[inline(always)]
-fn subtract<T: Lane>(x: &mut [T; BASE], a: T, y: &[T; BASE]) {
+pub(super) fn subtract<T: Lane>(x: &mut [T; BASE], a: T, y: &[T; BASE]) {
     for i in 0..BASE {
         x[i] -= a * y[i];
     }

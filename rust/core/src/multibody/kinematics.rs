@@ -6,11 +6,13 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::bias::{BiasScratch, bias};
+use super::coriolis::{CoriolisScratch, coriolis_matrix};
 use super::energy::{Energy, EnergyScratch, energy};
 use super::joint::Motion;
 use super::lane_configuration::LaneConfiguration;
 use super::mass_matrix::MassMatrix;
 use super::model::Model;
+use super::path_matrix::PathMatrix;
 use super::poses::Poses;
 use super::state::Configuration;
 use crate::scalar::Single;
@@ -199,6 +201,35 @@ impl Kinematics {
             &mut out,
         );
         out
+    }
+
+    /// The Coriolis matrix `C(q, v)` (nv, nv), with `C v` the bias without gravity and `C + Cᵀ` the
+    /// rate of the mass matrix, and the bias of gravity (nv), both newly allocated. `gravity`:
+    /// m/s², world.
+    #[must_use]
+    pub fn coriolis(
+        &self,
+        model: &Model,
+        v: &[f64],
+        gravity: &Vector3<f64>,
+    ) -> (DMatrix<f64>, Vec<f64>) {
+        let (mechanism, token) = (model.mechanism(), Single::best());
+        let mut C = PathMatrix::new(token, mechanism);
+        let mut weight = vec![0.0; model.nv()];
+        coriolis_matrix(
+            mechanism,
+            (model.inertias(), &self.poses),
+            v,
+            (*gravity).into(),
+            &mut CoriolisScratch::new(token, mechanism),
+            (&mut C, &mut weight),
+        );
+        let mut dense = DMatrix::identity(model.nv(), model.nv());
+        for mut column in dense.column_iter_mut() {
+            let unit: Vec<f64> = column.iter().copied().collect();
+            C.times(mechanism, &unit, column.as_mut_slice());
+        }
+        (dense, weight)
     }
 
     /// Energy at the velocity `v` (nv). `gravity`: m/s², world.

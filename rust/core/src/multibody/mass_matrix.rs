@@ -18,6 +18,7 @@ use super::composite::{Composite, Momentum};
 use super::factor::{Factor, Rows};
 use super::inertias::Inertias;
 use super::mechanism::{Mechanism, TreeSpan};
+use super::path_matrix::product;
 use super::poses::Poses;
 use crate::scalar::Lane;
 
@@ -25,7 +26,7 @@ use crate::scalar::Lane;
 #[derive(Clone, Debug)]
 pub struct MassMatrix<T: Lane> {
     token: T::Token,
-    rows: Rows<T>,
+    pub(super) rows: Rows<T>,
     composites: Vec<Composite<T>>,
     /// Momenta at a unit of each coupled joint's motion.
     coupled: Vec<Momentum<T>>,
@@ -239,17 +240,7 @@ impl<T: Lane> MassMatrix<T> {
     /// `M v` (nv).
     #[inline(always)]
     pub fn times(&self, mechanism: &Mechanism, v: &[T], out: &mut [T]) {
-        out.fill(T::splat(self.token, 0.0));
-        self.for_each(
-            mechanism,
-            #[inline(always)]
-            |i, j, x| {
-                out[i] += x * v[j];
-                if i != j {
-                    out[j] += x * v[i];
-                }
-            },
-        );
+        product(mechanism, [&self.rows, &self.rows], v, out);
     }
 
     /// Lane `lane` as a full symmetric matrix (nv, nv).
@@ -261,22 +252,6 @@ impl<T: Lane> MassMatrix<T> {
             dense[(j, i)] = x.get(lane);
         });
         dense
-    }
-
-    /// Adds it to a full matrix (nv, nv), column after column.
-    #[inline(always)]
-    pub(crate) fn add_to_full(&self, mechanism: &Mechanism, full: &mut [T]) {
-        let nv = mechanism.nv();
-        self.for_each(
-            mechanism,
-            #[inline(always)]
-            |i, j, x| {
-                full[j * nv + i] += x;
-                if i != j {
-                    full[i * nv + j] += x;
-                }
-            },
-        );
     }
 
     /// Computes `M = Lᵀ D L`. Returns where M is positive definite; the factor of any other lane

@@ -51,9 +51,6 @@ pub struct Mechanism {
     pub(super) diagonals: Vec<usize>,
     /// Tree of each velocity.
     pub(super) tree_of: Vec<usize>,
-    /// Body of each velocity, and the number of entries of the body's path up to and including the
-    /// velocity.
-    pub(super) up_to: Vec<(usize, usize)>,
     /// Whether a base or a loop passes the momentum of each cluster on to the world. A cluster is a
     /// set of trees that closed loops tie together.
     pub(super) clusters: Vec<bool>,
@@ -292,13 +289,6 @@ impl Mechanism {
     pub(super) fn row_of(&self, velocity: usize) -> usize {
         let tree = &self.trees[self.tree_of[velocity]];
         velocity - (tree.velocities.start + tree.lead()) + tree.rows.start
-    }
-
-    /// Velocities from the root up to and including velocity `k`.
-    #[inline]
-    pub(crate) fn velocity_path(&self, k: usize) -> &[usize] {
-        let (b, length) = self.up_to[k];
-        &self.path(b)[..length]
     }
 
     /// First velocity of the free root of body `b`'s tree.

@@ -45,7 +45,7 @@ pub mod bias;
 pub mod chart;
 mod composite;
 pub mod coordinates;
-pub mod coriolis;
+pub(crate) mod coriolis;
 pub mod description;
 pub mod energy;
 pub mod error;
@@ -61,6 +61,7 @@ pub mod mechanism;
 pub mod model;
 pub mod momentum;
 pub mod motor;
+pub(crate) mod path_matrix;
 pub mod poses;
 pub mod state;
 

@@ -11,16 +11,19 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
+use crate::multibody::path_matrix::PathMatrix;
 use crate::multibody::{Inertias, MassMatrix, Mechanism, Poses};
-use crate::scalar::{Lane, LaneMask};
+use crate::scalar::{Lane, LaneMask, Vec3};
 
-/// Scratch, sized at the first step that needs it. Matrices are stored column after column.
+/// Scratch.
 #[derive(Clone, Debug)]
 pub(crate) struct Gyroscopic<T: Lane> {
     token: T::Token,
     coriolis: CoriolisScratch<T>,
-    C: Vec<T>,
-    matrix: Vec<T>,
+    C: PathMatrix<T>,
+    matrix: PathMatrix<T>,
+    /// Bias of gravity.
+    weight: Vec<T>,
     /// `h (τ − G − C v) + J`, then Δv.
     load: Vec<T>,
     /// Where the symmetric part of C is left out, for each cluster.
@@ -36,23 +39,28 @@ pub(crate) struct Turned<'a, T: Lane> {
     pub poses: &'a Poses<T>,
     /// M̂.
     pub mass_matrix: &'a MassMatrix<T>,
+    /// m/s².
+    pub gravity: Vec3<T>,
 }
 
 impl<T: Lane> Gyroscopic<T> {
-    /// Without memory.
-    pub(crate) fn new(token: T::Token) -> Self {
+    /// Room for a mechanism.
+    pub(crate) fn new(token: T::Token, mechanism: &Mechanism) -> Self {
+        let (zero, nowhere) = (T::splat(token, 0.0), T::mask(token, 0));
+        let matrix = PathMatrix::new(token, mechanism);
         Self {
             token,
-            coriolis: CoriolisScratch::new(token),
-            C: Vec::new(),
-            matrix: Vec::new(),
-            load: Vec::new(),
-            is_skew: Vec::new(),
-            is_lost: Vec::new(),
+            coriolis: CoriolisScratch::new(token, mechanism),
+            C: matrix.clone(),
+            matrix,
+            weight: vec![zero; mechanism.nv()],
+            load: vec![zero; mechanism.nv()],
+            is_skew: vec![nowhere; mechanism.n_clusters()],
+            is_lost: vec![nowhere; mechanism.n_clusters()],
         }
     }
 
-    /// Turns the impulse `y = h (τ − G)` (nv) into `M̂ Δv − J`, see the page above.
+    /// Turns the impulse `y = h τ` (nv) into `M̂ Δv − J`, see the page above.
     ///
     /// `step`: h and θ; `v`: velocity before the step, and the one at which C is frozen; `impulse`:
     /// J (nv).
@@ -64,44 +72,42 @@ impl<T: Lane> Gyroscopic<T> {
         impulse: &[T],
         y: &mut [T],
     ) {
-        let (mechanism, nv) = (of.mechanism, v.len());
-        let (zero, nowhere) = (T::splat(self.token, 0.0), T::mask(self.token, 0));
-        for all in [&mut self.C, &mut self.matrix] {
-            all.resize(nv * nv, zero);
-        }
-        self.load.resize(nv, zero);
-        for all in [&mut self.is_skew, &mut self.is_lost] {
-            all.clear();
-            all.resize(mechanism.n_clusters(), nowhere);
-        }
-        let (coriolis, C) = (&mut self.coriolis, &mut self.C);
-        coriolis_matrix(mechanism, of.inertias, of.poses, v_frozen, coriolis, C);
+        let (token, mechanism) = (self.token, of.mechanism);
+        let nowhere = T::mask(token, 0);
+        self.is_skew.fill(nowhere);
+        coriolis_matrix(
+            mechanism,
+            (of.inertias, of.poses),
+            v_frozen,
+            of.gravity,
+            &mut self.coriolis,
+            (&mut self.C, &mut self.weight),
+        );
         loop {
-            let is_any_lost = T::vectorize(
-                self.token,
+            T::vectorize(
+                token,
                 #[inline(always)]
-                || {
-                    self.set_up(of, step, v, impulse, y);
-                    self.eliminate(mechanism);
-                    self.is_lost.iter().any(|lanes| lanes.any())
-                },
+                || self.set_up(of, step, v, impulse, y),
             );
-            if !is_any_lost {
+            self.is_lost.fill(nowhere);
+            let (is_lost, is_skew) = (&mut self.is_lost, &self.is_skew);
+            let each = |cluster: usize, is_positive: T::Mask| {
+                let lost = !is_positive & !is_skew[cluster];
+                is_lost[cluster] = is_lost[cluster] | lost;
+            };
+            (self.matrix).solve(token, mechanism, &mut self.load, each);
+            if !self.is_lost.iter().any(|lanes| lanes.any()) {
                 break;
             }
-            for cluster in 0..self.is_lost.len() {
-                let lost = self.is_lost[cluster];
-                self.is_skew[cluster] = self.is_skew[cluster] | lost;
-                self.is_lost[cluster] = nowhere;
+            for (cluster, lost) in self.is_lost.iter().enumerate() {
+                self.is_skew[cluster] = self.is_skew[cluster] | *lost;
                 if lost.any() {
-                    keep_skew_part(&mut self.C, nv, lost, |k| {
-                        mechanism.cluster_of_velocity(k) == cluster
-                    });
+                    self.C.keep_skew_part(mechanism, cluster, *lost);
                 }
             }
         }
         T::vectorize(
-            self.token,
+            token,
             #[inline(always)]
             || {
                 of.mass_matrix.times(mechanism, &self.load, y);
@@ -115,79 +121,19 @@ impl<T: Lane> Gyroscopic<T> {
     /// Matrix and right-hand side.
     #[inline(always)]
     fn set_up(&mut self, of: &Turned<'_, T>, (h, theta): (T, T), v: &[T], impulse: &[T], y: &[T]) {
-        let (nv, weight) = (v.len(), theta * h);
-        for (entry, c) in self.matrix.iter_mut().zip(&self.C) {
-            *entry = weight * *c;
-        }
-        of.mass_matrix.add_to_full(of.mechanism, &mut self.matrix);
-        for (load, (y, impulse)) in self.load.iter_mut().zip(y.iter().zip(impulse)) {
-            *load = *y + *impulse;
-        }
-        for (column, v) in self.C.chunks_exact(nv).zip(v) {
-            let turned = h * *v;
-            for (load, c) in self.load.iter_mut().zip(column) {
-                *load -= turned * *c;
-            }
-        }
-    }
-
-    /// Solves the system in place of the load, by elimination without exchanges; the matrix keeps
-    /// the inverses of the pivots. Notes where a
-    /// pivot is not positive although the symmetric part of C is there: with a positive definite
-    /// symmetric part every pivot is positive.
-    ///
-    /// The matrix has the sparsity of M. Elimination from the leaves to the base preserves it: each
-    /// velocity changes only the rows and columns of its path.
-    #[inline(always)]
-    fn eliminate(&mut self, mechanism: &Mechanism) {
-        let (A, b) = (&mut self.matrix[..], &mut self.load[..]);
-        let n = b.len();
-        for k in (0..n).rev() {
-            let (before, own) = A.split_at_mut(k * n);
-            let pivot = own[k];
-            let cluster = mechanism.cluster_of_velocity(k);
-            let is_lost = !pivot.like(0.0).lt(pivot) & !self.is_skew[cluster];
-            self.is_lost[cluster] = self.is_lost[cluster] | is_lost;
-            let path = mechanism.velocity_path(k);
-            let path = &path[..path.len() - 1];
-            let inverse = pivot.like(1.0) / pivot;
-            own[k] = inverse;
-            for &j in path {
-                let factor = before[j * n + k] * inverse;
-                for &i in path {
-                    before[j * n + i] -= factor * own[i];
-                }
-            }
-            let factor = b[k] * inverse;
-            for &i in path {
-                b[i] -= factor * own[i];
-            }
-        }
-        for k in 0..n {
-            let path = mechanism.velocity_path(k);
-            let mut rest = b[k];
-            for &j in &path[..path.len() - 1] {
-                rest -= A[j * n + k] * b[j];
-            }
-            b[k] = rest * A[k * n + k];
-        }
-    }
-}
-
-/// `A ← ½ (A − Aᵀ)` of an (n, n) matrix for the velocities of a cluster, in the lanes of a mask.
-fn keep_skew_part<T: Lane>(A: &mut [T], n: usize, lanes: T::Mask, is_own: impl Fn(usize) -> bool) {
-    for k in (0..n).filter(|k| is_own(*k)) {
-        for i in (0..=k).filter(|i| is_own(*i)) {
-            let (upper, lower) = (A[k * n + i], A[i * n + k]);
-            let half = upper.like(0.5) * (upper - lower);
-            A[k * n + i] = T::select(lanes, half, upper);
-            A[i * n + k] = T::select(lanes, -half, lower);
+        self.matrix.set_sum(of.mass_matrix, theta * h, &self.C);
+        self.C.times(of.mechanism, v, &mut self.load);
+        let parts = self.weight.iter().zip(y.iter().zip(impulse));
+        for (load, (weight, (y, impulse))) in self.load.iter_mut().zip(parts) {
+            *load = *y + *impulse - h * (*weight + *load);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::multibody::{Configuration, Kinematics, Model};
     use crate::scalar::Single;
@@ -205,19 +151,26 @@ mod tests {
             inertias,
             poses: kinematics.poses(),
             mass_matrix: &mass_matrix,
+            gravity: Vec3::splat(token, [0.3, -9.8, 0.5]),
         };
-        let mut solver = Gyroscopic::new(token);
+        let mut solver = Gyroscopic::new(token, mechanism);
         let impulse: Vec<f64> = v.iter().map(|v| 0.3 + v).collect();
         let mut y: Vec<f64> = v.iter().map(|v| 0.7 * v).collect();
-        let right: Vec<f64> = y.iter().zip(&impulse).map(|(y, j)| y + j).collect();
+        let pushed: Vec<f64> = y.iter().zip(&impulse).map(|(y, j)| y + j).collect();
         solver.solve(&of, step, [v, v], &impulse, &mut y);
         let (n, (h, theta)) = (v.len(), step);
+        let weight = kinematics.bias(model, &vec![0.0; n], &Vector3::new(0.3, -9.8, 0.5));
+        let right = (pushed.iter().zip(&weight)).map(|(pushed, weight)| pushed - h * weight);
+        let right: Vec<f64> = right.collect();
         let mut left = vec![0.0; n];
         mass_matrix.times(mechanism, &solver.load, &mut left);
-        for k in 0..n {
-            for i in 0..n {
-                left[i] += h * solver.C[k * n + i] * (theta * solver.load[k] + v[k]);
-            }
+        let mean: Vec<f64> = (solver.load.iter().zip(v))
+            .map(|(change, v)| theta * change + v)
+            .collect();
+        let mut turned = vec![0.0; n];
+        solver.C.times(mechanism, &mean, &mut turned);
+        for (left, turned) in left.iter_mut().zip(&turned) {
+            *left += h * turned;
         }
         [left, right]
     }

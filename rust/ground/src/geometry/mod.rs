@@ -37,7 +37,9 @@ pub mod support;
 pub mod terrain;
 
 pub use ray::{Hit, Ray, RayError};
-pub use shape::{Disc, Ellipsoid, Hull, OrientedBox, PlacedShape, Roller, Sphere, SupportMap};
+pub use shape::{
+    Disc, Ellipsoid, Hull, OrientedBox, PlacedShape, Roller, Roundness, Sphere, SupportMap,
+};
 pub use support::{Drum, Facing, Floor, Silo, Support, TerrainSupport};
 pub use terrain::{
     Clearing, Coverage, HeightField, Neighbourhood, Plane, Primitive, Rocks, SoftGround, SoftLayer,

@@ -4,7 +4,7 @@
 //! world axes. Positions in its tree are relative to its origin, so a machine far from the world's
 //! origin loses no precision. Its six screws are the units of these axes; the mass matrix has them
 //! as a block of its own, so they are not among the tree's motions. The rotations are about the
-//! body's own origin, which moves: `Ṡ = (0, ẋ × e)`.
+//! body's own origin.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -138,23 +138,4 @@ pub fn velocity<T: Lane>(v: &[T]) -> Motion<T> {
         axis: Vec3::new(v[3], v[4], v[5]),
         swing: Vec3::new(v[0], v[1], v[2]),
     }
-}
-
-/// The six screws S of a body that moves at the velocity V, about its origin, and their rates Ṡ.
-#[inline(always)]
-#[must_use]
-pub fn screws_and_rates<T: Lane>(V: &Motion<T>) -> [[Motion<T>; 2]; NV] {
-    let token = V.swing.x.token();
-    let zero = Vec3::splat(token, [0.0; 3]);
-    let [x, y, z] = Mat3::identity(token).columns();
-    let mut both = [[Motion {
-        axis: zero,
-        swing: zero,
-    }; 2]; NV];
-    for (k, e) in [x, y, z].into_iter().enumerate() {
-        both[k][0].swing = e;
-        both[3 + k][0].axis = e;
-        both[3 + k][1].swing = V.swing.cross(e);
-    }
-    both
 }

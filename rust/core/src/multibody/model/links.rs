@@ -46,10 +46,7 @@ pub(super) fn mechanism_of(
         pose += usize::from(tree.is_free && t > 0);
         let first = mechanism.rows.len();
         for k in tree.velocities.clone() {
-            let b = paths.body_of_velocity[k];
-            let path = paths.of[b].velocities.iter();
             mechanism.tree_of.push(t);
-            (mechanism.up_to).push((b, path.take_while(|&&i| i <= k).count()));
             add_row(&mut mechanism, bodies, paths, tree, k);
         }
         mechanism.trees.push(TreeSpan {
@@ -72,11 +69,15 @@ fn add_row(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, tree: &Tre
     let b = paths.body_of_velocity[k];
     if !matches!(bodies[b].joint, Joint::Free(_)) {
         let own = &paths.of[b];
-        let path = &own.velocities[tree.lead()..mechanism.up_to[k].1];
+        let path = (own.velocities.iter())
+            .skip(tree.lead())
+            .take_while(|&&i| i <= k);
         let start = mechanism.columns.len();
         let first = tree.velocities.start + tree.lead();
-        mechanism.columns.extend(path.iter().map(|&k| k - first));
-        (mechanism.column_motions).extend_from_slice(&own.motions[..path.len()]);
+        for (i, motion) in path.zip(&own.motions) {
+            mechanism.columns.push(i - first);
+            mechanism.column_motions.push(*motion);
+        }
         mechanism.rows.push(start..mechanism.columns.len());
     }
     mechanism

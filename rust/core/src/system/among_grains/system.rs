@@ -244,10 +244,11 @@ impl Dynamics for TreeAmongGrains<'_> {
 }
 
 impl Forces for TreeAmongGrains<'_> {
-    fn begin_load(&mut self, options: &StepOptions, start: Start<'_, Both>) {
+    fn begin_load(&mut self, options: &StepOptions, start: Start<'_, Both>, y: &mut [f64]) {
         let (start_a, start_b) = self.starts(start);
-        self.bed.begin_load(options, start_a);
-        self.tree.machine_mut().begin_load(options, start_b);
+        let (y_a, y_b) = self.halves_mut(y);
+        self.bed.begin_load(options, start_a, y_a);
+        self.tree.machine_mut().begin_load(options, start_b, y_b);
     }
 
     fn load(
@@ -267,12 +268,6 @@ impl Forces for TreeAmongGrains<'_> {
         self.tree
             .machine()
             .add_given(options, &mut impulse[self.bed.nv()..]);
-    }
-
-    fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [f64]) {
-        self.tree
-            .machine_mut()
-            .begin_gyroscopic(options, &mut scratch[self.bed.nv()..]);
     }
 
     fn load_gyroscopic(

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use super::contact::GrainTouch;
 use crate::contact::body_motion::{BodyMotion, Still};
+use crate::contact::detection::fastest_way;
 use crate::contact::rollers::turn_to_rollers;
 use crate::contact::{Activation, Contact, ContactFrame, ContactKey, Part};
 use crate::geometry::query::{dispatch, pairs};
@@ -40,7 +41,7 @@ pub(super) fn find(
     let n = grains.len() as u32;
     for part in Part::all(model) {
         let shape = part.placed(model, &middle);
-        let speed = approach(&middle, part.body(model), &shape).max(bed.parts.search.fastest);
+        let speed = fastest_way(&shape, part.body(model), &middle).max(bed.parts.search.fastest);
         let sizes = [grains.smallest(), grains.largest()];
         let search = Search::new(&activation, sizes, speed);
         let origin = middle.origin(part.body(model));
@@ -103,25 +104,6 @@ fn approach_of(bed: &GrainSystem<'_, 3>, middle: &Still<'_>, touch: &GrainTouch,
     let mut u = [frame.n.dot(&own), 0.0, 0.0];
     bed.subtract_point(touch.pushed(), v, &frame.rows(), &mut u);
     u[0]
-}
-
-/// Upper bound on the speed at which a point of a part's surface approaches anything, m/s. The spin
-/// of a wheel about its axle moves its surface within itself.
-fn approach(middle: &Still<'_>, body: usize, shape: &PlacedShape<'_>) -> f64 {
-    let centre = shape.centre();
-    let velocity = |x: &Vector3<f64>| middle.point_velocity(body, x);
-    let at_centre = velocity(&centre);
-    let turning = |e: &Vector3<f64>| (velocity(&(centre + e)) - at_centre).norm();
-    let turning = match shape {
-        PlacedShape::Sphere(_) => 0.0,
-        PlacedShape::Disc(disc) => turning(&disc.axle),
-        PlacedShape::Roller(roller) => turning(&roller.core.axle),
-        _ => [Vector3::x(), Vector3::y(), Vector3::z()]
-            .iter()
-            .map(turning)
-            .sum(),
-    };
-    at_centre.norm() + turning * shape.bound()
 }
 
 /// Half sides of a box with the world's axes about a shape, m.

@@ -1,6 +1,6 @@
 //! The forces on trees in lanes, without those of contacts.
 
-use super::{Implicit, TreeLanes};
+use super::TreeLanes;
 use crate::integrator::{Forces, StartOf, StepOptions, Work};
 use crate::multibody::LaneConfiguration;
 use crate::multibody::bias::bias;
@@ -24,6 +24,20 @@ impl<T: Lane> TreeLanes<T> {
         self.push(step.0, out);
     }
 
+    /// Turns a bias into the impulse of the forces and it.
+    fn push_against(&self, options: &StepOptions, y: &mut [T]) {
+        let (h, _) = self.step(options);
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                for (y, torque) in y.iter_mut().zip(&self.torque) {
+                    *y = *torque - h * *y;
+                }
+            },
+        );
+    }
+
     /// `y` = the bias at a velocity.
     fn weigh(&mut self, v: &[T], y: &mut [T]) {
         bias(
@@ -39,26 +53,30 @@ impl<T: Lane> TreeLanes<T> {
 }
 
 impl<T: Lane> Forces for TreeLanes<T> {
-    #[inline(always)]
-    fn begin_load(&mut self, options: &StepOptions, start: StartOf<'_, Self>) {
+    fn begin_load(&mut self, options: &StepOptions, start: StartOf<'_, Self>, y: &mut [T]) {
         let mut torque = std::mem::take(&mut self.torque);
-        torque.fill(self.number(0.0));
-        self.actuate(options, start, start.v, &mut torque);
-        self.torque = torque;
-    }
-
-    fn load(&mut self, options: &StepOptions, _: StartOf<'_, Self>, v_mean: &[T], y: &mut [T]) {
-        self.weigh(v_mean, y);
-        let (h, _) = self.step(options);
         T::vectorize(
             self.token,
             #[inline(always)]
             || {
-                for (y, torque) in y.iter_mut().zip(&self.torque) {
-                    *y = *torque - h * *y;
-                }
+                torque.fill(self.number(0.0));
+                self.actuate(options, start, start.v, &mut torque);
             },
         );
+        self.torque = torque;
+        let mut before = std::mem::take(&mut self.bias_before);
+        if !self.is_weighed {
+            self.weigh(start.v, &mut before);
+            self.is_weighed = true;
+        }
+        y.copy_from_slice(&before);
+        self.bias_before = before;
+        self.push_against(options, y);
+    }
+
+    fn load(&mut self, options: &StepOptions, _: StartOf<'_, Self>, v_mean: &[T], y: &mut [T]) {
+        self.weigh(v_mean, y);
+        self.push_against(options, y);
     }
 
     #[inline(always)]
@@ -67,22 +85,6 @@ impl<T: Lane> Forces for TreeLanes<T> {
             *impulse += *given;
         }
         self.push_with_sand(options, &self.torque, impulse, true);
-    }
-
-    fn begin_gyroscopic(&mut self, options: &StepOptions, scratch: &mut [T]) {
-        let (h, _) = self.step(options);
-        let mut own = self.implicit.take().unwrap_or_else(|| {
-            Box::new(Implicit {
-                solver: Gyroscopic::new(self.token),
-                given: scratch.to_vec(),
-            })
-        });
-        scratch.fill(h.like(0.0));
-        self.weigh(scratch, &mut own.given);
-        for (given, torque) in own.given.iter_mut().zip(&self.torque) {
-            *given = *torque - h * *given;
-        }
-        self.implicit = Some(own);
     }
 
     fn load_gyroscopic(
@@ -94,17 +96,17 @@ impl<T: Lane> Forces for TreeLanes<T> {
         y: &mut [T],
     ) {
         let step = self.step(options);
-        let Some(own) = &mut self.implicit else {
-            return;
-        };
-        y.copy_from_slice(&own.given);
+        let solver = (self.implicit)
+            .get_or_insert_with(|| Box::new(Gyroscopic::new(self.token, &self.mechanism)));
         let of = Turned {
             mechanism: &self.mechanism,
             inertias: &self.inertias,
             poses: &self.poses_middle,
             mass_matrix: &self.mass_matrix,
+            gravity: self.gravity,
         };
-        own.solver.solve(&of, step, [start.v, v_mean], impulse, y);
+        y.copy_from_slice(&self.torque);
+        solver.solve(&of, step, [start.v, v_mean], impulse, y);
     }
 
     #[inline(always)]

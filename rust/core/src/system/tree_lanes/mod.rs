@@ -61,7 +61,8 @@ pub struct TreeLanes<T: Lane> {
     pub mass_matrix: MassMatrix<T>,
     pub factor: Factor<T>,
     bias_scratch: BiasScratch<T>,
-    implicit: Option<Box<Implicit<T>>>,
+    /// Of steps with implicit gyroscopic terms, from the first on.
+    implicit: Option<Box<Gyroscopic<T>>>,
     /// Whether a tree may need implicit gyroscopic terms in the present step: M̂ is then kept
     /// beside its factor.
     turns: bool,
@@ -73,14 +74,9 @@ pub struct TreeLanes<T: Lane> {
     n_places: usize,
     /// Impulse of torques, sand and wrenches over the step (nv).
     torque: Vec<T>,
-}
-
-/// What steps with implicit gyroscopic terms need beside the others.
-#[derive(Clone)]
-struct Implicit<T: Lane> {
-    solver: Gyroscopic<T>,
-    /// Impulse of the forces but the gyroscopic ones (nv).
-    given: Vec<T>,
+    /// Bias at the middle of the step and the velocity before it (nv), once that is known.
+    bias_before: Vec<T>,
+    is_weighed: bool,
 }
 
 impl<T: Lane> TreeLanes<T> {
@@ -123,6 +119,8 @@ impl<T: Lane> TreeLanes<T> {
             loops: Loops::new(token, mechanism, loops, 0),
             n_places,
             torque: vector(),
+            bias_before: vector(),
+            is_weighed: false,
             mechanism: Arc::clone(mechanism),
         }
     }

@@ -41,7 +41,65 @@ pub enum PlacedShape<'a> {
     Hull(Hull<'a>),
 }
 
+/// The rotations about its centre that leave a shape as it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Roundness {
+    /// All.
+    Ball,
+    /// Those about an axis, a unit vector.
+    About(Vector3<f64>),
+    /// None, or a few.
+    None,
+}
+
 impl PlacedShape<'_> {
+    /// The rotations that leave it as it is.
+    #[inline]
+    #[must_use]
+    pub fn roundness(&self) -> Roundness {
+        match self {
+            Self::Disc(disc) => Roundness::About(disc.axle),
+            Self::Roller(roller) | Self::Cylinder(roller) => Roundness::About(roller.core.axle),
+            Self::Sphere(_) => Roundness::Ball,
+            Self::Box(_) | Self::Ellipsoid(_) | Self::Hull(_) => Roundness::None,
+        }
+    }
+
+    /// The middle disc of a wheel, which has a rolling direction; of any other shape `None`.
+    #[inline]
+    #[must_use]
+    pub fn wheel(&self) -> Option<&Disc> {
+        match self {
+            Self::Disc(disc) => Some(disc),
+            Self::Roller(roller) => Some(&roller.core),
+            _ => None,
+        }
+    }
+
+    /// Whether a point, relative to the centre, is further than `within` (m) from it, by an
+    /// inexpensive bound.
+    #[inline]
+    #[must_use]
+    pub fn is_beyond(&self, x: &Vector3<f64>, within: f64) -> bool {
+        match self {
+            Self::Disc(disc) => disc.axle.dot(x).abs() > within,
+            Self::Roller(roller) | Self::Cylinder(roller) => {
+                let beside = roller.core.axle.dot(x).abs();
+                beside > within + roller.half + roller.rounding
+            }
+            Self::Box(solid) => {
+                let local = solid.R.tr_mul(x);
+                let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
+                outside.norm_squared() > within * within
+            }
+            Self::Sphere(_) => false,
+            Self::Ellipsoid(_) | Self::Hull(_) => {
+                let reach = within + self.bound();
+                x.norm_squared() > reach * reach
+            }
+        }
+    }
+
     /// A box around it; `base` (m) is added to its place.
     #[inline]
     #[must_use]
