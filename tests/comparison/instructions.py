@@ -46,7 +46,22 @@ SCENES = {
     "rover in a curve, Newton": Scene("drive_steps", ("newton",), 1, 301),
     "rover on sand": Scene("sand_steps", ("explore",), 10, 110),
     "bed of disks": Scene("soil_steps", (), 1, 101),
+    "derivatives in sand": Scene("sand_steps", ("derivatives",), 10, 50),
+    "derivatives on firm ground": Scene("sand_steps", ("derivatives-on-firm-ground",), 10, 50),
+    "two rovers with a hitch": Scene("machine_steps", ("tow", "alone"), 10, 210),
 }
+#: Machines of `machine_steps` in the tables of the decisions 20 and 32, and how they are stepped.
+MACHINES = (
+    "rover", "flying", "turning", "mecanum", "tracks", "open-rover", "bar", "dry", "open-dry",
+    "two", "three", "push", "tow", "rover-hills", "two-hills", "three-hills",
+)  # fmt: skip
+EFFORTS = {"general": 1, "alone": 1, "batch": 8}
+
+
+def of_machine(name: str) -> list[str]:
+    """Thousands of instructions a step and a rover: with all effort, alone, in a batch of 8."""
+    counts = [collected_between(Scene("machine_steps", (name, how), 10, 210)) / n for how, n in EFFORTS.items()]
+    return [f"{count / 1000:.0f}" for count in counts]
 
 
 def collected(scene: Scene, steps: int) -> int:
@@ -63,15 +78,16 @@ def collected(scene: Scene, steps: int) -> int:
     return int(found)
 
 
-def counted() -> dict[str, int]:
-    """Instructions of a step of every scene."""
+def collected_between(scene: Scene) -> int:
+    """Instructions of a step."""
+    return round((collected(scene, scene.long) - collected(scene, scene.short)) / (scene.long - scene.short))
+
+
+def build() -> None:
+    """Compiles the programs."""
     examples = sorted({scene.example for scene in SCENES.values()})
-    build = ["cargo", "build", "--release", "--quiet", "--locked", "-p", "rover-core"]
-    subprocess.run([*build, *(word for one in examples for word in ("--example", one))], cwd=ROOT, check=True)
-    return {
-        name: round((collected(scene, scene.long) - collected(scene, scene.short)) / (scene.long - scene.short))
-        for name, scene in SCENES.items()
-    }
+    command = ["cargo", "build", "--release", "--quiet", "--locked", "-p", "rover-core"]
+    subprocess.run([*command, *(word for one in examples for word in ("--example", one))], cwd=ROOT, check=True)
 
 
 def compiler() -> str:
@@ -91,16 +107,25 @@ def main() -> None:
     """Counts and compares."""
     parser = argparse.ArgumentParser(description="Instructions of a step: have they changed?")
     parser.add_argument("--save", action="store_true", help=f"write them to {COUNTS.name}")
+    parser.add_argument("--machines", action="store_true", help="print the table of the machines instead")
     arguments = parser.parse_args()
     if shutil.which("valgrind") is None:
         sys.exit("valgrind is not installed")
-    now, rustc = counted(), compiler()
+    build()
+    console = Console(width=100, highlight=False)
+    if arguments.machines:
+        console.print(f"| machine | {' | '.join(EFFORTS)} |\n|---|---|---|---|")
+        for name in MACHINES:
+            console.print(f"| `{name}` | {' | '.join(of_machine(name))} |")
+        return
+    rustc = compiler()
+    now = {name: collected_between(scene) for name, scene in SCENES.items()}
     before = json.loads(COUNTS.read_text(encoding="utf-8")) if COUNTS.exists() else {"rustc": rustc, "a step": {}}
     table = Table("scene", "instructions a step", "committed", "change")
     for name, count in now.items():
         known = before["a step"].get(name)
         table.add_row(name, str(count), str(known or ""), f"{100 * (count / known - 1):+.2f}%" if known else "")
-    Console(width=100).print(table)
+    console.print(table)
     if arguments.save:
         COUNTS.write_text(json.dumps({"rustc": rustc, "a step": now}, indent=1) + "\n", encoding="utf-8")
         return

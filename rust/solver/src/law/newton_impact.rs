@@ -30,9 +30,9 @@ pub fn hovering_height<T: Lane>(g: T, h: T) -> T {
 /// sign. Without friction and with a common e the kinetic energy changes by `(1 − e)/2 pᵀ u⁻`,
 /// which is never a gain. The shift therefore applies whatever the sign of `u_N⁻`: a separating
 /// contact that is held to `u_N⁺ ≥ 0` while its neighbours bounce adds energy.
-#[inline]
+#[inline(always)]
 #[must_use]
-pub fn rebound(restitution: f64, u_N_before: f64) -> f64 {
+pub fn rebound<T: Lane>(restitution: T, u_N_before: T) -> T {
     restitution * u_N_before
 }
 

@@ -15,6 +15,7 @@ use crate::integrator::grouped::Grouped;
 use crate::integrator::systems::{MemoryOf, Systems};
 use crate::integrator::{StepOptions, StepReport};
 use crate::law::compliance::{Compliance, Yielding};
+use crate::law::newton_impact::rebound;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Lane, Vec3};
 use crate::solver::batch::problem::{ContactProblem, Triple};
@@ -103,7 +104,8 @@ impl<T: Lane> LaneSystem<T> {
     fn rebound(&self, sign: T, laws: &[Yielding<T>], u: &mut [Triple<T>]) {
         let zero = sign.like(0.0);
         for &slot in self.contacts.used() {
-            let mut shift = sign * (self.restitution[slot] * self.rows.u_before[slot][0]);
+            let before = self.rows.u_before[slot][0];
+            let mut shift = sign * rebound(self.restitution[slot], before);
             if !laws.is_empty() {
                 shift = T::select(laws[slot].is_soft(), zero, shift);
             }
