@@ -24,20 +24,6 @@ impl<T: Lane> TreeLanes<T> {
         self.push(step.0, out);
     }
 
-    /// Turns a bias into the impulse of the forces and it.
-    fn push_against(&self, options: &StepOptions, y: &mut [T]) {
-        let (h, _) = self.step(options);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                for (y, torque) in y.iter_mut().zip(&self.torque) {
-                    *y = *torque - h * *y;
-                }
-            },
-        );
-    }
-
     /// `y` = the bias at a velocity.
     fn weigh(&mut self, v: &[T], y: &mut [T]) {
         bias(
@@ -69,14 +55,31 @@ impl<T: Lane> Forces for TreeLanes<T> {
             self.weigh(start.v, &mut before);
             self.is_weighed = true;
         }
-        y.copy_from_slice(&before);
+        let (h, _) = self.step(options);
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                for (y, (torque, bias)) in y.iter_mut().zip(self.torque.iter().zip(&before)) {
+                    *y = *torque - h * *bias;
+                }
+            },
+        );
         self.bias_before = before;
-        self.push_against(options, y);
     }
 
     fn load(&mut self, options: &StepOptions, _: StartOf<'_, Self>, v_mean: &[T], y: &mut [T]) {
         self.weigh(v_mean, y);
-        self.push_against(options, y);
+        let (h, _) = self.step(options);
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                for (y, torque) in y.iter_mut().zip(&self.torque) {
+                    *y = *torque - h * *y;
+                }
+            },
+        );
     }
 
     #[inline(always)]
