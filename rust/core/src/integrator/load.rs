@@ -67,9 +67,17 @@ fn correct<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
 /// terms, `d.foreseen` has the latter and those of the loops.
 #[inline(always)]
 fn find_mean<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
-    let pushed = d.pushed.iter().zip(&d.cluster_of).filter(|_| is_any);
-    for (y, (pushed, cluster)) in d.y.iter_mut().zip(pushed) {
-        *y = S::T::select(d.persists[*cluster], *y + *pushed, *y);
+    if is_any {
+        let n = d.cluster_of.len();
+        let (y, pushed) = (&mut d.y[..n], &d.pushed[..n]);
+        for_each_velocity(
+            &d.cluster_of,
+            &d.persists,
+            #[inline(always)]
+            |k, persists| {
+                y[k] = S::T::select(persists, y[k] + pushed[k], y[k]);
+            },
+        );
     }
     s.machine().half_solve(&mut d.y);
     (s.machine_mut()).close_velocity(&d.options, &d.v, &d.v, &mut d.y);
@@ -88,9 +96,17 @@ fn find_mean<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
 fn foresee<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
     let zero = d.number(0.0);
     d.foreseen.fill(zero);
-    let pushed = d.pushed.iter().zip(&d.cluster_of).filter(|_| is_any);
-    for (foreseen, (pushed, cluster)) in d.foreseen.iter_mut().zip(pushed) {
-        *foreseen = S::T::select(d.persists[*cluster], *pushed, zero);
+    if is_any {
+        let n = d.cluster_of.len();
+        let (foreseen, pushed) = (&mut d.foreseen[..n], &d.pushed[..n]);
+        for_each_velocity(
+            &d.cluster_of,
+            &d.persists,
+            #[inline(always)]
+            |k, persists| {
+                foreseen[k] = S::T::select(persists, pushed[k], zero);
+            },
+        );
     }
     s.machine_mut().add_loop_impulse(&mut d.foreseen);
 }
@@ -98,11 +114,18 @@ fn foresee<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
 /// Adds the deferred correction r to the impulse `d.y`, and turns it into factor coordinates.
 #[inline(always)]
 pub(super) fn correct_impulse<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
-    let share = d.number(1.0 - d.options.theta);
-    let pushed = d.pushed.iter().zip(&d.persistent).zip(&d.cluster_of);
-    for (y, ((pushed, before), cluster)) in d.y.iter_mut().zip(pushed).filter(|_| is_any) {
-        let persists = d.persists[*cluster];
-        *y = S::T::select(persists, *y + share * (*before - *pushed), *y);
+    if is_any {
+        let (share, n) = (d.number(1.0 - d.options.theta), d.cluster_of.len());
+        let (y, pushed, before) = (&mut d.y[..n], &d.pushed[..n], &d.persistent[..n]);
+        for_each_velocity(
+            &d.cluster_of,
+            &d.persists,
+            #[inline(always)]
+            |k, persists| {
+                let corrected = y[k] + share * (before[k] - pushed[k]);
+                y[k] = S::T::select(persists, corrected, y[k]);
+            },
+        );
     }
     s.machine().half_solve(&mut d.y);
 }
@@ -119,4 +142,18 @@ fn finish_load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     (s.machine_mut()).close_velocity(&d.options, &d.v, &d.v, &mut d.y);
     s.local(&d.y, &mut d.u);
     add_shifts(s, d);
+}
+
+/// Calls `act` with each velocity and the lanes of its cluster.
+#[inline(always)]
+fn for_each_velocity<M: Copy>(cluster_of: &[usize], lanes: &[M], mut act: impl FnMut(usize, M)) {
+    if let [only] = *lanes {
+        for k in 0..cluster_of.len() {
+            act(k, only);
+        }
+    } else {
+        for (k, cluster) in cluster_of.iter().enumerate() {
+            act(k, lanes[*cluster]);
+        }
+    }
 }

@@ -195,7 +195,8 @@ pub(super) fn take_answers<S: Systems>(
     problems: &mut S::Problems,
     probe: &mut dyn Probe,
 ) -> bool {
-    for (report, retaken) in d.reports.iter_mut().zip(d.n_retaken) {
+    let lanes = d.reports.iter_mut().take(S::T::LANES);
+    for (report, retaken) in lanes.zip(d.n_retaken) {
         *report = StepReport {
             steps: 1,
             retaken,
