@@ -118,7 +118,7 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
     fn place_middle(&mut self, q: &LaneConfiguration<T>) {
         self.poses_middle.update(&self.mechanism, &self.inertias, q);
         self.joints_middle.copy_from_slice(&q.joints);
-        self.is_weighed = false;
+        self.bias_before.clear();
         self.apply_wrenches(q);
     }
 

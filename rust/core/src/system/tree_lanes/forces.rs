@@ -51,9 +51,9 @@ impl<T: Lane> Forces for TreeLanes<T> {
         );
         self.torque = torque;
         let mut before = std::mem::take(&mut self.bias_before);
-        if !self.is_weighed {
+        if before.is_empty() {
+            before.resize(start.v.len(), self.number(0.0));
             self.weigh(start.v, &mut before);
-            self.is_weighed = true;
         }
         let (h, _) = self.step(options);
         T::vectorize(

@@ -74,9 +74,8 @@ pub struct TreeLanes<T: Lane> {
     n_places: usize,
     /// Impulse of torques, sand and wrenches over the step (nv).
     torque: Vec<T>,
-    /// Bias at the middle of the step and the velocity before it (nv), once that is known.
+    /// Bias at the middle of the step and the velocity before it (nv); empty until it is known.
     bias_before: Vec<T>,
-    is_weighed: bool,
 }
 
 impl<T: Lane> TreeLanes<T> {
@@ -120,7 +119,6 @@ impl<T: Lane> TreeLanes<T> {
             n_places,
             torque: vector(),
             bias_before: vector(),
-            is_weighed: false,
             mechanism: Arc::clone(mechanism),
         }
     }
