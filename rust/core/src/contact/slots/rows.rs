@@ -758,12 +758,14 @@ impl<T: Lane> Rows<T> {
                     out.Z[contact * stride..][..stride].fill([0.0; 3]);
                 } else {
                     out.slots |= 1 << self.numbers[slot];
-                    out.Z[contact * stride..][..still].fill([0.0; 3]);
+                    if still > 0 {
+                        out.Z[contact * stride..][..still].fill([0.0; 3]);
+                    }
                 }
             },
         );
         if whole == 0 {
-            self.write_along_path(contacts, slot, problems);
+            self.write_along_path(contacts, slot, (still, rows), problems);
             return;
         }
         for (k, (velocity, z)) in path.velocities().zip(rows).enumerate() {
@@ -803,10 +805,9 @@ impl<T: Lane> Rows<T> {
         &self,
         contacts: &Contacts<T>,
         slot: usize,
+        (still, rows): (usize, &[Triple<T>]),
         problems: &mut [ContactProblem],
     ) {
-        let (path, rows) = self.of(contacts, slot);
-        let still = BASE - path.lead();
         let (homes, places) = (contacts.homes(slot), contacts.places(slot));
         let near = T::mask(self.token, contacts.near(slot));
         let Some(cluster) = contacts.cluster_of(slot) else {
