@@ -55,7 +55,7 @@ SCENES = {
 #: and in a batch.
 MACHINES = (
     "rover", "flying", "turning", "mecanum", "tracks", "open-rover", "bar", "dry", "open-dry",
-    "two", "three", "push", "tow", "rover-hills", "two-hills", "three-hills",
+    "two", "three", "push", "tow",
 )  # fmt: skip
 EFFORTS = {"general": 1, "alone": 1, "batch": 8}
 
