@@ -1,8 +1,8 @@
 //! Coriolis matrix `C(q, v)` with `C v = N(q, v) v` and `C + Cᵀ = Ṁ`, used for implicit gyroscopic
 //! terms.
 //!
-//! Its points x, of mass m, move at `J_k v_k` with `J_k = S_k x`; `C_jk = Σ m J_j · J̇_k` is a sum over
-//! all of them. Over a body with the inertia I and the spatial velocity V it is
+//! Its points x, of mass m, move at `J_k v_k` with `J_k = S_k x`; `C_jk = Σ m J_j · J̇_k` is a sum
+//! over all of them. Over a body with the inertia I and the spatial velocity V it is
 //!
 //! ```text
 //! C_jk = Σ S_jᵀ (I Ṡ_k + B S_k)      over the bodies that both j and k move

@@ -18,7 +18,7 @@ use super::composite::{Composite, Momentum};
 use super::factor::{Factor, Rows};
 use super::inertias::Inertias;
 use super::mechanism::{Mechanism, TreeSpan};
-use super::path_matrix::product;
+use super::path_matrix::{PathMatrix, product};
 use super::poses::Poses;
 use crate::scalar::Lane;
 
@@ -241,6 +241,13 @@ impl<T: Lane> MassMatrix<T> {
     #[inline(always)]
     pub fn times(&self, mechanism: &Mechanism, v: &[T], out: &mut [T]) {
         product(mechanism, [&self.rows, &self.rows], v, out);
+    }
+
+    /// `A = M + a C`.
+    #[inline(always)]
+    pub(crate) fn add_scaled(&self, a: T, C: &PathMatrix<T>, A: &mut PathMatrix<T>) {
+        A.lower.set_sum(&self.rows, a, &C.lower);
+        A.upper.set_sum(&self.rows, a, &C.upper);
     }
 
     /// Lane `lane` as a full symmetric matrix (nv, nv).

@@ -6,7 +6,6 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::factor::{Rows, split_base, subtract};
-use super::mass_matrix::MassMatrix;
 use super::mechanism::{BASE, Mechanism};
 use crate::scalar::Lane;
 
@@ -31,13 +30,6 @@ impl<T: Lane> PathMatrix<T> {
             lower: Rows::new(token, mechanism),
             upper: Rows::new(token, mechanism),
         }
-    }
-
-    /// `M + a C`.
-    #[inline(always)]
-    pub(crate) fn set_sum(&mut self, M: &MassMatrix<T>, a: T, C: &Self) {
-        self.lower.set_sum(&M.rows, a, &C.lower);
-        self.upper.set_sum(&M.rows, a, &C.upper);
     }
 
     /// `A x` (nv).

@@ -121,7 +121,7 @@ impl<T: Lane> Gyroscopic<T> {
     /// Matrix and right-hand side.
     #[inline(always)]
     fn set_up(&mut self, of: &Turned<'_, T>, (h, theta): (T, T), v: &[T], impulse: &[T], y: &[T]) {
-        self.matrix.set_sum(of.mass_matrix, theta * h, &self.C);
+        (of.mass_matrix).add_scaled(theta * h, &self.C, &mut self.matrix);
         self.C.times(of.mechanism, v, &mut self.load);
         let parts = self.weight.iter().zip(y.iter().zip(impulse));
         for (load, (weight, (y, impulse))) in self.load.iter_mut().zip(parts) {
