@@ -8,9 +8,9 @@
 //! C_jk = Σ S_jᵀ (I Ṡ_k + B S_k)      over the bodies that both j and k move
 //! ```
 //!
-//! with `B + Bᵀ = İ` and `B V = V×* I V`, which gives both properties. Spatial vectors are (angular,
-//! linear) at the origin of the tree's places, world axes. A velocity that several joints share, as
-//! coupled ones do, has a screw of each; their products add.
+//! with `B + Bᵀ = İ` and `B V = V×* I V`, which gives both properties. Spatial vectors are
+//! (angular, linear) at the origin of the tree's places, world axes. A velocity that several joints
+//! share, as coupled ones do, has a screw of each; their products add.
 //!
 //! With V = (ω, v), mass m, first moment s and inertia J about that origin, and `f = m v + ω × s`
 //!
@@ -297,7 +297,7 @@ impl<T: Lane> Turning<T> {
         Self { I, K, f }
     }
 
-    /// What it adds by a screw with a rate.
+    /// The share of a joint with a screw S and its rate.
     #[inline(always)]
     fn share(&self, S: &Motion<T>, S_dot: &Motion<T>) -> Share<T> {
         let Momentum { linear, angular } = self.I.momentum(S_dot);

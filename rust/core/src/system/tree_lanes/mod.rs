@@ -61,7 +61,7 @@ pub struct TreeLanes<T: Lane> {
     pub mass_matrix: MassMatrix<T>,
     pub factor: Factor<T>,
     bias_scratch: BiasScratch<T>,
-    /// Of steps with implicit gyroscopic terms, from the first on.
+    /// Scratch of implicit gyroscopic terms, from the first step with them on.
     implicit: Option<Box<Gyroscopic<T>>>,
     /// Whether a tree may need implicit gyroscopic terms in the present step: M̂ is then kept
     /// beside its factor.

@@ -46,7 +46,7 @@ pub enum PlacedShape<'a> {
 pub enum Roundness {
     /// All.
     Ball,
-    /// Those about an axis, a unit vector.
+    /// Rotations about an axis, a unit vector.
     About(Vector3<f64>),
     /// None, or a few.
     None,
