@@ -29,8 +29,8 @@ fn every_step_of_64_boxes_is_solved() {
     solve_every_step(4, 1, 220);
 }
 
-/// Ignored because it takes 7 s and is the test above with more boxes, which runs always and fails
-/// for the same defect: `make test-all` runs it.
+/// Ignored because it takes 7 s and is the test above with more boxes, which runs always: `make
+/// test-all` runs it.
 #[test]
 #[ignore = "tests/physics/contacts/heaps.rs::every_step_of_64_boxes_is_solved"]
 fn every_step_of_125_boxes_is_solved() {
