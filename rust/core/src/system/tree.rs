@@ -124,6 +124,15 @@ impl<'a> TreeSystem<'a> {
         contact.between_materials(self.model, &**self.terrain, &options.materials)
     }
 
+    /// Newton's e of a contact, 0 of dry friction.
+    pub(super) fn restitution(&self, options: &StepOptions, contact: &Contact) -> f64 {
+        if joint_friction::joint_of(contact).is_some() {
+            return 0.0;
+        }
+        let of_pair = self.between_materials(options, contact);
+        of_pair.map_or(options.restitution, |[_, e]| e)
+    }
+
     /// Rows of contacts at the end of the step, and of touches at its middle, as
     /// [`MechanicalSystem::assemble`] builds them. W stays what it was.
     pub(super) fn assemble_rows(&mut self, contacts: &[Contact], touches: &[Contact], v: &[f64]) {
@@ -220,8 +229,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             let most = options.time_step * self.model.joints()[joint].passive.friction;
             return -most * self.parts.friction_entry(joint);
         }
-        let of_pair = self.between_materials(options, contact);
-        rebound(of_pair.map_or(options.restitution, |[_, e]| e), u_N_before)
+        rebound(self.restitution(options, contact), u_N_before)
     }
 
     fn yields(&self) -> bool {

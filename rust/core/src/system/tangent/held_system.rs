@@ -10,6 +10,7 @@ use crate::integrator::grouped::Grouped;
 use crate::integrator::systems::{MemoryOf, Systems};
 use crate::integrator::{Dynamics, StepOptions, StepReport};
 use crate::law::compliance::{Compliance, Yielding};
+use crate::law::newton_impact::rebound;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Dual, Lane, Vec3};
 use crate::solver::batch::problem::Triple;
@@ -410,7 +411,8 @@ impl<T: Lane> Systems for Held<'_, T> {
             let is_soft = !laws.is_empty() && self.scene.held.contacts[i].is_soft;
             let restitution = self.scene.held.contacts[i].restitution;
             if restitution > 0.0 && !is_soft {
-                u[0] += self.number(sign * restitution) * self.own.u_before[i][0];
+                let before = self.own.u_before[i][0];
+                u[0] += self.number(sign) * rebound(self.number(restitution), before);
             }
         }
     }

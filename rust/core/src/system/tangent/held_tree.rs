@@ -73,7 +73,7 @@ impl TreeSystem<'_> {
             };
             HeldContact {
                 slope: ContactSlope::of(self.model, end, &**self.terrain, contact),
-                restitution: self.normal_shift(options, contact, 1.0),
+                restitution: self.restitution(options, contact),
                 is_soft: step.yields.get(i).is_some_and(|yields| *yields),
                 joint,
             }
