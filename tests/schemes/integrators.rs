@@ -210,7 +210,7 @@ fn bounces_without_loss_keep_the_energy_but_for_what_damps() {
             // θ = 1 falls by g h more than it should in each step, and loses it at the impact; the
             // penalty's impact is resolved by its step.
             SchemeFamily::MoreauJean { theta, .. } if theta > 0.5 => {
-                assert!(change < -1e-4, "{change}")
+                assert!(change < -1e-4, "{change}");
             }
             SchemeFamily::Penalty(..) => assert!(change.abs() > 1e-4, "{change}"),
             _ => assert!(change.abs() < 1e-10, "{}: {change:e}", scheme.name),

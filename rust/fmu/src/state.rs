@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 
 /// States of a unit, as the standard names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[expect(clippy::enum_variant_names, reason = "the standard's names")]
 pub enum UnitMode {
     Instantiated,
     InitializationMode,

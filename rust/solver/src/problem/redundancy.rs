@@ -461,7 +461,7 @@ impl Redundancy {
             match own.kind {
                 AdmissibleImpulse::Rests => self.start.extend_from_slice(p),
                 AdmissibleImpulse::Slides(c) => {
-                    self.start.push(p.iter().zip(c).map(|(p, c)| p * c).sum())
+                    self.start.push(p.iter().zip(c).map(|(p, c)| p * c).sum());
                 }
                 AdmissibleImpulse::Rubs(_) => self.start.push(p[1]),
             }
@@ -477,7 +477,7 @@ impl Redundancy {
             match own.kind {
                 AdmissibleImpulse::Rests => p.copy_from_slice(&y[..d]),
                 AdmissibleImpulse::Slides(c) => {
-                    p.iter_mut().zip(c).for_each(|(p, c)| *p = c * y[0])
+                    p.iter_mut().zip(c).for_each(|(p, c)| *p = c * y[0]);
                 }
                 AdmissibleImpulse::Rubs(_) => p[1] = y[0],
             }
