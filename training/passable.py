@@ -106,19 +106,19 @@ def passable(
     """Print the share of fields that have a way."""
     rover = named_model(model)
     table = [("difficulty", "fields with a way", "95% interval", "crossed first by")]
-    told: dict[str, dict[int, str]] = {}
+    crossings: dict[str, dict[int, str]] = {}
     say = partial(typer.echo, err=True)
     for level in difficulty or [1.0, 1.5, 2.0]:
         arguments: dict[str, Any] = {"terrain": terrain, "difficulty": level}
         arguments |= {} if model == BUILT_IN else {"model": model}
         seeds = list(range(seed, seed + fields))
         found = crossed(arguments, seeds, rover, tries=tries, planned=planned, patience=patience, say=say)
-        told[f"{level:g}"] = found
+        crossings[f"{level:g}"] = found
         n = sum(map(bool, found.values()))
         low, high = wilson_interval(n, fields)
         who = ", ".join(f"{name} {count}" for name, count in Counter(filter(None, found.values())).most_common())
         if output is not None:
-            output.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+            output.write_text(json.dumps(crossings, indent=1) + "\n", encoding="utf-8")
         table.append((f"{level:g}", f"{n} of {fields}", f"{100.0 * low:.1f} to {high:.1%}", who))
     Console().print(plain_table(table))
 

@@ -65,7 +65,7 @@ def train(
     tried_seconds = time.process_time() - clock
     network, explained = fit_forecast(parts, seed=seed, epochs=epochs)
     network.save(folder / FORECAST_FILE)
-    told = {
+    described = {
         "seed": seed,
         "states": [int(part.state[-1]) + 1 for part in parts],
         "scenes": [scene for scene, _ in scenes],
@@ -77,7 +77,7 @@ def train(
         "fitting_cpu_seconds": round(time.process_time() - clock - tried_seconds, 1),
         **provenance(),
     }
-    (folder / "run.json").write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    (folder / "run.json").write_text(json.dumps(described, indent=2) + "\n", encoding="utf-8")
     say_path("forecast", folder)
 
 

@@ -88,7 +88,7 @@ FRAMES = {
 def frame(name: str) -> np.ndarray:
     """An environment after some seconds of driving, with its goal."""
     width, height = SIZE
-    camera = sight(name, _driven(gym.make(name), name))
+    camera = camera_of(name, _driven(gym.make(name), name))
     options = {"width": width, "height": height, "camera": camera}
     return _driven(gym.make(name, render_mode="rgb_array", render_options=options), name)[2]
 
@@ -110,7 +110,7 @@ def _driven(env: gym.Env[Any, Any], name: str) -> tuple[np.ndarray, np.ndarray, 
     return place, np.array([x, place[1], z]), image, reach
 
 
-def sight(name: str, driven: tuple[np.ndarray, np.ndarray, np.ndarray, float]) -> tuple[list[float], list[float]]:
+def camera_of(name: str, driven: tuple[np.ndarray, np.ndarray, np.ndarray, float]) -> tuple[list[float], list[float]]:
     """Eye and target of a frame."""
     place, goal, _, reach = driven
     shot = FRAMES.get(name, Shot())

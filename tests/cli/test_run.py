@@ -138,16 +138,16 @@ def test_forces_and_torques_of_a_thinned_run_are_means_of_all_steps(tmp_path: Pa
         means = steps.trajectory[name][1:].reshape(30, 20, 6, -1).mean(axis=1)
         np.testing.assert_allclose(rows.trajectory[name][1:].reshape(means.shape), means, rtol=1e-9, atol=1e-9)
 
-    thinned = steps.resample(10.0)
+    resampled = steps.resample(10.0)
     impact = int(np.argmax(steps.trajectory["wheel_forces"][:, 0, 0]))
-    frame = int(np.argmin(np.abs(thinned.time - steps.time[impact])))
-    near = np.abs(steps.time - thinned.time[frame]) <= 0.1 + 1e-6
-    loads = rover_curves(thinned)["charts"][0]["values"][0]
+    frame = int(np.argmin(np.abs(resampled.time - steps.time[impact])))
+    near = np.abs(steps.time - resampled.time[frame]) <= 0.1 + 1e-6
+    loads = rover_curves(resampled)["charts"][0]["values"][0]
     assert loads[frame] == pytest.approx(steps.trajectory["wheel_forces"][near, 0, 0].mean(), abs=0.5)
-    scene = rover_scene(thinned, follow=True)
+    scene = rover_scene(resampled, follow=True)
     (forces,) = (channel.values for channel in scene.channels if channel.name == "forces")
     share = steps.model.mass * 9.81 / 6
-    near = np.abs(steps.time - thinned.time[frame]) <= 0.05 + 1e-6
+    near = np.abs(steps.time - resampled.time[frame]) <= 0.05 + 1e-6
     assert share * forces[frame, 0, 4] == pytest.approx(steps.trajectory["wheel_forces"][near, 0, 0].mean(), rel=0.02)
     hits = [event for event in scene.facts["events"] if "hits with" in event["name"]]
     assert any(abs(event["time"] - steps.time[impact]) < 0.01 for event in hits)

@@ -1,4 +1,4 @@
-"""Planning with the simulator: the field's plan, the futures, and the policy that chooses among them."""
+"""Planning with the simulator: the field's plan, the roll-outs, and the policy that chooses among them."""
 
 import gymnasium as gym
 import numpy as np
@@ -7,7 +7,7 @@ from pursuit import pursuit
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.planning import FieldPlan, Futures, PlannerOptions, PlannerPolicy
+from rover_gym.planning import FieldPlan, PlannerOptions, PlannerPolicy, Rollouts
 from rover_gym.planning.planner_policy import ScannedGround
 from rover_gym.policy import CommandController, ScanPolicy
 
@@ -66,7 +66,7 @@ def test_a_future_ends_where_the_rover_would() -> None:
     controller = CommandController(env)
     commands = np.array([[[0.8, 0.5, 0.0], [0.8, -0.5, 0.3]], [[-0.5, 0.0, 0.0], [-0.5, 0.5, 0.0]]])
     hold = 10
-    ends = Futures(env, 2, threads=1).drive(controller, commands, hold)
+    ends = Rollouts(env, 2, threads=1).drive(controller, commands, hold)
     before = env.snapshot()
     for one, plan in zip(ends.place, commands, strict=True):
         env.restore(before)
@@ -84,7 +84,7 @@ def test_a_future_that_reaches_the_goal_ends_there() -> None:
     env = planar()
     controller = CommandController(env)
     circle = pursuit(env, controller, env.progress.observation[None])
-    ends = Futures(env, 1, threads=1).drive(controller, circle[None], 400)
+    ends = Rollouts(env, 1, threads=1).drive(controller, circle[None], 400)
     assert ends.reached.all()
     assert ends.time[0] < 400 * env.dt
 

@@ -12,7 +12,7 @@ from refusals import refused
 from rover_gym import HeightField, ModelError, OptionError, PDPolicy, Plane, RoverEnv, RoverModel, TerrainError, Union
 from rover_gym.economy import Scene
 from rover_gym.planning import PlannerPolicy
-from rover_gym.planning.futures import Futures
+from rover_gym.planning.rollouts import Rollouts
 from rover_gym.policy import (
     ArcNetworkPolicy,
     GuidedPolicy,
@@ -104,7 +104,7 @@ def test_a_ground_is_an_object_a_name_or_a_file(tmp_path: Path) -> None:
     env = RoverEnv()
     PlannerPolicy(env, terrain="plane", model="rover")
     env.reset(seed=0)
-    Futures(env, 2, model="rover")
+    Rollouts(env, 2, model="rover")
     assert isinstance(Scene("plane").terrain, Plane)  # type: ignore[arg-type]
     with refused(TerrainError, "terrain", "plane"):
         Scene("rocks")  # type: ignore[arg-type]

@@ -133,7 +133,7 @@ def test_frames_of_the_gallery_show_rover_and_goal_from_different_sides(
     place, goal = np.array([1.0, 0.4, 2.0]), np.array([8.0, 0.4, 5.0])
     seen = {}
     for name in ENVIRONMENTS:
-        eye, target = (np.array(point) for point in gallery.sight(name, (place, goal, np.zeros(0), 1.0)))
+        eye, target = (np.array(point) for point in gallery.camera_of(name, (place, goal, np.zeros(0), 1.0)))
         way = (target - eye) / np.linalg.norm(target - eye)
         for end in (place, goal):
             away = (end - eye) / np.linalg.norm(end - eye)

@@ -178,7 +178,7 @@ def test_a_recording_holds_what_the_page_shows_of_plan_and_sensors(tmp_path: Pat
     loop.send(Record())
     stepped(loop, clock, 20)
     view.follow(loop.state)
-    seen = loop.state.sights
+    seen = loop.state.overlays
     loop.send(Drive(1.0))  # the hand takes over, and intends nothing that can be drawn
     stepped(loop, clock, 5)
     by_hand = LiveView()

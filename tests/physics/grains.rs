@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use rover_core::integrator::{
-    Dynamics, Integrator, MechanicalSystem, NoProbe, Scratch, Stabilisation, StateMut, StepOptions,
-    StepReport, WarmStart,
+    Dynamics, Integrator, MechanicalSystem, NoProbe, Stabilisation, StateMut, StepOptions,
+    StepReport, StepScratch, WarmStart,
 };
 use rover_core::nalgebra::{SVector, Vector3};
-use rover_core::planar::Ball;
+use rover_core::planar::PlanarBall;
 use rover_core::problem::FrictionContactProblem;
 use rover_core::solver::SolverOptions;
 use rover_core::spatial::space::{axis, body_velocities};
@@ -29,7 +29,7 @@ struct Heap<const D: usize> {
     steps: usize,
     warm_start: WarmStart<GrainKey>,
     parts: GrainParts<D>,
-    scratch: Scratch<Vec<f64>, GrainContact<D>>,
+    scratch: StepScratch<Vec<f64>, GrainContact<D>>,
     sleep: Sleep,
     sleep_options: Option<SleepOptions>,
 }
@@ -103,7 +103,7 @@ where
         scene.check_configuration(&q).expect("a configuration");
         let nv = scene.nv();
         Self {
-            scratch: Scratch::new(&q, 3 * scene.grains.len()),
+            scratch: StepScratch::new(&q, 3 * scene.grains.len()),
             v: vec![0.0; nv],
             q,
             time: 0.0,
@@ -611,7 +611,7 @@ where
     let at = 2 * body_velocities(D);
     let grain = struck(on_a_floor(&centres, 0.4), at);
     let mut scene = on_a_floor(&centres[..2], 0.4).scene;
-    let ball = Ball::new(2.0, 0.1, kappa::<D>() * 2.0 * 0.01).unwrap();
+    let ball = PlanarBall::new(2.0, 0.1, kappa::<D>() * 2.0 * 0.01).unwrap();
     scene.machine = Some(Arc::new(ball.into()));
     let mut q = coordinates(&centres[..2]);
     q.extend([flat[2].x, flat[2].y, 0.0]);

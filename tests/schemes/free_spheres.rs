@@ -8,7 +8,7 @@ use std::sync::Arc;
 use rover_comparison::free_spheres::SphereKind;
 use rover_comparison::scenes::{G, options};
 use rover_comparison::slab::Slab;
-use rover_comparison::sphere_scenes::{KIND, Push, Scene, Treatment, run};
+use rover_comparison::sphere_scenes::{KIND, Push, SphereScene, Treatment, run};
 use rover_comparison::sphere_simulation::SphereSimulation;
 use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::Vector3;
@@ -31,7 +31,7 @@ fn weightless(friction: f64, restitution: f64, time_step: f64) -> StepOptions {
 fn bouncing_keeps_its_energy_at_any_step() {
     for step in [0.02, 0.01, 0.003, 0.001] {
         let shown = run(
-            Scene::Bouncing,
+            SphereScene::Bouncing,
             step,
             Treatment::VelocityLevel,
             4.0,
@@ -48,7 +48,7 @@ fn bouncing_keeps_its_energy_at_any_step() {
 fn elastic_impacts_of_the_block_keep_its_energy() {
     for step in [0.01, 0.005] {
         let shown = run(
-            Scene::ElasticBlock,
+            SphereScene::ElasticBlock,
             step,
             Treatment::VelocityLevel,
             1.0,
@@ -62,12 +62,26 @@ fn elastic_impacts_of_the_block_keep_its_energy() {
 
 #[test]
 fn projection_keeps_the_block_apart() {
-    let projected = run(Scene::Block, 1e-3, Treatment::Projection, 0.6, no_clock).unwrap();
+    let projected = run(
+        SphereScene::Block,
+        1e-3,
+        Treatment::Projection,
+        0.6,
+        no_clock,
+    )
+    .unwrap();
     assert!(projected.n_contacts > 200 && projected.converged > 0.99);
     assert!(projected.penetration < 1e-5, "{projected:?}");
     assert!(projected.deepest < 5e-3, "{projected:?}");
     // The velocity law alone lets penetration stay.
-    let left = run(Scene::Block, 1e-3, Treatment::VelocityLevel, 0.6, no_clock).unwrap();
+    let left = run(
+        SphereScene::Block,
+        1e-3,
+        Treatment::VelocityLevel,
+        0.6,
+        no_clock,
+    )
+    .unwrap();
     assert!(left.penetration > projected.penetration, "{left:?}");
     assert!(left.penetration < 1e-4, "{left:?}");
 }
@@ -77,7 +91,7 @@ fn projected_to_convergence_nothing_penetrates_at_the_end_of_any_step() {
     // 216 contacts with the ground and among neighbours, each less than
     // 1e-10 m deep: a sum below 1e-17 m².
     let largest = |treatment: Treatment| {
-        let mut simulation = Scene::Block.start(1e-2, treatment).unwrap();
+        let mut simulation = SphereScene::Block.start(1e-2, treatment).unwrap();
         let mut largest = 0.0_f64;
         for _ in 0..60 {
             assert!(simulation.step(1).unwrap().is_converged());
@@ -96,7 +110,7 @@ fn projected_to_convergence_nothing_penetrates_at_the_end_of_any_step() {
 #[test]
 fn balls_roll_on_a_pushed_box_with_two_sevenths_of_its_acceleration() {
     for push in [Push::X, Push::Z, Push::Diagonal] {
-        let scene = Scene::Rolling(push);
+        let scene = SphereScene::Rolling(push);
         let [slab, ball] = scene.accelerations().unwrap().map(|a| a.norm());
         assert!((slab - 0.7385).abs() < 5e-5 && (ball - 0.2110).abs() < 5e-5);
         for step in [0.01, 0.002] {
@@ -156,7 +170,7 @@ fn a_box_dropped_askew_comes_to_rest_on_a_face() {
 fn impacts_in_flight_keep_the_momentum() {
     // A weightless crowd that implodes, with friction, above the plane.
     for (friction, restitution) in [(0.0, 1.0), (0.6, 0.0), (0.6, 0.5)] {
-        let mut centres = Scene::ElasticBlock.centres();
+        let mut centres = SphereScene::ElasticBlock.centres();
         centres.retain(|x| x.x.abs() < 0.4 && x.z.abs() < 0.4 && x.y < 1.8);
         for x in &mut centres {
             x.y += 5.0;

@@ -4,18 +4,18 @@
 #![allow(clippy::unwrap_used)] // a test stops where a scene is impossible
 
 use rover_comparison::measure::{
-    Curve, Motion, accumulation, creep, drop_and_rest, elastic_change, end_of,
+    BenchmarkMotion, ConvergenceCurve, accumulation, creep, drop_and_rest, elastic_change, end_of,
     order_across_impacts, order_in, reference, reference_scheme,
 };
 use rover_comparison::scenes::{G, ball_above, ball_on, flight_at, options};
-use rover_comparison::{Kind, Penalty, SCHEMES, Scheme};
+use rover_comparison::{Penalty, SCHEMES, Scheme, SchemeFamily};
 use rover_core::planar::Line;
 
 fn named(start: &str) -> &'static Scheme {
     SCHEMES.iter().find(|s| s.name.starts_with(start)).unwrap()
 }
 
-fn check(scheme: &Scheme, curve: &Curve, expected: f64) {
+fn check(scheme: &Scheme, curve: &ConvergenceCurve, expected: f64) {
     let order = curve.order().unwrap();
     assert!(
         (order - expected).abs() < 0.2,
@@ -30,14 +30,14 @@ fn in_flight_every_scheme_has_its_order() {
     // and semi-implicit Euler 1; Runge–Kutta 4.
     for scheme in &SCHEMES {
         let expected = match scheme.kind {
-            Kind::MoreauJean { theta, .. } if theta > 0.5 => 1.0,
-            Kind::Penalty(..) => 1.0,
-            Kind::EventDriven => 4.0,
+            SchemeFamily::MoreauJean { theta, .. } if theta > 0.5 => 1.0,
+            SchemeFamily::Penalty(..) => 1.0,
+            SchemeFamily::EventDriven => 4.0,
             _ => 2.0,
         };
         check(
             scheme,
-            &order_in(scheme, Motion::Flight, 16).unwrap(),
+            &order_in(scheme, BenchmarkMotion::Flight, 16).unwrap(),
             expected,
         );
     }
@@ -48,11 +48,11 @@ fn across_impacts_every_scheme_is_of_first_order_and_the_event_driven_is_exact()
     for scheme in &SCHEMES {
         let curve = order_across_impacts(scheme, 100);
         match scheme.kind {
-            Kind::EventDriven => {
+            SchemeFamily::EventDriven => {
                 let worst = curve.error.iter().map(|e| e.unwrap()).fold(0.0, f64::max);
                 assert!(worst < 1e-9, "{curve:?}");
             }
-            Kind::Penalty(..) => {}
+            SchemeFamily::Penalty(..) => {}
             _ => check(scheme, &curve, 1.0),
         }
     }
@@ -60,7 +60,11 @@ fn across_impacts_every_scheme_is_of_first_order_and_the_event_driven_is_exact()
 
 #[test]
 fn the_reference_agrees_with_itself_at_half_the_step() {
-    for motion in [Motion::Rolling, Motion::Sliding, Motion::Driving] {
+    for motion in [
+        BenchmarkMotion::Rolling,
+        BenchmarkMotion::Sliding,
+        BenchmarkMotion::Driving,
+    ] {
         let (fine, coarse) = (
             reference(motion).unwrap(),
             end_of(&reference_scheme(), motion, 256).unwrap(),
@@ -92,7 +96,10 @@ fn the_others_pass_the_zeno_point_and_rest() {
     let e = 0.5;
     let zeno = (2.0 / G).sqrt() * (1.0 + e) / (1.0 - e);
     for scheme in &SCHEMES {
-        if matches!(scheme.kind, Kind::EventDriven | Kind::Penalty(..)) {
+        if matches!(
+            scheme.kind,
+            SchemeFamily::EventDriven | SchemeFamily::Penalty(..)
+        ) {
             continue;
         }
         let h = 1e-3;
@@ -158,7 +165,7 @@ fn a_block_on_a_slope_stays_but_for_the_penalty_which_creeps() {
     let (alpha, mu) = (0.3_f64, 0.5_f64);
     for scheme in &SCHEMES {
         let speed = creep(scheme).unwrap();
-        if let Kind::Penalty(_, slip_speed) = scheme.kind {
+        if let SchemeFamily::Penalty(_, slip_speed) = scheme.kind {
             let expected = slip_speed * alpha.tan() / (mu * mu - alpha.tan().powi(2)).sqrt();
             assert!(
                 (speed - expected).abs() < 0.01 * expected,
@@ -202,8 +209,10 @@ fn bounces_without_loss_keep_the_energy_but_for_what_damps() {
         match scheme.kind {
             // θ = 1 falls by g h more than it should in each step, and loses it at the impact; the
             // penalty's impact is resolved by its step.
-            Kind::MoreauJean { theta, .. } if theta > 0.5 => assert!(change < -1e-4, "{change}"),
-            Kind::Penalty(..) => assert!(change.abs() > 1e-4, "{change}"),
+            SchemeFamily::MoreauJean { theta, .. } if theta > 0.5 => {
+                assert!(change < -1e-4, "{change}");
+            }
+            SchemeFamily::Penalty(..) => assert!(change.abs() > 1e-4, "{change}"),
             _ => assert!(change.abs() < 1e-10, "{}: {change:e}", scheme.name),
         }
     }
@@ -215,7 +224,7 @@ fn what_drops_without_restitution_rests() {
         let (growth, rest) = drop_and_rest(scheme).unwrap();
         assert!(rest < 1e-9, "{}: {rest:e} m/s", scheme.name);
         assert!(
-            growth < 1e-5 || matches!(scheme.kind, Kind::Penalty(..)),
+            growth < 1e-5 || matches!(scheme.kind, SchemeFamily::Penalty(..)),
             "{growth:e}"
         );
     }
@@ -227,18 +236,22 @@ fn in_persistent_contact_each_has_its_order() {
     // step with the reaction's mean direction make it 2.
     for scheme in &SCHEMES {
         let expected = match scheme.kind {
-            Kind::MoreauJean { theta, .. } if theta > 0.5 => 1.0,
-            Kind::MoreauJean { .. } | Kind::GeneralisedAlpha(_) => 2.0,
-            Kind::SchatzmanPaoli => 1.0,
-            Kind::EventDriven => 4.0,
-            Kind::Penalty(..) => continue,
+            SchemeFamily::MoreauJean { theta, .. } if theta > 0.5 => 1.0,
+            SchemeFamily::MoreauJean { .. } | SchemeFamily::GeneralisedAlpha(_) => 2.0,
+            SchemeFamily::SchatzmanPaoli => 1.0,
+            SchemeFamily::EventDriven => 4.0,
+            SchemeFamily::Penalty(..) => continue,
         };
         // Our scheme halves its coarsest steps from rest, which would blur the slope.
         let coarsest = match scheme.kind {
-            Kind::MoreauJean { .. } => 32,
+            SchemeFamily::MoreauJean { .. } => 32,
             _ => 16,
         };
-        for motion in [Motion::Rolling, Motion::Sliding, Motion::Driving] {
+        for motion in [
+            BenchmarkMotion::Rolling,
+            BenchmarkMotion::Sliding,
+            BenchmarkMotion::Driving,
+        ] {
             let curve = order_in(scheme, motion, coarsest).unwrap();
             check(scheme, &curve, expected);
         }
@@ -249,7 +262,7 @@ fn in_persistent_contact_each_has_its_order() {
 fn the_penalty_scheme_converges_to_another_motion() {
     // Refining sixteen times, from 0.16 ms to 0.01 ms, gains nothing: the remaining error is that
     // of the spring and the regularised friction.
-    let curve = order_in(named("Penalty"), Motion::Driving, 4096).unwrap();
+    let curve = order_in(named("Penalty"), BenchmarkMotion::Driving, 4096).unwrap();
     let errors: Vec<f64> = curve.error.iter().map(|e| e.unwrap()).collect();
     assert!(
         errors[4] > 0.8 * errors[0] && errors[4] > 1e-3,

@@ -6,8 +6,8 @@ use friction_contact::problem::{
     evaluate,
 };
 use friction_contact::solver::{
-    Answer, ManyBodies, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage,
-    solve, solve_many_bodies,
+    ContactSolution, ManyBodies, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace,
+    Stage, solve, solve_many_bodies,
 };
 use proptest::prelude::*;
 
@@ -901,7 +901,7 @@ fn free_bodies_list_their_sweeps_and_what_came_after_them() {
     };
     let (mut p, mut u) = (vec![0.0; 2 * n], vec![0.0; 2 * n]);
     let mut workspace = SolverWorkspace::new();
-    let answer = Answer {
+    let answer = ContactSolution {
         p: &mut p,
         u: &mut u,
         rolling: &mut [],

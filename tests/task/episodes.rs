@@ -8,7 +8,7 @@ use rover_core::multibody::Model;
 use rover_core::simulation::{ReadingScratch, RoverScene, RoverSimulation};
 use rover_task::draw::domain::DomainDistribution;
 use rover_task::draw::rocks::RockDistribution;
-use rover_task::draw::scene::{Fixed, SceneDistribution};
+use rover_task::draw::scene::{FixedDraws, SceneDistribution};
 use rover_task::draw::start::StartDistribution;
 use rover_task::draw::{Order, Pcg64};
 use rover_task::episode::running::Period;
@@ -88,7 +88,7 @@ fn begin(model: &Arc<Model>, i: usize) -> Beginning {
     let order = Order {
         random: Pcg64::seeded(&[u32::try_from(i).unwrap()]),
         difficulty: None,
-        fixed: &Fixed::default(),
+        fixed: &FixedDraws::default(),
     };
     let drawn = distribution(model, i).draw(&[order], 100, None, &mut || true);
     drawn.unwrap().unwrap().remove(0)

@@ -60,7 +60,7 @@ from rover_gym.mechanics import OptionError
 from rover_gym.policy.comparison import EpisodeFilm
 from rover_gym.policy.evaluation import Episode, run_episode, timed
 from rover_gym.record.channels import outcome_words
-from rover_gym.replay.sights import SENSORS
+from rover_gym.replay.overlays import SENSORS
 from rover_gym.replay.tape import Tape, Watched
 from rover_gym.validation import number, refuse
 

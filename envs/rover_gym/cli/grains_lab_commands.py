@@ -91,9 +91,9 @@ def plate(
     number("sinkage", sinkage, above=0.0)
     bed = given.bed()
     # `--depth` is the bed's.
-    told = {"depth": "--sinkage", "plate_friction": "--tool-friction"}
-    told |= {name: f"--{name}" for name in ("radius", "speed", "samples")}
-    with status("pushing the plate"), one_line(told):
+    option_names = {"depth": "--sinkage", "plate_friction": "--tool-friction"}
+    option_names |= {name: f"--{name}" for name in ("radius", "speed", "samples")}
+    with status("pushing the plate"), one_line(option_names):
         points = plate_test(
             bed,
             radius,

@@ -195,9 +195,9 @@ def _read(file: Path, options: dict[str, object]) -> tuple[RoverModel, ImportRep
         text = str(error)
         for argument, option in AS_OPTIONS:
             text = re.sub(argument, option, text)
-        told = ModelError(text)
-        told.field, told.value = error.field, error.value
-        raise told from None
+        reworded = ModelError(text)
+        reworded.field, reworded.value = error.field, error.value
+        raise reworded from None
 
 
 def _say_solids(results: Results, found: RoverModel) -> None:

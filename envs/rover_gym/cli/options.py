@@ -271,7 +271,7 @@ def given_arguments(given: Sequence[str] | None) -> dict[str, Any]:
     return arguments
 
 
-DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' tries out futures in the simulator, see the manual's page on policies."
+DRIVERS_HELP = f"{NAMES_HELP[:-1]}; 'planner' rolls out commands in the simulator, see the manual's page on policies."
 
 
 def named_driver(name: str, model: RoverModel | None = None) -> NamedPolicy:
@@ -299,7 +299,7 @@ def driver_title(name: str) -> str:
     """What a driver is, as a heading says it."""
     if is_model_file(name):
         return Path(name).name
-    return "the planner with futures" if name == "planner" else policy_title(name)
+    return "the planner with roll-outs" if name == "planner" else policy_title(name)
 
 
 def takes(kind: type[Any], **defaults: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:

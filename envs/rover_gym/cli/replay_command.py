@@ -126,7 +126,7 @@ def plot(
     recording = newest_run(recording)
     folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
     run = open_run(recording)
-    from rover_gym.figures.drawing import draw_run, drawable  # noqa: PLC0415 - slow, and a bad file is told at once
+    from rover_gym.figures.drawing import draw_run, drawable  # noqa: PLC0415 - slow, and a bad file is reported at once
 
     names = [f"{name}.{file_format}" for name in (*drawable(run), "overview")]
     check_paths({"the run": recording}, output=Into(folder, names))

@@ -39,7 +39,7 @@ def speed(
     """Measure how many rovers this machine simulates."""
     grounds = list(SpeedTerrain) if terrain is None else [terrain]
     exploring_rounds = -(-rounds // _STEPS_A_ROUND)
-    told: dict[str, tuple[ExploringSpeed, VectorSpeed]] = {}
+    measured: dict[str, tuple[ExploringSpeed, VectorSpeed]] = {}
     with progress_bar() as bar:
         task = bar.add_task("speed", total=len(grounds) * (rounds + exploring_rounds + 2), state=f"{num_envs} rovers")
 
@@ -51,11 +51,11 @@ def speed(
                 num_envs, threads, ground=ground.value, torque=torque, rounds=exploring_rounds, progress=advance
             )
             arguments: dict[str, Any] = {"terrain": ground.value, "height_scan": ground is SpeedTerrain.rocks}
-            told[ground.value] = (
+            measured[ground.value] = (
                 exploring,
                 measure_speed(num_envs, threads, rounds=rounds, progress=advance, **arguments),
             )
-    first = next(iter(told.values()))[0]
+    first = next(iter(measured.values()))[0]
     machine = {
         "processor": processor(),
         "cores": os.cpu_count(),
@@ -64,12 +64,12 @@ def speed(
         "packages": {"rover-gym": __version__},
     }
     with Results(as_json=as_json) as results:
-        results.add(machine=machine, grounds={name: _fields(*two) for name, two in told.items()})
+        results.add(machine=machine, grounds={name: _fields(*two) for name, two in measured.items()})
     if as_json:
         return
     typer.echo(f"{machine['processor']}, {machine['cores']} cores, {machine['instruction_set']}; {machine['date']}")
     typer.echo(f"rover-gym {__version__}; {num_envs} rovers, {first.threads} threads")
-    for name, (exploring, environment) in told.items():
+    for name, (exploring, environment) in measured.items():
         _print_exploring(name, exploring)
         _print_environment(environment)
 

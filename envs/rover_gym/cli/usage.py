@@ -1,4 +1,4 @@
-"""Wrong options and commands, told in one line."""
+"""Wrong options and commands, reported in one line."""
 
 import sys
 from typing import Any

@@ -161,7 +161,7 @@ class RoverBatch:
         #: Generators of the rovers before their first episodes; afterwards the core has them.
         self._generators: Rows = np.zeros((self.n, 4), np.uint64)
         #: Generators that were handed out; they hold their rovers' states.
-        self._lent: dict[int, np.random.Generator] = {}
+        self._handed_out: dict[int, np.random.Generator] = {}
         self._seeds: list[int | None] = [None] * self.n
         self._difficulties: list[Range | None] = [None] * self.n
         self._begun = np.zeros(self.n, np.bool_)
@@ -282,9 +282,9 @@ class RoverBatch:
             term[chosen] = 0.0
         for i, seed in zip(chosen, drawn.seeds, strict=True):
             self._seeds[i] = seed
-        for i in drawn.seeded & self._lent.keys():
-            del self._lent[i]
-        self._hand_back(self._lent.keys() & set(chosen))
+        for i in drawn.seeded & self._handed_out.keys():
+            del self._handed_out[i]
+        self._hand_back(self._handed_out.keys() & set(chosen))
 
     def step(
         self, actions: object, active: Mask | None = None, *, has_scan: bool = True
@@ -308,7 +308,7 @@ class RoverBatch:
         """
         self._check_begun(actions)
         before = self.episodes.observations() if self._terms else None
-        with self._lending(self._lent if self.task.is_noisy else ()):
+        with self._following_handed_out(self._handed_out if self.task.is_noisy else ()):
             # The core refuses what is outside [-1, 1] before anything moves: actions within pay for no check here.
             beyond: npt.NDArray[np.int64] | None = None
             try:
@@ -507,7 +507,7 @@ class RoverBatch:
         self._difficulties[i], self._seeds[i], self._begun[i] = checked.difficulty, snapshot.seed, True
         for name, term in self._terms.items():
             term[i] = snapshot.terms[name]
-        self._hand_back(self._lent.keys() & {i})
+        self._hand_back(self._handed_out.keys() & {i})
 
     def set_difficulties(self, difficulties: Sequence[float | Range | None]) -> None:
         """Sets each rover's difficulty of the rocks, or the range it is drawn from, from its next reset on.
@@ -540,13 +540,13 @@ class RoverBatch:
 
         The rover continues to draw from it: numbers that the caller draws are not drawn again.
         """
-        if i not in self._lent:
-            self._lent[i] = generator_at(self.generator_rows([i])[0])
-        return self._lent[i]
+        if i not in self._handed_out:
+            self._handed_out[i] = generator_at(self.generator_rows([i])[0])
+        return self._handed_out[i]
 
     def set_generator(self, i: int, generator: np.random.Generator) -> None:
         """Gives rover i another random generator; the next draw refuses one that is not over `PCG64`."""
-        self._lent[i] = generator
+        self._handed_out[i] = generator
 
     def set_seed(self, i: int, seed: int) -> None:
         """Says which seed rover i's random generator has been made from."""
@@ -607,17 +607,17 @@ class RoverBatch:
         self._started = True
 
     @contextmanager
-    def _lending(self, lent: Iterable[int]) -> Iterator[None]:
+    def _following_handed_out(self, rovers: Iterable[int]) -> Iterator[None]:
         """Lets the core draw from generators that were handed out."""
-        lent = list(lent)
-        if not lent:
+        rovers = list(rovers)
+        if not rovers:
             yield
             return
-        self.episodes.set_generators(lent, np.stack([row_of(self._lent[i]) for i in lent]))
+        self.episodes.set_generators(rovers, np.stack([row_of(self._handed_out[i]) for i in rovers]))
         try:
             yield
         finally:
-            self._hand_back(lent)
+            self._hand_back(rovers)
 
     def generator_rows(self, chosen: Sequence[int]) -> Rows:
         """The states of some rovers' random generators, `(m, 4)`; none is moved."""
@@ -626,8 +626,8 @@ class RoverBatch:
         begun = [k for k, i in enumerate(chosen) if self._begun[i]]
         rows[begun] = self.episodes.generators([chosen[k] for k in begun])
         for k, i in enumerate(chosen):
-            if i in self._lent:
-                rows[k] = row_of(self._lent[i])
+            if i in self._handed_out:
+                rows[k] = row_of(self._handed_out[i])
         return rows
 
     def _seed_at_random(self, chosen: Sequence[int]) -> None:
@@ -638,7 +638,7 @@ class RoverBatch:
         for i, seed in zip(unseeded, seeds, strict=True):
             self._seeds[i] = seed
 
-    def _hand_back(self, lent: Iterable[int]) -> None:
+    def _hand_back(self, rovers: Iterable[int]) -> None:
         """Sets generators that were handed out to the states in the core."""
-        for i in lent:
-            set_row(self._lent[i], self.episodes.generators([i])[0])
+        for i in rovers:
+            set_row(self._handed_out[i], self.episodes.generators([i])[0])

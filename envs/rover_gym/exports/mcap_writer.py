@@ -22,7 +22,7 @@ from rover_gym.record.rover_run import RoverRun, film_rows
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.rendering.appearance import ROCK_COLOUR
 from rover_gym.replay import scenery
-from rover_gym.replay.sights import SENSORS, hits, sensor_of
+from rover_gym.replay.overlays import SENSORS, hits, sensor_of
 from rover_gym.validation import TERRAINS, array, checked, number, refuse, vector
 
 if TYPE_CHECKING:

@@ -388,9 +388,9 @@ class GrainRun(Run):
     @property
     def whole(self) -> GrainRun:
         """The run with all samples of its file, of which `resample` and `at` have kept some."""
-        if self.trajectory.thinned is None:
+        if self.trajectory.original is None:
             return self
-        whole = self.trajectory.thinned[0]
+        whole = self.trajectory.original[0]
         return replace(self, trajectory=whole, rows=np.arange(len(whole["time"])))
 
 

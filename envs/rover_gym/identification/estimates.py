@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.identification.fitting import EXACT, Solution, Window, WindowFit, is_told
+from rover_gym.identification.fitting import EXACT, Solution, Window, WindowFit, is_identifiable
 from rover_gym.identification.parameters import Parameter
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
@@ -164,7 +164,7 @@ def open_combinations(jacobian: Array, scales: Array, variance: float) -> tuple[
     """
     sensitivities, directions = np.linalg.svd(jacobian * scales / math.sqrt(variance), full_matrices=False)[1:]
     found = []
-    for direction in directions[~is_told(sensitivities)]:
+    for direction in directions[~is_identifiable(sensitivities)]:
         parts = direction**2
         order = np.argsort(-parts)
         found.append(OpenCombination(tuple(int(i) for i in order if parts[i] > SMALLEST_PART)))

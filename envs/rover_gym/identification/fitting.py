@@ -418,8 +418,8 @@ class WindowFit:
         jacobian = _reduced(linear, [one.by_parameters for one in linear]) * self._scales
         residuals = _reduced(linear, [one.residuals for one in linear])
         left, sensitivities, right = np.linalg.svd(jacobian, full_matrices=False)
-        told = is_told(sensitivities)
-        step = -right[told].T @ ((left.T @ residuals)[told] / sensitivities[told])
+        identifiable = is_identifiable(sensitivities)
+        step = -right[identifiable].T @ ((left.T @ residuals)[identifiable] / sensitivities[identifiable])
         step *= part / max(1.0, float(np.abs(step).max(initial=0.0)) / LONGEST_STEP)
         moved = np.clip(values + self._scales * step, self._lows, self._highs)
         rover, gain = self.rover(moved)
@@ -449,11 +449,11 @@ class WindowFit:
         return ((rows - window.measured) / deviations).reshape(len(rovers), -1)
 
 
-def is_told(sensitivities: Array) -> npt.NDArray[np.bool_]:
+def is_identifiable(sensitivities: Array) -> npt.NDArray[np.bool_]:
     """(p,) which combinations of parameters a run determines, in the order of their sensitivities."""
     least = max(LEAST_SENSITIVITY, SMALLEST_SENSITIVITY * float(sensitivities.max(initial=0.0)))
-    told: npt.NDArray[np.bool_] = sensitivities >= least
-    return told
+    identifiable: npt.NDArray[np.bool_] = sensitivities >= least
+    return identifiable
 
 
 def _is_misfit(residuals: Array) -> bool:

@@ -95,19 +95,19 @@ def identify(
     for combination in found:
         reasons |= {one: combination.reason(chosen, one) for one in combination.members}
         held |= next({one: chosen[one].start} for one in combination.members if one not in held)
-    # What the run does not tell stays where the search began; the others are as they are best then.
-    free, told, best = _free(fit, solution, chosen, held, max_iterations)
+    # What the run does not determine stays where the search began; the others are as they are best then.
+    free, reduced, best = _free(fit, solution, chosen, held, max_iterations)
     factors: dict[int, float] = {}
     if free:
-        around = look_around(told, best, [chosen[i] for i in free], max_iterations)
+        around = look_around(reduced, best, [chosen[i] for i in free], max_iterations)
         best = around.solution
         factors = dict(zip(free, around.factors.tolist(), strict=True))
         if around.flat:
             reasons |= {free[i]: reason for i, reason in around.flat.items()}
             held |= {free[i]: chosen[free[i]].start for i in around.flat}
-            fit.go_on_from(told)
+            fit.go_on_from(reduced)
             solution = replace(solution, values=_inserted(solution.values, free, best.values))
-            free, told, best = _free(fit, solution, chosen, held, max_iterations)
+            free, reduced, best = _free(fit, solution, chosen, held, max_iterations)
     widened = np.array([factors[i] for i in free])
     missed = _missed(windows, best, setup.model) if noise is None else ()
     return _identification(chosen, windows, best, free, widened, reasons, sensitivities, setup, missed)
@@ -120,8 +120,8 @@ def _free(
     free = [i for i in range(len(parameters)) if i not in held]
     if not held:
         return free, fit, solution
-    told = fit.hold(held)
-    return free, told, told.solve(solution.values[free], solution.deviations, iterations=iterations)
+    reduced = fit.hold(held)
+    return free, reduced, reduced.solve(solution.values[free], solution.deviations, iterations=iterations)
 
 
 def _inserted(values: Array, places: Sequence[int], entries: Array) -> Array:

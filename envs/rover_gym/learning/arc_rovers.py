@@ -110,16 +110,16 @@ class Group:
         over = terminated | truncated
         self.returns += rewards
         self.lengths += 1
-        told: list[dict[str, Any]] = [{} for _ in range(len(over))]
+        reported: list[dict[str, Any]] = [{} for _ in range(len(over))]
         for i in np.flatnonzero(over).tolist():
-            told[i] = {
+            reported[i] = {
                 "terminal_observation": infos["final_obs"][i],
                 "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
                 "episode": {"r": float(self.returns[i]), "l": int(self.lengths[i]), "t": time.process_time()},
                 "is_success": bool(infos["final_info"]["termination"][i] == "goal"),
             }
             self.returns[i], self.lengths[i] = 0.0, 0
-        return seen, (rewards * scale).astype(np.float32), over, told
+        return seen, (rewards * scale).astype(np.float32), over, reported
 
 
 def evaluate(network: ArcNetwork, arguments: Mapping[str, Any], seeds: Sequence[int]) -> list[EvaluatedEpisode]:
@@ -158,8 +158,8 @@ class _Worker:
         parts = np.split(arcs, len(self._groups)) if self._groups else []
         found = [group.step(part, scale) for group, part in zip(self._groups, parts, strict=True)]
         seen = _joined([one[0] for one in found])
-        told = [info for one in found for info in one[3]]
-        return seen, np.concatenate([one[1] for one in found]), np.concatenate([one[2] for one in found]), told
+        reported = [info for one in found for info in one[3]]
+        return seen, np.concatenate([one[1] for one in found]), np.concatenate([one[2] for one in found]), reported
 
     def evaluate(self, arrays: Any, arguments: Mapping[str, Any], seeds: Sequence[int]) -> Any:
         return evaluate(ArcNetwork(arrays), arguments, seeds)
@@ -253,12 +253,12 @@ class Rovers:
     def receive(self) -> tuple[ArcObservation, npt.NDArray[Any], npt.NDArray[Any], list[dict[str, Any]]]:
         """What came of it."""
         found = [self._here.step(*self._parts[0])] if self._here is not None else [_got(pipe) for pipe in self._pipes]
-        told = [info for one in found for info in one[3]]
+        reported = [info for one in found for info in one[3]]
         return (
             _joined([one[0] for one in found]),
             np.concatenate([one[1] for one in found]),
             np.concatenate([one[2] for one in found]),
-            told,
+            reported,
         )
 
     def evaluate(self, network: ArcNetwork) -> dict[str, list[EvaluatedEpisode]]:

@@ -1,7 +1,7 @@
 """Fits the network of `rover_gym.policy.ArcForecast` to arcs that were tried.
 
 A policy drives over fields. At some of its decisions copies of the rover drive some of the planner's arcs, slow and
-fast, for `HORIZON` seconds (`rover_gym.planning.Futures`). In some episodes a random arc is held now and then, so that
+fast, for `HORIZON` seconds (`rover_gym.planning.Rollouts`). In some episodes a random arc is held now and then, so that
 the rover gets into places where the policy would not go.
 """
 
@@ -16,7 +16,7 @@ import torch
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import OptionError, sin_cos
-from rover_gym.planning.futures import Futures
+from rover_gym.planning.rollouts import Rollouts
 from rover_gym.policy.arc_forecast import HORIZON, OUTPUTS, ArcFeatures, with_speed
 from rover_gym.policy.features import LARGEST_FEATURE
 from rover_gym.policy.named_policy import named_policy
@@ -118,7 +118,7 @@ class _Trial:
 
     def begin(self) -> None:
         """Begins an episode, after the environment's reset."""
-        self._futures = Futures(self._env, self.copies, time_step=TIME_STEP, threads=1)
+        self._rollouts = Rollouts(self._env, self.copies, time_step=TIME_STEP, threads=1)
         self._start = self._env.simulation.q[[0, 2]]
 
     def drive(self, observation: Single, rng: np.random.Generator) -> tuple[Single, Single]:
@@ -129,7 +129,7 @@ class _Trial:
         env, planner, features, n = self._env, self._planner, self._features, len(self._chords)
         picked = rng.permutation(2 * n)[: self.copies]
         hold = max(1, round(HORIZON / env.dt))
-        ends = self._futures.drive(planner.controller, self.commands[picked, None], hold)
+        ends = self._rollouts.drive(planner.controller, self.commands[picked, None], hold)
         x, z, heading = (float(env.simulation.q[j]) for j in (0, 2, 4))
         sine, cosine = sin_cos(heading)
         dx, dz = (ends.place - [x, z]).T

@@ -76,8 +76,8 @@ def policy_of_file(path: str | Path) -> NamedPolicy:
     run = file.with_name("run.json")
     arguments: Mapping[str, Any] = {}
     if run.is_file():
-        told = json.loads(run.read_text(encoding="utf-8"))
-        given = told.get("environment") if isinstance(told, dict) else None
+        described = json.loads(run.read_text(encoding="utf-8"))
+        given = described.get("environment") if isinstance(described, dict) else None
         arguments = environment_arguments(given) if isinstance(given, dict) else {}
     return NamedPolicy(arguments, lambda env: FilePolicy(env, file))
 
@@ -90,11 +90,11 @@ def _algorithm(path: Path) -> tuple[str, str]:  # noqa: RET503 - `refuse` does n
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            told = json.loads(archive.read("data"))
+            described = json.loads(archive.read("data"))
     except (zipfile.BadZipFile, KeyError, ValueError) as error:
         refuse(PolicyError, "policy", str(path), f"is no model of stable-baselines3 ({error})")
     for entry, package, name in ALGORITHMS:
-        if isinstance(told, dict) and entry in told:
+        if isinstance(described, dict) and entry in described:
             return package, name
     known = ", ".join(name for _, _, name in ALGORITHMS)
     refuse(PolicyError, "policy", str(path), f"is of an unknown algorithm; known are {known}")

@@ -59,8 +59,8 @@ class RawPolicy:
         folder.mkdir(parents=True, exist_ok=True)
         self.model.save(folder / "model.zip")
         self.normalisation.save(str(folder / "normalisation.pkl"))
-        told = {"algorithm": type(self.model).__name__, "environment": self.environment, **provenance()}
-        (folder / "run.json").write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        described = {"algorithm": type(self.model).__name__, "environment": self.environment, **provenance()}
+        (folder / "run.json").write_text(json.dumps(described, indent=2) + "\n", encoding="utf-8")
 
     @classmethod
     def load(cls, folder: str | Path) -> "RawPolicy":
@@ -71,12 +71,12 @@ class RawPolicy:
             OSError: The folder lacks a file.
         """
         folder = Path(folder)
-        told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        algorithm = str(told["algorithm"]).split()[-1]
+        described = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        algorithm = str(described["algorithm"]).split()[-1]
         if algorithm not in ALGORITHMS:
             refuse(OptionError, "algorithm", algorithm, f"must be one of {', '.join(ALGORITHMS)}")
         environment = environment_arguments(
-            told["environment"] if "environment" in told else _earlier_environment(folder, told["task"])
+            described["environment"] if "environment" in described else _earlier_environment(folder, described["task"])
         )
         rovers = RoverVecEnv(1, threads=1, **environment)
         normalisation = VecNormalize.load(str(folder / "normalisation.pkl"), rovers)

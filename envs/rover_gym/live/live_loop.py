@@ -36,7 +36,7 @@ from rover_gym.live.live_recording import LiveRecording
 from rover_gym.live.live_scene import BY_HAND
 from rover_gym.live.live_state import LiveState, Past, poses_of
 from rover_gym.mechanics import CommandError, RoverGymError
-from rover_gym.replay.sights import sights_now
+from rover_gym.replay.overlays import live_overlays
 from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ MOST_DEBT = 0.25
 #: Time over which the real-time factor is measured, s.
 MEASURED = 2.0
 
-#: What the user is told where a drive has ended.
+#: Notices of the page where a drive has ended.
 ENDINGS = {
     "roll_over": "the rover has rolled over",
     "left_field": "the rover has left the field",
@@ -60,7 +60,7 @@ ENDINGS = {
     "battery_empty": "the battery is empty",
 }
 
-#: What may go wrong with a command or a file: the user is told, and the drive goes on.
+#: What may go wrong with a command or a file: the page reports it, and the drive goes on.
 EXPECTED = (RoverGymError, MissingExtraError, OSError)
 
 
@@ -68,7 +68,7 @@ class LiveLoop:
     """Steps a rover in real time, in a thread of its own.
 
     `send` and `state` are for any thread. Commands are carried out between two control periods, in order. What they ask
-    for in vain, and a recording that fails, is told in `LiveState.notice`; the drive goes on.
+    for in vain, and a recording that fails, is reported in `LiveState.notice`; the drive goes on.
 
     Args:
         rover: The rover. It belongs to the loop from here on.
@@ -165,7 +165,7 @@ class LiveLoop:
             self.tell("the goal is reached: back to where it came from")
         self._past.keep(self._rover)
         self._look()
-        self._guard(lambda recording: recording.append(self._rover, self._sights))
+        self._guard(lambda recording: recording.append(self._rover, self._overlays))
         if self._rover.ended:
             self._is_paused = True
             self.tell(f"{ENDINGS.get(self._rover.ended, self._rover.ended)}: rewind or restart")
@@ -259,14 +259,14 @@ class LiveLoop:
 
     def _next_file(self) -> None:
         self._look()
-        self._guard(lambda recording: recording.next_file(self._rover, self._sights))
+        self._guard(lambda recording: recording.next_file(self._rover, self._overlays))
         self._note_file()
 
     def _record(self, *, on: bool) -> None:
         if not on:
             self._end_recording()
         elif self._recording is None:
-            self._recording = LiveRecording(self._folder, self._rover, self._sights, mcap=self._mcap)
+            self._recording = LiveRecording(self._folder, self._rover, self._overlays, mcap=self._mcap)
             self._note_file()
             self.tell(f"recording {self._recording.path.name}")
 
@@ -293,7 +293,7 @@ class LiveLoop:
 
     def _look(self) -> None:
         """Notes what the rover sees now, and what its driver intends."""
-        self._sights = sights_now(self._rover.env, self._rover.driver, self._rover.driver_state)
+        self._overlays = live_overlays(self._rover.env, self._rover.driver, self._rover.driver_state)
 
     def _measure(self) -> None:
         """Keeps pairs of wall and simulated time, of the last seconds."""
@@ -328,7 +328,7 @@ class LiveLoop:
             speed=math.hypot(velocity[0], velocity[2]),
             wheel_forces=forces,
             mass_centre=simulation.centre_of_mass(),
-            sights=self._sights,
+            overlays=self._overlays,
             ruts=np.zeros((0, 3)) if sand is None else sand["ruts"],
             loads=forces[:, 0],
             slip=info["slip_ratio"],

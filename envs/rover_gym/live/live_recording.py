@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rover_gym.live.live_rover import LiveRover
-    from rover_gym.replay.sights import Sights
+    from rover_gym.replay.overlays import Overlays
 
 #: Rows that a kill may lose: two and a half seconds.
 ROWS_PER_FLUSH = 50
@@ -32,7 +32,7 @@ class LiveRecording:
     Args:
         folder: The folder; it is created.
         rover: The rover, recorded from its present state on.
-        sights: What it sees now, and what its driver intends.
+        overlays: What it sees now, and what its driver intends.
         mcap: Whether `live-1.mcap`, ... get the same rows.
 
     Attributes:
@@ -45,11 +45,11 @@ class LiveRecording:
         MissingExtraError: What writes MCAP is not installed.
     """
 
-    def __init__(self, folder: Path, rover: LiveRover, sights: Sights, *, mcap: bool = False) -> None:
+    def __init__(self, folder: Path, rover: LiveRover, overlays: Overlays, *, mcap: bool = False) -> None:
         self._folder, self._mcap = folder, mcap
-        self._begin(rover, sights)
+        self._begin(rover, overlays)
 
-    def _begin(self, rover: LiveRover, sights: Sights) -> None:
+    def _begin(self, rover: LiveRover, overlays: Overlays) -> None:
         self.path = _free_path(self._folder)
         self._sampler = RoverSampler(rover.env.model)
         channels = (
@@ -57,11 +57,11 @@ class LiveRecording:
             *OF_EPISODES,
             Channel("friction", "1", "friction coefficient"),
             Channel("gravity", "m/s2", "magnitude of gravity"),
-            *sights.tracks(),
+            *overlays.tracks(),
         )
         simulation, scene = rover.env.simulation, rover.scene
         facts = {**asdict(scene), "goal": rover.env.goal, "goal_tolerance": rover.env.goal_tolerance}
-        facts |= {"control_period": rover.dt, "height_scan": rover.height_scan, **sights.facts()}
+        facts |= {"control_period": rover.dt, "height_scan": rover.height_scan, **overlays.facts()}
         attributes = describe(simulation, "a live drive", facts, seed=scene.seed)
         terrain = simulation.terrain
         with ExitStack() as opened:
@@ -73,14 +73,14 @@ class LiveRecording:
                 self._files.append(McapWriter(log, rover.env.model, terrain, goal=goal, attributes=attributes))
             opened.pop_all()
         self.rows = 0
-        self.append(rover, sights)
+        self.append(rover, overlays)
 
     @property
     def paths(self) -> list[Path]:
         """All files that are being written."""
         return [file.path for file in self._files]
 
-    def append(self, rover: LiveRover, sights: Sights) -> None:
+    def append(self, rover: LiveRover, overlays: Overlays) -> None:
         """Adds the present state, with what is seen and intended.
 
         Raises:
@@ -96,7 +96,7 @@ class LiveRecording:
             "friction": scene.friction,
             "gravity": scene.gravity,
         }
-        row |= more | sights.row()
+        row |= more | overlays.row()
         with ExitStack() as failing:  # one file that fails ends the other
             failing.callback(self.close)
             for file in self._files:
@@ -104,7 +104,7 @@ class LiveRecording:
             failing.pop_all()
         self.rows += 1
 
-    def next_file(self, rover: LiveRover, sights: Sights) -> None:
+    def next_file(self, rover: LiveRover, overlays: Overlays) -> None:
         """Ends the file and goes on in the next one.
 
         Raises:
@@ -112,7 +112,7 @@ class LiveRecording:
             OSError: The next file cannot be created.
         """
         self.close()
-        self._begin(rover, sights)
+        self._begin(rover, overlays)
 
     def close(self) -> None:
         """Writes what is left and ends the file; a second call does nothing.

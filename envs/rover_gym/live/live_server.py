@@ -160,18 +160,18 @@ class LiveServer:
     async def _show(self, page: Any) -> None:
         """Sends the scene and its frames to a page; a page that is slow gets fewer."""
         closed = require("websockets.exceptions", "replay").ConnectionClosed
-        shown, last, told = -1, -1, 0
+        shown, last, n_sent = -1, -1, 0
         try:
             while True:
                 begin, state = time.perf_counter(), self._loop.state
                 if state.number != last and not self._is_dark and self._follow(state):
                     last, (number, frame) = state.number, self._seen
                     if self.view.number != shown:
-                        shown, told = self.view.number, 0
+                        shown, n_sent = self.view.number, 0
                         await page.send(self.view.scene)
                     if number == last:
-                        ruts = bytes(self.view.pressed[told:])
-                        told += len(ruts)
+                        ruts = bytes(self.view.pressed[n_sent:])
+                        n_sent += len(ruts)
                         await page.send(frame + ruts)
                 await asyncio.sleep(max(0.0, 0.5 * state.period - (time.perf_counter() - begin)))
         except closed:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rover_gym.live.live_rover import LiveMoment, LiveRover
     from rover_gym.live.live_scene import LiveScene
     from rover_gym.mechanics import RoverModel, Terrain
-    from rover_gym.replay.sights import Sights
+    from rover_gym.replay.overlays import Overlays
 
 
 Array = npt.NDArray[np.float64]
@@ -41,7 +41,7 @@ class LiveState:
         speed: Horizontal speed of the trunk's origin, m/s.
         wheel_forces: `(n_wheels, 3)` force on each wheel along normal, rolling direction and their cross product, N.
         mass_centre: `(3,)` world, m.
-        sights: What the rover sees and its driver intends, of this moment.
+        overlays: What the rover sees and its driver intends, of this moment.
         ruts: `(n, 3)` place x and z and depth of each cell of sand that a wheel has pressed down, m.
         loads: `(n_wheels,)` normal force on each wheel, N.
         slip: Mean slip ratio of the wheels in contact.
@@ -77,7 +77,7 @@ class LiveState:
     speed: float
     wheel_forces: Array
     mass_centre: Array
-    sights: Sights
+    overlays: Overlays
     ruts: Array
     loads: Array
     slip: float

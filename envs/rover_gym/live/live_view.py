@@ -53,14 +53,14 @@ class LiveView:
     def follow(self, state: LiveState) -> None:
         """Builds the scene of a state, if it is another one or the rover has come near its edge."""
         away = np.abs(state.positions[0] - self._middle).max()
-        shape = [(channel.name, channel.values.shape) for channel in state.sights.channels()]
+        shape = [(channel.name, channel.values.shape) for channel in state.overlays.channels()]
         if state.world == self._world and away <= REACH - NEAR_EDGE and shape == self._shape:
             return
         self._shape = shape
         scene, self._wheels = bare_scene(_standing(state))
         scene.channels = self._channels(state)
         scene.facts |= {"period": state.period}
-        state.sights.describe(scene, state.model)
+        state.overlays.describe(scene, state.model)
         self._ruts, self._drawn, self.pressed = None, 0, bytearray()
         if sand_of(state.terrain) is not None:
             middle = state.positions[0][[0, 2]]
@@ -91,7 +91,7 @@ class LiveView:
             FrameChannel.turns("normals", normals),
             FrameChannel.fine("mass", state.mass_centre[None, None]),
             FrameChannel.fine("friction", np.full((1, 1, 1), state.scene.friction)),
-            *state.sights.channels(),
+            *state.overlays.channels(),
         ]
 
 

@@ -4,7 +4,7 @@ The costs are those of Dijkstra's algorithm (Dijkstra 1959) on a grid, as `rover
 them.
 
 The price of a place grows with the height of the ground under the trunk above the mean of its surroundings, relative to
-the trunk's clearance. `PlannerPolicy` uses the cost-to-go at the end of each simulated future.
+the trunk's clearance. `PlannerPolicy` uses the cost-to-go at the end of each roll-out.
 """
 
 from dataclasses import dataclass

@@ -20,7 +20,7 @@ from rover_gym.maps.ground_lookup import TerrainLike, as_terrain
 from rover_gym.mechanics import HeightField, OptionError, StateError
 from rover_gym.models.lookup import ModelLike
 from rover_gym.planning.field_plan import FieldPlan
-from rover_gym.planning.futures import Ends, Futures
+from rover_gym.planning.rollouts import Ends, Rollouts
 from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.policy.features import check_observed
 from rover_gym.policy.ground_map import MOST_CELLS, GroundMap, MapOptions
@@ -131,7 +131,7 @@ class PlannerOptions:
     Attributes:
         samples: Sequences per round.
         iterations: Rounds per planning, each around the best of the previous round.
-        horizon: Length of a future, s.
+        horizon: Length of a roll-out, s.
         knot: How long a command of the sequence is held, s.
         period: Time between plannings, s.
         actions: What is sampled: "commands", or "raw" actions, wheel torques and steering set-points.
@@ -141,7 +141,7 @@ class PlannerOptions:
         energy_price: Cost of a joule, in metres of good ground.
         time_price: Cost of a second, in metres of good ground.
         failure_price: Cost of a failed episode, in metres of good ground.
-        time_step: Largest physics step of the futures, s.
+        time_step: Largest physics step of the roll-outs, s.
     """
 
     samples: int = 40
@@ -183,10 +183,10 @@ class PlannerPolicy:
         options: Sampling and costs.
         limits: The values of a command of 1.
         seed: Of the samples.
-        threads: Threads that step the futures; None for one per core.
-        model: The rover of the futures, see `Futures`.
-        friction: Of the futures, see `Futures`.
-        terrain: The ground of the futures and of the field's plan, or its file; the episode's by default.
+        threads: Threads that step the roll-outs; None for one per core.
+        model: The rover of the roll-outs, see `Rollouts`.
+        friction: Friction of the roll-outs, see `Rollouts`.
+        terrain: The ground of the roll-outs and of the field's plan, or its file; the episode's by default.
         sees: "field" for the whole ground, or "scan" for the ground covered by the height scans so far. Unseen ground
             gets the height of the nearest seen place.
 
@@ -222,9 +222,9 @@ class PlannerPolicy:
         if self.options.actions == "raw":
             self._controller = raw = RawActions(self._env, commands, self.options.raw_spread)
             self._spread = raw.spread
-        self._futures: Futures | None = None
-        self._make_futures = partial(
-            Futures,
+        self._rollouts: Rollouts | None = None
+        self._make_rollouts = partial(
+            Rollouts,
             self._env,
             self.options.samples,
             time_step=self.options.time_step,
@@ -335,7 +335,7 @@ class PlannerPolicy:
 
     def _begin(self) -> None:
         self._aim()
-        self._futures = self._make_futures()
+        self._rollouts = self._make_rollouts()
         self._start, self._since = self._env.start, 0
         self._sequence = np.zeros_like(self._sequence)
         if not isinstance(self._controller, RawActions):
@@ -349,16 +349,16 @@ class PlannerPolicy:
         self._field = FieldPlan.over(terrain, self._env.model, simulation.q[[0, 2]], self._goal)
 
     def _plan(self) -> None:
-        """Draws, drives and judges futures; keeps the sequence that the rover follows."""
+        """Draws, drives and judges roll-outs; keeps the sequence that the rover follows."""
         options = self.options
-        futures, field = self._futures, self._field
-        assert futures is not None and field is not None  # noqa: PT018, S101 - `_begin` made them
+        rollouts, field = self._rollouts, self._field
+        assert rollouts is not None and field is not None  # noqa: PT018, S101 - `_begin` made them
         mean = self._shifted()
         fixed = np.concatenate((mean[None], self._library))[: options.samples]
         for _ in range(options.iterations):
             drawn = mean + self._random.normal(size=(options.samples - len(fixed), *mean.shape)) * self._spread
             plans = np.clip(np.concatenate((fixed, drawn)), -1.0, 1.0)
-            costs = self._costs(futures.drive(self._controller, plans, self._hold, self._terrain), field)
+            costs = self._costs(rollouts.drive(self._controller, plans, self._hold, self._terrain), field)
             order = np.argsort(costs, kind="stable")
             mean = plans[order[: max(1, options.samples // 10)]].mean(axis=0)
             fixed = np.stack((plans[order[0]], mean))
@@ -371,7 +371,7 @@ class PlannerPolicy:
         return np.asarray(self._sequence[np.rint(at).astype(int)])
 
     def _costs(self, ends: Ends, field: FieldPlan) -> Array:
-        """(n,) what each future costs, in metres of good ground."""
+        """(n,) what each roll-out costs, in metres of good ground."""
         options = self.options
         rest = np.where(ends.reached, 0.0, field.cost_to_go(ends.place))
         rest[~np.isfinite(rest)] = options.failure_price

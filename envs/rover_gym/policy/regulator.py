@@ -25,7 +25,7 @@ The wheels of a skid-steered rover slip sideways in every turn, and their loads 
 `feedforward + min(k, m / n / response) e`, without limit.
 
 The observed traction is that of the last physics step, in which a wheel may just have hit a rock. It is limited to the
-value that the previous torque could have balanced with a change of the rim speed by LEAP.
+value that the previous torque could have balanced with a change of the rim speed by RIM_SPEED_CHANGE.
 """
 
 import math
@@ -43,7 +43,7 @@ Array = npt.NDArray[np.float64]
 SLACK = 0.5
 
 #: Largest change of a rim's speed in a control period that explains an observed traction, m/s.
-LEAP = 1.5
+RIM_SPEED_CHANGE = 1.5
 
 #: Differences of the speeds of rim and ground, m/s, up to which a wheel rolls, and from which on it spins. With them,
 #: on 60 fields of difficulties 1 and 1.5 each, the baseline reached 48 and 24 goals, without them 48 and 22.
@@ -110,7 +110,7 @@ class WheelRegulator:
         k = self._spin_gain
         applied = seen[:, self._previous] / self._entry_per_force
         traction = self._force_scale * seen[:, self._traction] * (seen[:, self._contact] > 0.5)
-        traction = np.clip(traction, applied - LEAP * k, applied + LEAP * k)
+        traction = np.clip(traction, applied - RIM_SPEED_CHANGE * k, applied + RIM_SPEED_CHANGE * k)
         slack = SLACK * np.clip(seen[:, self._load], 0.0, 1.0) * (1.0 - self._spin(seen, rim))
 
         direction = np.where(missing < 0.0, -1.0, 1.0)

@@ -78,9 +78,9 @@ class Run:
     @property
     def whole(self) -> Self:
         """The run with all samples of its file, of which `resample` and `at` have kept some."""
-        if self.trajectory.thinned is None:
+        if self.trajectory.original is None:
             return self
-        changed: Any = replace(self, trajectory=self.trajectory.thinned[0])  # type: ignore[type-var]
+        changed: Any = replace(self, trajectory=self.trajectory.original[0])  # type: ignore[type-var]
         return changed  # type: ignore[no-any-return]
 
     def mean(
@@ -101,7 +101,7 @@ class Run:
                 return measured
             window = float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
         columns = moving_mean(whole.time, measured.reshape(len(measured), -1), window)
-        rows = slice(None) if self.trajectory.thinned is None else self.trajectory.thinned[1]
+        rows = slice(None) if self.trajectory.original is None else self.trajectory.original[1]
         result: npt.NDArray[np.float64] = columns[rows].reshape(-1, *measured.shape[1:])
         return result
 

@@ -55,14 +55,14 @@ class Trajectory:
         units: The units of the data sets, by name.
         attributes: Metadata of the run, with JSON values decoded.
         terrain: The ground; None if the file holds none.
-        thinned: Of a run with fewer samples than its file: the whole run, and the indices of these samples in it.
+        original: Of a run with fewer samples than its file: the whole run, and the indices of these samples in it.
     """
 
     data: Mapping[str, npt.NDArray[np.float64]]
     units: Mapping[str, str]
     attributes: Mapping[str, Any]
     terrain: Terrain | None = None
-    thinned: tuple[Trajectory, npt.NDArray[np.int64]] | None = None
+    original: tuple[Trajectory, npt.NDArray[np.int64]] | None = None
 
     def __getitem__(self, name: str) -> npt.NDArray[np.float64]:
         """The data set of a name.
@@ -75,9 +75,9 @@ class Trajectory:
         return self.data[name]
 
     def at(self, rows: npt.NDArray[np.int64]) -> Trajectory:
-        """Some samples of the run, by their indices `(n,)`; `thinned` keeps all of them."""
-        whole, kept = (self, rows) if self.thinned is None else (self.thinned[0], self.thinned[1][rows])
-        return replace(self, data={name: values[rows] for name, values in self.data.items()}, thinned=(whole, kept))
+        """Some samples of the run, by their indices `(n,)`; `original` keeps all of them."""
+        whole, kept = (self, rows) if self.original is None else (self.original[0], self.original[1][rows])
+        return replace(self, data={name: values[rows] for name, values in self.data.items()}, original=(whole, kept))
 
 
 def read_trajectory(path: str | Path) -> Trajectory:

@@ -90,7 +90,7 @@ def check_display(field: str) -> None:
     """Rejects a window where the system has no display.
 
     Raises:
-        OptionError: Neither X11 nor Wayland has a display, and SDL is not told to do without.
+        OptionError: Neither X11 nor Wayland has a display, and SDL is not set to do without.
     """
     named = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER")
     if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in named):

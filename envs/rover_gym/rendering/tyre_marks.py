@@ -13,7 +13,7 @@ OPACITY = 0.3
 
 TOUCHING = 0.005  # m, gap up to which a wheel marks the ground
 
-STEP, LEAP = 0.03, 1.0  # m, between two points of a mark, and beyond which the rover has been set elsewhere
+STEP, RESET_DISTANCE = 0.03, 1.0  # m, between two points of a mark, and beyond which the rover has been set elsewhere
 
 MOST = 400  # points of each mark; older ones are forgotten
 
@@ -54,7 +54,7 @@ class TyreMarks:
             touches = centre[1] - radius - height < TOUCHING + 0.1 * radius  # on a slope the foot lies aside
             place = np.array([centre[0], height + LIFT if touches else np.nan, centre[2]])
             far = float(np.hypot(*(place - path[-1])[[0, 2]])) if path else 0.0
-            if far > (STEP if stands else LEAP):
+            if far > (STEP if stands else RESET_DISTANCE):
                 self._forget()
             elif path and far < STEP:
                 continue

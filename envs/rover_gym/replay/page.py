@@ -34,7 +34,7 @@ SCRIPTS = (
     "view.js",
     "ruts.js",
     "grains.js",
-    "sights.js",
+    "markers.js",
     "overlays.js",
     "eye.js",
     "curves.js",

@@ -11,7 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.spec_json import as_json
 from rover_gym.mechanics import OptionError
-from rover_gym.replay.sights import SENSORS
+from rover_gym.replay.overlays import SENSORS
 from rover_gym.replay.tape import Tape, Watched
 from rover_gym.validation import checked, known_keys, refuse
 

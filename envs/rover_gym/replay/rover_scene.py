@@ -14,6 +14,7 @@ from rover_gym.record.channels import outcome_words
 from rover_gym.record.rover_run import moving_mean
 from rover_gym.rendering.appearance import GROUND_COLOUR_2, HAZE, SAND_GROUND, WHEEL_COLOURS
 from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents, with_ghost
+from rover_gym.replay.overlays import recorded_overlays
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 from rover_gym.replay.scenery import (
     MOST_HEIGHTS,
@@ -26,7 +27,6 @@ from rover_gym.replay.scenery import (
     surroundings,
     trunk_path,
 )
-from rover_gym.replay.sights import recorded_sights
 from rover_gym.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
 from rover_gym.rotations import continuous, quaternions
 
@@ -172,18 +172,18 @@ def rover_scene(run: RoverRun, *, follow: bool, ghost: RoverRun | None = None) -
         FrameChannel.turns("normals", normals),
     ]
     attributes = run.trajectory.attributes
-    sights = recorded_sights(run.trajectory.data, attributes.get("scene", {}), run.terrain)
-    told = run.trajectory.data.get("friction")
-    if told is not None and told.ndim == 1:  # a live drive may change it
-        scene.channels.append(FrameChannel.fine("friction", told[:, None, None]))
+    overlays = recorded_overlays(run.trajectory.data, attributes.get("scene", {}), run.terrain)
+    recorded = run.trajectory.data.get("friction")
+    if recorded is not None and recorded.ndim == 1:  # a live drive may change it
+        scene.channels.append(FrameChannel.fine("friction", recorded[:, None, None]))
     elif (friction := _friction(attributes)) is None:
-        sights.missing["cones"] = "this run has no recorded friction coefficient"
+        overlays.missing["cones"] = "this run has no recorded friction coefficient"
     else:
         scene.facts["friction"] = friction
     if "q" in run.trajectory.data:
         scene.channels.append(mass_channel(run))
-    scene.channels += sights.channels()
-    sights.describe(scene, run.model)
+    scene.channels += overlays.channels()
+    overlays.describe(scene, run.model)
     scene.arrays["trail"] = ("f4", marks(run, wheels, points).ravel())
     ruts = rut_edits(run, wheels, points, across)
     if ruts is not None:
@@ -204,8 +204,8 @@ def _gravity(run: RoverRun) -> float:
 def _friction(attributes: Mapping[str, Any]) -> float | None:
     """The friction coefficient of wheels and ground, as far as a run says it."""
     for part in ("scene", "solver"):
-        told = attributes.get(part)
-        value = told.get("friction") if isinstance(told, dict) else None
+        settings = attributes.get(part)
+        value = settings.get("friction") if isinstance(settings, dict) else None
         if isinstance(value, (int, float)) and 0.0 <= value < np.inf:
             return float(value)
     return None
@@ -219,14 +219,14 @@ def facts(run: RoverRun) -> list[str]:
     rocks = scene.get("rocks")
     difficulty = rocks.get("difficulty") if isinstance(rocks, dict) else None
     slope = scene.get("slope")
-    told = [
+    found = [
         f"scene: {terrain}" if isinstance(terrain, str) else None,
         f"slope: {np.degrees(slope):.1f} degrees" if isinstance(slope, float) and slope else None,
         f"seed: {seed}" if isinstance(seed, (int, np.integer)) else None,
         f"difficulty: {difficulty:.2g}" if isinstance(difficulty, float) else None,
         f"outcome: {outcome_words(str(outcome))}" if outcome is not None else None,
     ]
-    return [fact[:LONGEST_FACT] for fact in told if fact is not None]
+    return [fact[:LONGEST_FACT] for fact in found if fact is not None]
 
 
 def _depths(run: RoverRun, wheels: list[tuple[str, str]]) -> Chart:

@@ -12,7 +12,7 @@ from rover_gym.env.reward_terms import WEIGHTS
 from rover_gym.record.channels import Channel, RoverSampler, describe
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import OF_EPISODES
-from rover_gym.replay.sights import Sights, sights_now
+from rover_gym.replay.overlays import Overlays, live_overlays
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -70,20 +70,20 @@ class Tape:
         sensors: Sequence[str] = (),
     ) -> None:
         self._sampler, self._driver, self._sensors = RoverSampler(rover.model), driver, sensors
-        sights = self._sights(rover)
+        overlays = self._overlays(rover)
         channels = [
             *self._sampler.channels,
             *OF_EPISODES,
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
-            *sights.tracks(),
+            *overlays.tracks(),
         ]
         scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
-        scene |= {"goal_tolerance": rover.goal_tolerance, **sights.facts()}
+        scene |= {"goal_tolerance": rover.goal_tolerance, **overlays.facts()}
         attributes = describe(rover.simulation, f"an episode of {title}", scene, seed=seed)
         self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
 
-    def _sights(self, rover: RoverEnv) -> Sights:
-        return sights_now(rover, self._driver.policy, self._driver.state, self._sensors)
+    def _overlays(self, rover: RoverEnv) -> Overlays:
+        return live_overlays(rover, self._driver.policy, self._driver.state, self._sensors)
 
     def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
         """Adds the environment's current state."""
@@ -94,7 +94,7 @@ class Tape:
             "slip_ratio": info["slip_ratio"],
             "motor_energy": info["energy"],
             "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
-            **self._sights(rover).row(),
+            **self._overlays(rover).row(),
         }
         self.recorder.append(row)
 

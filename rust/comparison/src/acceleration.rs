@@ -5,7 +5,7 @@
 
 use crate::whole::Whole;
 use rover_core::contact::Activation;
-use rover_core::integrator::{Start, StepError, StepOptions};
+use rover_core::integrator::{StepError, StepOptions, StepStart};
 use rover_core::solver::{SolveReport, SolverWorkspace, solve};
 
 /// Largest displacement of any cluster, m, that `y` (nv) causes away from the contact points.
@@ -56,7 +56,7 @@ pub(crate) fn free_acceleration<S: Whole>(
         return Err(StepError::SingularMassMatrix { time });
     }
     a.resize(v.len(), 0.0);
-    let start = Start {
+    let start = StepStart {
         configuration: q,
         v,
     };

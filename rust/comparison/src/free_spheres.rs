@@ -8,7 +8,7 @@
 
 use rover_core::contact::{Activation, ContactFrame};
 use rover_core::integrator::{
-    Dynamics, Forces, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    Dynamics, Forces, MechanicalSystem, StepOptions, StepStart, UnilateralContact,
 };
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact};
@@ -70,7 +70,7 @@ impl Bodies {
 
 /// Where the bodies are.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Placement {
+pub struct BodyPlacement {
     /// Centres of the bodies, the box last, world, m.
     pub centres: Vec<Vector3<f64>>,
     /// Attitude of the box.
@@ -155,7 +155,11 @@ pub(crate) fn apart(a: &Vector3<f64>, b: &Vector3<f64>, radius: f64) -> (f64, Ve
 impl Bodies {
     /// Gap, normal and arms of the contact of a name.
     #[inline]
-    fn measure(&self, at: &Placement, key: (u32, u32)) -> (f64, Vector3<f64>, [Vector3<f64>; 2]) {
+    fn measure(
+        &self,
+        at: &BodyPlacement,
+        key: (u32, u32),
+    ) -> (f64, Vector3<f64>, [Vector3<f64>; 2]) {
         let (i, j) = (key.0 as usize, key.1 as usize);
         let radius = self.kind.radius;
         let none = Vector3::zeros();
@@ -226,8 +230,8 @@ pub(crate) fn spin(v: &[f64], body: usize) -> Vector3<f64> {
 /// Poses and matrices of a step: scratch.
 #[derive(Clone, Debug, Default)]
 pub struct SphereScratch {
-    middle: Placement,
-    pub(crate) end: Placement,
+    middle: BodyPlacement,
+    pub(crate) end: BodyPlacement,
     grid: Pairs,
     rows: Vec<PairContact<3, NV>>,
     inverse_masses: Vec<[f64; NV]>,
@@ -274,19 +278,19 @@ fn add_transposed(
 
 impl Dynamics for SphereSystem<'_> {
     type T = f64;
-    type Configuration = Placement;
+    type Configuration = BodyPlacement;
 
     fn nv(&self) -> usize {
         NV * self.bodies.count()
     }
 
-    fn set_moved(&self, from: &Placement, v: &[f64], h: f64, to: &mut Placement) {
+    fn set_moved(&self, from: &BodyPlacement, v: &[f64], h: f64, to: &mut BodyPlacement) {
         to.centres.clone_from(&from.centres);
         to.turn = from.turn;
         self.advance(to, v, h);
     }
 
-    fn advance(&self, q: &mut Placement, v: &[f64], h: f64) {
+    fn advance(&self, q: &mut BodyPlacement, v: &[f64], h: f64) {
         for (i, x) in q.centres.iter_mut().enumerate() {
             *x += linear(v, i) * h;
         }
@@ -295,13 +299,13 @@ impl Dynamics for SphereSystem<'_> {
         }
     }
 
-    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Placement, to: &mut Placement) {
+    fn take(&self, lanes: impl Fn(usize) -> bool, from: &BodyPlacement, to: &mut BodyPlacement) {
         if lanes(0) {
             to.clone_from(from);
         }
     }
 
-    fn is_finite(&self, q: &Placement) -> bool {
+    fn is_finite(&self, q: &BodyPlacement) -> bool {
         let turn = q.turn.coords.iter();
         q.centres
             .iter()
@@ -310,15 +314,15 @@ impl Dynamics for SphereSystem<'_> {
             .all(|x| x.is_finite())
     }
 
-    fn normalise(&self, q: &mut Placement) {
+    fn normalise(&self, q: &mut BodyPlacement) {
         q.turn.renormalize();
     }
 
-    fn place_middle(&mut self, q: &Placement) {
+    fn place_middle(&mut self, q: &BodyPlacement) {
         self.parts.middle.clone_from(q);
     }
 
-    fn place_end(&mut self, q: &Placement) {
+    fn place_end(&mut self, q: &BodyPlacement) {
         self.parts.end.clone_from(q);
     }
 
@@ -367,7 +371,7 @@ impl Forces for SphereSystem<'_> {
     fn load(
         &mut self,
         options: &StepOptions,
-        _start: Start<'_, Placement>,
+        _start: StepStart<'_, BodyPlacement>,
         v_mean: &[f64],
         y: &mut [f64],
     ) {

@@ -39,4 +39,4 @@ pub use generalised_alpha::GeneralisedAlpha;
 pub use penalty::Penalty;
 pub use projected_to_convergence::ProjectedToConvergence;
 pub use schatzman_paoli::SchatzmanPaoli;
-pub use scheme::{Kind, SCHEMES, Scheme, Stepper};
+pub use scheme::{SCHEMES, Scheme, SchemeFamily, Stepper};

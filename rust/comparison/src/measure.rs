@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use rover_core::integrator::StepError;
-use rover_core::planar::{Ball, ContactRule, Line};
+use rover_core::planar::{ContactRule, Line, PlanarBall};
 use rover_core::simulation::PlanarSimulation;
 
 use serde::Serialize;
@@ -15,18 +15,18 @@ use crate::scenes::{
     G, MASS, WHEEL_LOAD, ball_above, ball_on_sine, bouncing_at, driving, flight, flight_at,
     options, rolling, sliding,
 };
-use crate::{EventDriven, Kind, SCHEMES, Scheme, Stepper};
+use crate::{EventDriven, SCHEMES, Scheme, SchemeFamily, Stepper};
 
 /// Steps of one scene from the coarsest, each half of the one before, and the error at each.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Curve {
+pub struct ConvergenceCurve {
     /// s.
     pub h: Vec<f64>,
     /// In the scene's unit; none where the run failed or left the scene by more than 10.
     pub error: Vec<Option<f64>>,
 }
 
-impl Curve {
+impl ConvergenceCurve {
     /// Slope of the straight line through log error against log h; none
     /// with fewer than three errors.
     #[must_use]
@@ -58,8 +58,8 @@ fn curve(
     duration: f64,
     coarsest: usize,
     mut error_with: impl FnMut(usize, f64) -> Result<f64, MeasureError>,
-) -> Curve {
-    let mut curve = Curve {
+) -> ConvergenceCurve {
+    let mut curve = ConvergenceCurve {
         h: Vec::new(),
         error: Vec::new(),
     };
@@ -75,7 +75,7 @@ fn curve(
 
 /// Which motion a curve is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum BenchmarkMotion {
     /// The two-wheel rover in the air, against the closed form.
     Flight,
     /// The ball rolling in a valley.
@@ -105,13 +105,17 @@ fn run(
 ///
 /// # Errors
 /// A step that cannot be taken.
-pub fn end_of(scheme: &Scheme, motion: Motion, n: usize) -> Result<Vec<f64>, MeasureError> {
+pub fn end_of(
+    scheme: &Scheme,
+    motion: BenchmarkMotion,
+    n: usize,
+) -> Result<Vec<f64>, MeasureError> {
     let h = DURATION / n as f64;
     match motion {
-        Motion::Flight => run(flight(scheme, h)?, &scheme.stepper(WHEEL_LOAD, 0.0), n),
-        Motion::Rolling => run(rolling(scheme, h)?, &scheme.stepper(MASS, 0.0), n),
-        Motion::Sliding => run(sliding(scheme, h)?, &scheme.stepper(MASS, 0.0), n),
-        Motion::Driving => run(driving(scheme, h)?, &scheme.stepper(WHEEL_LOAD, 0.0), n),
+        BenchmarkMotion::Flight => run(flight(scheme, h)?, &scheme.stepper(WHEEL_LOAD, 0.0), n),
+        BenchmarkMotion::Rolling => run(rolling(scheme, h)?, &scheme.stepper(MASS, 0.0), n),
+        BenchmarkMotion::Sliding => run(sliding(scheme, h)?, &scheme.stepper(MASS, 0.0), n),
+        BenchmarkMotion::Driving => run(driving(scheme, h)?, &scheme.stepper(WHEEL_LOAD, 0.0), n),
     }
 }
 
@@ -125,9 +129,9 @@ pub fn reference_scheme() -> Scheme {
 ///
 /// # Errors
 /// A step that cannot be taken.
-pub fn reference(motion: Motion) -> Result<Vec<f64>, MeasureError> {
+pub fn reference(motion: BenchmarkMotion) -> Result<Vec<f64>, MeasureError> {
     match motion {
-        Motion::Flight => Ok(flight_at(DURATION)?.as_slice().to_vec()),
+        BenchmarkMotion::Flight => Ok(flight_at(DURATION)?.as_slice().to_vec()),
         _ => end_of(&reference_scheme(), motion, REFERENCE),
     }
 }
@@ -136,7 +140,11 @@ pub fn reference(motion: Motion) -> Result<Vec<f64>, MeasureError> {
 ///
 /// # Errors
 /// No reference.
-pub fn order_in(scheme: &Scheme, motion: Motion, coarsest: usize) -> Result<Curve, MeasureError> {
+pub fn order_in(
+    scheme: &Scheme,
+    motion: BenchmarkMotion,
+    coarsest: usize,
+) -> Result<ConvergenceCurve, MeasureError> {
     let exact = reference(motion)?;
     let error = |n, _| {
         let end = end_of(scheme, motion, n)?;
@@ -153,7 +161,7 @@ pub const RESTITUTION: f64 = 0.8;
 
 /// Mean error of the velocity of a bouncing ball over 2 s and 16 starting heights, m/s.
 #[must_use]
-pub fn order_across_impacts(scheme: &Scheme, coarsest: usize) -> Curve {
+pub fn order_across_impacts(scheme: &Scheme, coarsest: usize) -> ConvergenceCurve {
     let duration = 2.0;
     curve(duration, coarsest, |n, h| {
         let mut sum = 0.0;
@@ -174,7 +182,7 @@ pub fn order_across_impacts(scheme: &Scheme, coarsest: usize) -> Curve {
 
 /// Largest gap and deepest penetration of the wheels during the drive over the sine, m.
 #[must_use]
-pub fn drift(scheme: &Scheme, coarsest: usize) -> Curve {
+pub fn drift(scheme: &Scheme, coarsest: usize) -> ConvergenceCurve {
     curve(DURATION, coarsest, |n, h| {
         let mut simulation = driving(scheme, h)?;
         let stepper = scheme.stepper(WHEEL_LOAD, 0.0);
@@ -205,7 +213,7 @@ pub struct EnergyBehaviour {
 
 /// Step of the energy's runs, s: the penalty's stiffness allows no larger one.
 fn energy_step(scheme: &Scheme) -> f64 {
-    if matches!(scheme.kind, Kind::Penalty(..)) {
+    if matches!(scheme.kind, SchemeFamily::Penalty(..)) {
         1e-3
     } else {
         5e-3
@@ -304,7 +312,7 @@ pub fn creep(scheme: &Scheme) -> Result<f64, MeasureError> {
     let (alpha, mu) = (0.3_f64, 0.5);
     let ground = Line::new(-alpha.tan(), 0.0)?;
     // No friction turns it: a block.
-    let block = Ball::new(MASS, 0.3, 1e12)?;
+    let block = PlanarBall::new(MASS, 0.3, 1e12)?;
     let options = scheme.options(&options(mu, 0.0, 1e-3));
     let mut simulation =
         PlanarSimulation::new(block, Arc::new(ground), ContactRule::Nearest, options)?;
@@ -335,21 +343,21 @@ pub fn accumulation(e: f64, duration: f64) -> Result<Option<f64>, MeasureError> 
 
 /// Everything about a scheme.
 #[derive(Clone, Debug, Serialize)]
-pub struct Measured {
+pub struct SchemeMeasurement {
     /// For tables.
     pub name: &'static str,
     /// The rover in the air.
-    pub flight: Curve,
+    pub flight: ConvergenceCurve,
     /// The ball rolling.
-    pub rolling: Curve,
+    pub rolling: ConvergenceCurve,
     /// The ball sliding.
-    pub sliding: Curve,
+    pub sliding: ConvergenceCurve,
     /// The rover driving.
-    pub driving: Curve,
+    pub driving: ConvergenceCurve,
     /// L1 in the velocity across impacts.
-    pub impacts: Curve,
+    pub impacts: ConvergenceCurve,
     /// Gap during the drive.
-    pub drift: Curve,
+    pub drift: ConvergenceCurve,
     /// Fitted orders of the six, in this order.
     pub orders: [Option<f64>; 6],
     /// Long runs.
@@ -368,25 +376,26 @@ pub struct Measured {
 ///
 /// # Errors
 /// No reference.
-pub fn measure(scheme: &Scheme) -> Result<Measured, MeasureError> {
+pub fn measure(scheme: &Scheme) -> Result<SchemeMeasurement, MeasureError> {
     // The penalty's stiffness bounds its step.
-    let finer = if matches!(scheme.kind, Kind::Penalty(..)) {
+    let finer = if matches!(scheme.kind, SchemeFamily::Penalty(..)) {
         16
     } else {
         1
     };
     let coarsest = 16 * finer;
     let [flight, rolling, sliding, driving] = [
-        order_in(scheme, Motion::Flight, 16)?,
-        order_in(scheme, Motion::Rolling, coarsest)?,
-        order_in(scheme, Motion::Sliding, coarsest)?,
-        order_in(scheme, Motion::Driving, coarsest)?,
+        order_in(scheme, BenchmarkMotion::Flight, 16)?,
+        order_in(scheme, BenchmarkMotion::Rolling, coarsest)?,
+        order_in(scheme, BenchmarkMotion::Sliding, coarsest)?,
+        order_in(scheme, BenchmarkMotion::Driving, coarsest)?,
     ];
     let impacts = order_across_impacts(scheme, 100 * finer);
     let drift = drift(scheme, coarsest);
     let cost = cost(scheme).ok();
-    let orders = [&flight, &rolling, &sliding, &driving, &impacts, &drift].map(Curve::order);
-    Ok(Measured {
+    let orders =
+        [&flight, &rolling, &sliding, &driving, &impacts, &drift].map(ConvergenceCurve::order);
+    Ok(SchemeMeasurement {
         name: scheme.name,
         orders,
         flight,

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::{SVector, Vector2, Vector3};
 use rover_core::planar::{
-    Ball, ContactRule, Curve, Ground, Line, PlanarError, PlanarWheel, Sine, TwoWheelRover,
+    ContactRule, Curve, Line, PlanarBall, PlanarError, PlanarGround, PlanarWheel, Sine,
+    TwoWheelRover,
 };
 use rover_core::simulation::PlanarSimulation;
 
@@ -37,8 +38,8 @@ pub fn options(friction: f64, restitution: f64, time_step: f64) -> StepOptions {
 }
 
 /// A homogeneous disc.
-fn disc() -> Result<Ball, PlanarError> {
-    Ball::new(MASS, RADIUS, 0.5 * MASS * RADIUS * RADIUS)
+fn disc() -> Result<PlanarBall, PlanarError> {
+    PlanarBall::new(MASS, RADIUS, 0.5 * MASS * RADIUS * RADIUS)
 }
 
 /// A two-wheel rover without symmetry.
@@ -78,7 +79,7 @@ pub fn ball_above(
 pub fn ball_on(
     scheme: &Scheme,
     options: &StepOptions,
-    ground: impl Ground + 'static,
+    ground: impl PlanarGround + 'static,
     centre: [f64; 2],
     v: [f64; 3],
 ) -> Result<PlanarSimulation, MeasureError> {

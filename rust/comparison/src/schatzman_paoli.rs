@@ -22,7 +22,7 @@ use std::cell::RefCell;
 
 use crate::whole::Whole;
 use rover_core::integrator::{
-    Integrator, KeyOf, Probe, ScratchOf, Start, StateMut, StepError, StepOptions, StepReport,
+    Integrator, KeyOf, Probe, ScratchOf, StateMut, StepError, StepOptions, StepReport, StepStart,
     StepStatus, UnilateralContact, WarmStart,
 };
 use rover_core::solver::{SolveReport, SolverWorkspace};
@@ -118,7 +118,7 @@ impl<S: Whole> Touching<S> {
 fn iterate<S: Whole>(
     system: &mut S,
     options: &StepOptions,
-    start: Start<'_, S::Configuration>,
+    start: StepStart<'_, S::Configuration>,
     touching: &mut Touching<S>,
     solver: &mut SolverWorkspace,
     report: &mut StepReport,
@@ -210,7 +210,7 @@ impl<S: Whole> Integrator<S> for SchatzmanPaoli {
         };
         let mut touching = Touching::<S>::new(contacts, q);
         warm_start.recall(&touching.contacts, d, &mut touching.p);
-        let start = Start {
+        let start = StepStart {
             configuration: q,
             v: before,
         };

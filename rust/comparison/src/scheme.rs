@@ -10,7 +10,7 @@ use crate::{EventDriven, GeneralisedAlpha, Penalty, ProjectedToConvergence, Scha
 
 /// Which family.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum SchemeFamily {
     /// The rover's own.
     MoreauJean {
         /// Linearised or Newton.
@@ -36,7 +36,7 @@ pub struct Scheme {
     /// For tables.
     pub name: &'static str,
     /// What steps.
-    pub kind: Kind,
+    pub kind: SchemeFamily,
 }
 
 /// All that are compared.
@@ -59,24 +59,24 @@ pub const SCHEMES: [Scheme; 8] = [
     },
     Scheme {
         name: "Generalised-α, ρ = 0.8",
-        kind: Kind::GeneralisedAlpha(0.8),
+        kind: SchemeFamily::GeneralisedAlpha(0.8),
     },
     Scheme {
         name: "Schatzman–Paoli",
-        kind: Kind::SchatzmanPaoli,
+        kind: SchemeFamily::SchatzmanPaoli,
     },
     Scheme {
         name: "Event-driven, Runge–Kutta 4",
-        kind: Kind::EventDriven,
+        kind: SchemeFamily::EventDriven,
     },
     Scheme {
         name: "Penalty, 1e5 N/m",
-        kind: Kind::Penalty(1e5, 1e-2),
+        kind: SchemeFamily::Penalty(1e5, 1e-2),
     },
 ];
 
-const fn moreau_jean(variant: Variant, theta: f64, stabilisation: Stabilisation) -> Kind {
-    Kind::MoreauJean {
+const fn moreau_jean(variant: Variant, theta: f64, stabilisation: Stabilisation) -> SchemeFamily {
+    SchemeFamily::MoreauJean {
         variant,
         theta,
         stabilisation,
@@ -88,7 +88,7 @@ impl Scheme {
     #[must_use]
     pub fn options(&self, base: &StepOptions) -> StepOptions {
         let mut options = base.clone();
-        if let Kind::MoreauJean {
+        if let SchemeFamily::MoreauJean {
             variant,
             theta,
             stabilisation,
@@ -106,11 +106,13 @@ impl Scheme {
     #[must_use]
     pub fn stepper(&self, mass: f64, restitution: f64) -> Stepper {
         match self.kind {
-            Kind::MoreauJean { variant, .. } => Stepper::MoreauJean(variant),
-            Kind::GeneralisedAlpha(rho) => Stepper::GeneralisedAlpha(GeneralisedAlpha::new(rho)),
-            Kind::SchatzmanPaoli => Stepper::SchatzmanPaoli(SchatzmanPaoli::default()),
-            Kind::EventDriven => Stepper::EventDriven(EventDriven::default()),
-            Kind::Penalty(stiffness, slip) => Stepper::Penalty(Penalty::with_restitution(
+            SchemeFamily::MoreauJean { variant, .. } => Stepper::MoreauJean(variant),
+            SchemeFamily::GeneralisedAlpha(rho) => {
+                Stepper::GeneralisedAlpha(GeneralisedAlpha::new(rho))
+            }
+            SchemeFamily::SchatzmanPaoli => Stepper::SchatzmanPaoli(SchatzmanPaoli::default()),
+            SchemeFamily::EventDriven => Stepper::EventDriven(EventDriven::default()),
+            SchemeFamily::Penalty(stiffness, slip) => Stepper::Penalty(Penalty::with_restitution(
                 stiffness,
                 mass,
                 restitution,

@@ -4,6 +4,7 @@
 //! The first three: spheres of 10 kg and radius 0.1 m without friction.
 //! SimBenchmark's y and z are exchanged: y is up here.
 
+use rover_core::geometry::terrain::rocks::SplitMix64;
 use rover_core::integrator::{OptionsError, Stabilisation, StepError, StepOptions};
 use rover_core::nalgebra::Vector3;
 use serde::Serialize;
@@ -49,28 +50,6 @@ pub const JITTER: f64 = 1e-3;
 /// Interval of measurement, s; a longer step is measured at each step.
 pub const SAMPLE: f64 = 0.01;
 
-/// Numbers by splitmix64: short, so that other programs can make the same block.
-#[derive(Clone, Copy, Debug)]
-pub struct Random(u64);
-
-impl Random {
-    /// From a seed.
-    #[must_use]
-    pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// Uniform in [0, 1).
-    pub fn in_unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// Which way the box is pushed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Push {
@@ -96,7 +75,7 @@ impl Push {
 
 /// A scene of free spheres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scene {
+pub enum SphereScene {
     /// 6 x 6 x 6 spheres, e = 0, lowest centres 0.11 m above the plane.
     Block,
     /// 6 x 6 x 6 spheres, e = 1, lowest centres 1.1 m above the plane.
@@ -120,7 +99,7 @@ pub enum Treatment {
     Convergence,
 }
 
-impl Scene {
+impl SphereScene {
     /// All of them.
     pub const ALL: [Self; 6] = [
         Self::Block,
@@ -244,10 +223,11 @@ impl Scene {
             Self::Block => 0.11,
             Self::ElasticBlock => 1.1,
         };
-        let mut random = Random::new(1);
+        // SplitMix64 is short, so that other programs can make the same block.
+        let mut random = SplitMix64::new(1);
         let mut points = lattice(6, 6, SPACING, lowest);
         for x in points.iter_mut().flat_map(|x| x.iter_mut()) {
-            *x += JITTER * (2.0 * random.in_unit() - 1.0);
+            *x += JITTER * (2.0 * random.uniform() - 1.0);
         }
         points
     }
@@ -336,7 +316,7 @@ fn velocity_error(
 /// # Errors
 /// A step that failed, in words.
 pub fn run(
-    scene: Scene,
+    scene: SphereScene,
     time_step: f64,
     treatment: Treatment,
     duration: f64,

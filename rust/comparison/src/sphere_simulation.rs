@@ -10,8 +10,8 @@ use rover_core::simulation::{ActiveContact, LocatedContact, Scene, Simulation, S
 
 use crate::Stepper;
 use crate::free_spheres::{
-    Bodies, NV, Pairs, Placement, SphereContact, SphereKind, SphereScratch, SphereSystem, apart,
-    linear, spin,
+    Bodies, BodyPlacement, NV, Pairs, SphereContact, SphereKind, SphereScratch, SphereSystem,
+    apart, linear, spin,
 };
 use crate::slab::{CORNERS, Slab};
 
@@ -38,8 +38,8 @@ impl LocatedContact for SphereContact {
 }
 
 impl Scene for Bodies {
-    type Configuration = Placement;
-    type Moved = Placement;
+    type Configuration = BodyPlacement;
+    type Moved = BodyPlacement;
     type Contact = SphereContact;
     type Command = ();
     type Memory = ();
@@ -50,7 +50,7 @@ impl Scene for Bodies {
         NV * self.count()
     }
 
-    fn moved(&self, q: &Placement) -> Placement {
+    fn moved(&self, q: &BodyPlacement) -> BodyPlacement {
         q.clone()
     }
 
@@ -88,7 +88,7 @@ impl Scene for Bodies {
     fn energy(
         &self,
         options: &StepOptions,
-        state: &State<Placement>,
+        state: &State<BodyPlacement>,
         _command: &Self::Command,
     ) -> Energy {
         let mut energy = Energy::default();
@@ -110,7 +110,7 @@ impl Scene for Bodies {
     }
 
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool {
-        let Placement { centres, turn } = &snapshot.state.configuration;
+        let BodyPlacement { centres, turn } = &snapshot.state.configuration;
         let mut numbers = centres.iter().flatten().chain(turn.coords.iter());
         let mut bodies = snapshot
             .active
@@ -170,7 +170,7 @@ impl SphereSimulation {
         let turn = UnitQuaternion::identity();
         Ok(Self {
             stepper: Stepper::MoreauJean(options.variant),
-            inner: Simulation::of(bodies, Placement { centres, turn }, options)?,
+            inner: Simulation::of(bodies, BodyPlacement { centres, turn }, options)?,
             grid: Pairs::default(),
         })
     }
@@ -283,7 +283,7 @@ impl SphereSimulation {
         };
         let bodies = self.inner.scene();
         let (n, radius) = (bodies.n, bodies.kind.radius);
-        let Placement { centres, turn } = self.inner.q();
+        let BodyPlacement { centres, turn } = self.inner.q();
         for x in &centres[..n] {
             enter(radius - x.y);
         }

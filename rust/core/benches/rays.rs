@@ -82,11 +82,11 @@ fn rocks(n: u32, ground: Option<Plane>) -> SphereField {
     SphereField::new(&centres, &radii, ground).unwrap()
 }
 
-/// CPU time of this thread, or any time where the system does not tell it, s.
+/// CPU time of this thread, or wall time where the system does not provide it, s.
 fn seconds() -> f64 {
     static START: OnceLock<Instant> = OnceLock::new();
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let nanoseconds = told.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
+    let statistics = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanoseconds = statistics.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     let start = START.get_or_init(Instant::now);
     nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |time| time * 1e-9)
 }

@@ -16,10 +16,10 @@ use std::time::Instant;
 
 use exploring_scenes::{Ground, STEPS_A_COMMAND, drives};
 use rover_core::contact::Activation;
-use rover_core::contact::slots::contacts::{Contacts, Sight};
-use rover_core::contact::slots::ground::Ground as LaneGround;
-use rover_core::contact::slots::machine::Machine;
-use rover_core::contact::slots::rows::Rows;
+use rover_core::contact::slots::contacts::{ContactSlots, DetectionInput};
+use rover_core::contact::slots::ground::BlockGround as LaneGround;
+use rover_core::contact::slots::machine::SharedMachine;
+use rover_core::contact::slots::rows::ContactMatrices;
 use rover_core::geometry::Terrain;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::inertias::Inertias;
@@ -70,14 +70,14 @@ fn records(ground: Ground, n: usize) -> (Arc<Model>, Vec<Record>) {
 
 struct Block<T: Lane> {
     token: T::Token,
-    machine: Machine,
+    machine: SharedMachine,
     ground: LaneGround<T>,
     /// Poses at the midpoint and at the end, and velocity, of every step.
     states: Vec<(Poses<T>, Poses<T>, Vec<T>)>,
     factor: Factor<T>,
     models: Vec<Option<Arc<Model>>>,
-    contacts: Contacts<T>,
-    rows: Rows<T>,
+    contacts: ContactSlots<T>,
+    rows: ContactMatrices<T>,
     q: Vec<[T; 3]>,
     problems: Vec<ContactProblem>,
     fallbacks: u32,
@@ -85,7 +85,7 @@ struct Block<T: Lane> {
 
 impl<T: Lane> Block<T> {
     fn new(token: T::Token, model: &Model, records: &[Record]) -> Self {
-        let machine = Machine::of(model);
+        let machine = SharedMachine::of(model);
         let mut inertias = Inertias::new(token, &machine);
         let mut ground = LaneGround::new(token, machine.wheels.len(), machine.boxes.len());
         for lane in 0..T::LANES {
@@ -120,10 +120,10 @@ impl<T: Lane> Block<T> {
         M.update(&machine, &inertias, &states[0].0);
         let mut factor = Factor::new(token, &machine);
         assert!(M.factorise(&machine, &mut factor).all());
-        let contacts = Contacts::new(token, &machine);
+        let contacts = ContactSlots::new(token, &machine);
         Self {
             token,
-            rows: Rows::new(token, &machine, contacts.n_slots()),
+            rows: ContactMatrices::new(token, &machine, contacts.n_slots()),
             q: vec![[T::splat(token, 0.0); 3]; contacts.n_slots()],
             machine,
             models: vec![Some(Arc::new(model.clone())); T::LANES],
@@ -142,7 +142,7 @@ impl<T: Lane> Block<T> {
         if last >= 1 {
             let gravity = Vec3::splat(self.token, [0.0, -9.81, 0.0]);
             let activation = Activation::of_step(gravity, H, 0.5, 0.5 * H);
-            let sight = Sight {
+            let input = DetectionInput {
                 machine: &self.machine,
                 models: &self.models,
                 going: (1 << T::LANES) - 1,
@@ -152,7 +152,7 @@ impl<T: Lane> Block<T> {
                 needs_pieces: false,
                 activation: &activation,
             };
-            let fallbacks = self.contacts.detect(&mut self.ground, &sight);
+            let fallbacks = self.contacts.detect(&mut self.ground, &input);
             self.fallbacks += fallbacks.bits().count_ones();
         }
         if last >= 2 {

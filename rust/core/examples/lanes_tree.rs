@@ -8,7 +8,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use rover_core::contact::slots::machine::Machine;
+use rover_core::contact::slots::machine::SharedMachine;
 use rover_core::multibody::bias::{BiasScratch, bias};
 use rover_core::multibody::energy::{EnergyScratch, energy};
 use rover_core::multibody::inertias::Inertias;
@@ -32,7 +32,7 @@ const PHASES: [&str; 7] = [
 
 struct Block<T: Lane> {
     token: T::Token,
-    machine: Machine,
+    machine: SharedMachine,
     inertias: Inertias<T>,
     start: LaneConfiguration<T>,
     place: LaneConfiguration<T>,
@@ -48,7 +48,7 @@ struct Block<T: Lane> {
 
 impl<T: Lane> Block<T> {
     fn new(token: T::Token, model: &Model) -> Self {
-        let machine = Machine::of(model);
+        let machine = SharedMachine::of(model);
         let mut block = Self {
             token,
             inertias: Inertias::new(token, &machine),

@@ -7,12 +7,12 @@ use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
 /// Motion of the trunk at the begin of an interval.
-pub struct Motion {
+pub struct TrunkMotion {
     velocity: Vector3<f64>,
     attitude: UnitQuaternion<f64>,
 }
 
-impl Motion {
+impl TrunkMotion {
     /// At this moment.
     pub fn of(rover: &RoverSimulation) -> Self {
         Self {

@@ -6,7 +6,7 @@ use rover_core::multibody::{Energy, coordinates};
 use rover_core::simulation::RoverSimulation;
 
 use crate::inertial::unaccelerated;
-use crate::scene_file::Channel;
+use crate::scene_file::VariableKind;
 use crate::state::LastStep;
 
 /// The outputs of one call.
@@ -34,31 +34,31 @@ impl<'a> Reading<'a> {
     }
 
     /// An entry of an output; `None` where there is none.
-    pub fn get(&self, channel: Channel, index: usize) -> Option<f64> {
+    pub fn get(&self, channel: VariableKind, index: usize) -> Option<f64> {
         let rover = self.rover;
         let energy = || self.energy.get_or_init(|| rover.energy());
         Some(match channel {
-            Channel::Q => *self.q().get(index)?,
-            Channel::V => *rover.v().get(index)?,
-            Channel::Attitude => {
+            VariableKind::Q => *self.q().get(index)?,
+            VariableKind::V => *rover.v().get(index)?,
+            VariableKind::Attitude => {
                 let attitude = rover.q().attitude.quaternion();
                 let [x, y, z, w] = attitude.coords.into();
                 *[w, x, y, z].get(index)?
             }
-            Channel::WheelGap => *self.gaps().get(index)?,
-            Channel::WheelForce => *self.forces().get(index / 3)?.get(index % 3)?,
-            Channel::MotorTorque => *rover.motor_torques().get(index)?,
-            Channel::TrunkForce => rover.body_force(),
-            Channel::Inertial => {
+            VariableKind::WheelGap => *self.gaps().get(index)?,
+            VariableKind::WheelForce => *self.forces().get(index / 3)?.get(index % 3)?,
+            VariableKind::MotorTorque => *rover.motor_torques().get(index)?,
+            VariableKind::TrunkForce => rover.body_force(),
+            VariableKind::Inertial => {
                 let readings = self.last.inertial;
                 let readings = readings.unwrap_or_else(|| unaccelerated(rover, self.gravity));
                 *readings.get(index)?
             }
-            Channel::KineticEnergy => energy().kinetic,
-            Channel::PotentialEnergy => energy().potential,
-            Channel::Contacts => self.last.contacts,
-            Channel::SolverResidual => self.last.residual,
-            Channel::SolverIterations => self.last.iterations,
+            VariableKind::KineticEnergy => energy().kinetic,
+            VariableKind::PotentialEnergy => energy().potential,
+            VariableKind::Contacts => self.last.contacts,
+            VariableKind::SolverResidual => self.last.residual,
+            VariableKind::SolverIterations => self.last.iterations,
             _ => return None,
         })
     }

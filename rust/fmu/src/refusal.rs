@@ -5,7 +5,7 @@ use rover_core::multibody::ModelError;
 use rover_core::simulation::{CommandError, SnapshotError};
 use thiserror::Error;
 
-use crate::state::Mode;
+use crate::state::UnitMode;
 
 /// Why a call is refused. Nothing has changed.
 #[derive(Debug, Error)]
@@ -32,7 +32,7 @@ pub enum Refusal {
         /// The function.
         call: &'static str,
         /// The state of the unit.
-        mode: Mode,
+        mode: UnitMode,
     },
     /// A function that the unit does not offer.
     #[error("{call}: is not supported")]
@@ -64,7 +64,7 @@ pub enum Refusal {
         /// The variable.
         name: String,
         /// The state of the unit.
-        mode: Mode,
+        mode: UnitMode,
     },
     /// Another number of values than of variables.
     #[error("nValues: must be {expected}, is {actual}")]

@@ -5,14 +5,14 @@ use rover_core::simulation::{RoverScene, Snapshot};
 use serde::{Deserialize, Serialize};
 
 use crate::refusal::Refusal;
-use crate::state::{Inputs, LastStep, Mode, Parameters};
+use crate::state::{Inputs, LastStep, Parameters, UnitMode};
 
 /// Everything that changes in a unit.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Saved {
     /// Token of the unit that the state belongs to.
     pub token: String,
-    pub mode: Mode,
+    pub mode: UnitMode,
     pub parameters: Parameters,
     pub inputs: Inputs,
     /// Time of the master, s.

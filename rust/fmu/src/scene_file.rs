@@ -24,7 +24,7 @@ const CHECKSUM: &str = "\nCRC-32 ";
 /// What a variable of the unit is.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
-pub enum Channel {
+pub enum VariableKind {
     Time,
     Friction,
     Restitution,
@@ -54,7 +54,7 @@ pub enum Channel {
 pub struct Variable {
     pub reference: u32,
     pub name: String,
-    pub channel: Channel,
+    pub channel: VariableKind,
     pub index: usize,
     /// 1 or -1: of the variable, where that of the channel is positive.
     pub sign: f64,
@@ -182,7 +182,7 @@ impl SceneFile {
 
 impl SceneFile {
     /// The refusal of a command, which names the variable in the place of the command's entry.
-    pub fn refusal(&self, channel: Channel, error: CommandError) -> Refusal {
+    pub fn refusal(&self, channel: VariableKind, error: CommandError) -> Refusal {
         let CommandError::BeyondLimit {
             index,
             value,

@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// States of a unit, as the standard names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[expect(clippy::enum_variant_names, reason = "the standard's names")]
-pub enum Mode {
+pub enum UnitMode {
     Instantiated,
     InitializationMode,
     StepMode,
@@ -56,7 +55,7 @@ pub struct Inputs {
     pub steering: Option<Vec<f64>>,
 }
 
-/// What the last communication step told.
+/// Results of the last communication step.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct LastStep {
     pub residual: f64,

@@ -6,12 +6,12 @@ use rover_core::integrator::StepStatus;
 use rover_core::multibody::{Model, ModelDescription};
 use rover_core::simulation::RoverSimulation;
 
-use crate::inertial::Motion;
+use crate::inertial::TrunkMotion;
 use crate::reading::Reading;
 use crate::refusal::Refusal;
 use crate::saved::Saved;
-use crate::scene_file::{Channel, SceneFile, Variable};
-use crate::state::{Inputs, LastStep, Mode, Parameters};
+use crate::scene_file::{SceneFile, Variable, VariableKind};
+use crate::state::{Inputs, LastStep, Parameters, UnitMode};
 
 /// Share of a time step by which a communication step may miss a whole number of them: masters add
 /// up their times.
@@ -23,7 +23,7 @@ const MOST_STEPS: f64 = 1e9;
 /// A unit.
 pub struct Unit {
     scene: SceneFile,
-    mode: Mode,
+    mode: UnitMode,
     parameters: Parameters,
     inputs: Inputs,
     time: f64,
@@ -44,7 +44,7 @@ impl Unit {
         let parameters = Parameters::of(&scene.options);
         let rover = begun(&scene, &parameters)?;
         Ok(Self {
-            mode: Mode::Instantiated,
+            mode: UnitMode::Instantiated,
             parameters,
             inputs: Inputs::default(),
             time: 0.0,
@@ -56,7 +56,7 @@ impl Unit {
     }
 
     /// Refuses a call outside of these states.
-    pub fn demand(&self, call: &'static str, modes: &[Mode]) -> Result<(), Refusal> {
+    pub fn demand(&self, call: &'static str, modes: &[UnitMode]) -> Result<(), Refusal> {
         let mode = self.mode;
         if modes.contains(&mode) {
             return Ok(());
@@ -66,7 +66,7 @@ impl Unit {
 
     /// Begins the initialisation; times in s.
     pub fn begin(&mut self, start: f64, stop: Option<f64>) -> Result<(), Refusal> {
-        self.demand("fmi3EnterInitializationMode", &[Mode::Instantiated])?;
+        self.demand("fmi3EnterInitializationMode", &[UnitMode::Instantiated])?;
         finite("startTime", start)?;
         if let Some(stop) = stop
             && !(stop.is_finite() && stop >= start)
@@ -77,21 +77,24 @@ impl Unit {
                 value: stop,
             });
         }
-        (self.time, self.stop, self.mode) = (start, stop, Mode::InitializationMode);
+        (self.time, self.stop, self.mode) = (start, stop, UnitMode::InitializationMode);
         Ok(())
     }
 
     /// Ends the initialisation.
     pub fn begin_steps(&mut self) -> Result<(), Refusal> {
-        self.demand("fmi3ExitInitializationMode", &[Mode::InitializationMode])?;
-        self.mode = Mode::StepMode;
+        self.demand(
+            "fmi3ExitInitializationMode",
+            &[UnitMode::InitializationMode],
+        )?;
+        self.mode = UnitMode::StepMode;
         Ok(())
     }
 
     /// Ends the run.
     pub fn terminate(&mut self) -> Result<(), Refusal> {
-        self.demand("fmi3Terminate", &[Mode::StepMode])?;
-        self.mode = Mode::Terminated;
+        self.demand("fmi3Terminate", &[UnitMode::StepMode])?;
+        self.mode = UnitMode::Terminated;
         Ok(())
     }
 
@@ -100,7 +103,7 @@ impl Unit {
         let parameters = Parameters::of(&self.scene.options);
         self.rover = begun(&self.scene, &parameters)?;
         (self.parameters, self.inputs) = (parameters, Inputs::default());
-        (self.mode, self.time, self.stop) = (Mode::Instantiated, 0.0, None);
+        (self.mode, self.time, self.stop) = (UnitMode::Instantiated, 0.0, None);
         self.last = LastStep::default();
         Ok(())
     }
@@ -108,7 +111,7 @@ impl Unit {
     /// Steps from a time of the master by a whole number of time steps, s; whether all were solved
     /// to tolerance.
     pub fn step(&mut self, at: f64, by: f64) -> Result<bool, Refusal> {
-        self.demand("fmi3DoStep", &[Mode::StepMode])?;
+        self.demand("fmi3DoStep", &[UnitMode::StepMode])?;
         let h = self.parameters.time_step;
         let slack = STEP_ROUNDING * h;
         let refuse = |name: &str, range: String, value| {
@@ -137,7 +140,7 @@ impl Unit {
             reason = "checked"
         )]
         let report = {
-            let before = Motion::of(&self.rover);
+            let before = TrunkMotion::of(&self.rover);
             let report = self.rover.step(n as usize)?;
             let inertial = before.readings(&self.rover, self.parameters.gravity, n * h);
             self.last = LastStep {
@@ -159,7 +162,11 @@ impl Unit {
     pub fn numbers(&self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
         self.demand(
             "fmi3GetFloat64",
-            &[Mode::InitializationMode, Mode::StepMode, Mode::Terminated],
+            &[
+                UnitMode::InitializationMode,
+                UnitMode::StepMode,
+                UnitMode::Terminated,
+            ],
         )?;
         count(references.len(), values.len())?;
         let gravity = self.parameters.gravity;
@@ -167,13 +174,13 @@ impl Unit {
         for (&reference, value) in references.iter().zip(values) {
             let variable = self.variable(reference)?;
             let found = match variable.channel {
-                Channel::Time => Some(self.time),
-                Channel::Friction => Some(self.parameters.friction),
-                Channel::Restitution => Some(self.parameters.restitution),
-                Channel::TimeStep => Some(self.parameters.time_step),
-                Channel::Gravity => self.parameters.gravity.get(variable.index).copied(),
-                Channel::WheelTorque => self.torques().get(variable.index).copied(),
-                Channel::Steering => self.steering().get(variable.index).copied(),
+                VariableKind::Time => Some(self.time),
+                VariableKind::Friction => Some(self.parameters.friction),
+                VariableKind::Restitution => Some(self.parameters.restitution),
+                VariableKind::TimeStep => Some(self.parameters.time_step),
+                VariableKind::Gravity => self.parameters.gravity.get(variable.index).copied(),
+                VariableKind::WheelTorque => self.torques().get(variable.index).copied(),
+                VariableKind::Steering => self.steering().get(variable.index).copied(),
                 channel => reading.get(channel, variable.index),
             };
             *value = variable.sign * found.ok_or(Refusal::NoVariable { reference })?;
@@ -183,7 +190,11 @@ impl Unit {
 
     /// Sets variables: all, or none.
     pub fn set_numbers(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refusal> {
-        let modes = [Mode::Instantiated, Mode::InitializationMode, Mode::StepMode];
+        let modes = [
+            UnitMode::Instantiated,
+            UnitMode::InitializationMode,
+            UnitMode::StepMode,
+        ];
         self.demand("fmi3SetFloat64", &modes)?;
         count(references.len(), values.len())?;
         let (mut parameters, mut inputs) = (self.parameters.clone(), self.inputs.clone());
@@ -191,18 +202,20 @@ impl Unit {
             let variable = self.variable(reference)?;
             finite(&variable.name, value)?;
             let place = match variable.channel {
-                Channel::WheelTorque => {
+                VariableKind::WheelTorque => {
                     let torques = inputs.torques.get_or_insert_with(|| self.torques());
                     torques.get_mut(variable.index)
                 }
-                Channel::Steering => {
+                VariableKind::Steering => {
                     let steering = inputs.steering.get_or_insert_with(|| self.steering());
                     steering.get_mut(variable.index)
                 }
-                Channel::Friction => self.fixed(variable, Some(&mut parameters.friction))?,
-                Channel::Restitution => self.fixed(variable, Some(&mut parameters.restitution))?,
-                Channel::TimeStep => self.fixed(variable, Some(&mut parameters.time_step))?,
-                Channel::Gravity => {
+                VariableKind::Friction => self.fixed(variable, Some(&mut parameters.friction))?,
+                VariableKind::Restitution => {
+                    self.fixed(variable, Some(&mut parameters.restitution))?
+                }
+                VariableKind::TimeStep => self.fixed(variable, Some(&mut parameters.time_step))?,
+                VariableKind::Gravity => {
                     self.fixed(variable, parameters.gravity.get_mut(variable.index))?
                 }
                 _ => {
@@ -219,20 +232,28 @@ impl Unit {
     pub fn text(&self, reference: u32) -> Result<&str, Refusal> {
         self.demand(
             "fmi3GetString",
-            &[Mode::InitializationMode, Mode::StepMode, Mode::Terminated],
+            &[
+                UnitMode::InitializationMode,
+                UnitMode::StepMode,
+                UnitMode::Terminated,
+            ],
         )?;
         match self.variable(reference)?.channel {
-            Channel::Model => Ok(&self.parameters.model),
+            VariableKind::Model => Ok(&self.parameters.model),
             _ => Err(Refusal::NoVariable { reference }),
         }
     }
 
     /// Sets the text of a variable.
     pub fn set_text(&mut self, reference: u32, value: &str) -> Result<(), Refusal> {
-        let modes = [Mode::Instantiated, Mode::InitializationMode, Mode::StepMode];
+        let modes = [
+            UnitMode::Instantiated,
+            UnitMode::InitializationMode,
+            UnitMode::StepMode,
+        ];
         self.demand("fmi3SetString", &modes)?;
         let variable = self.variable(reference)?;
-        if variable.channel != Channel::Model {
+        if variable.channel != VariableKind::Model {
             return Err(Refusal::NoVariable { reference });
         }
         let mut parameters = self.parameters.clone();
@@ -288,7 +309,7 @@ impl Unit {
 
     /// The place of a parameter, before the steps begin.
     fn fixed<T>(&self, variable: &Variable, place: T) -> Result<T, Refusal> {
-        if self.mode == Mode::StepMode {
+        if self.mode == UnitMode::StepMode {
             let (name, mode) = (variable.name.clone(), self.mode);
             return Err(Refusal::ReadOnly { name, mode });
         }
@@ -315,11 +336,11 @@ impl Unit {
         let rover = anew.as_mut().unwrap_or(&mut self.rover);
         if let Some(steering) = &inputs.steering {
             let set = rover.set_steering(steering);
-            set.map_err(|e| self.scene.refusal(Channel::Steering, e))?;
+            set.map_err(|e| self.scene.refusal(VariableKind::Steering, e))?;
         }
         if let Some(torques) = &inputs.torques {
             let set = rover.set_wheel_torques(torques);
-            set.map_err(|e| self.scene.refusal(Channel::WheelTorque, e))?;
+            set.map_err(|e| self.scene.refusal(VariableKind::WheelTorque, e))?;
         }
         if let Some(rover) = anew {
             self.rover = rover;

@@ -12,7 +12,7 @@ use crate::episode::{GivenSimulation, simulation};
 use crate::errors::{Kind, Result, Value};
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Open, Release, Shared, Watch};
-use crate::simulation::{Origin, Simulation};
+use crate::simulation::{Simulation, SimulationInputs};
 
 /// Steps many rovers on several threads. Each gives the same bits as it would alone.
 ///
@@ -33,7 +33,7 @@ pub struct SimulationBatch(Shared<Inner>);
 
 struct Inner {
     inner: Batch,
-    origins: Vec<Origin>,
+    origins: Vec<SimulationInputs>,
 }
 
 /// (n,) truth values: which rovers move.

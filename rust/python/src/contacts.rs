@@ -106,7 +106,7 @@ impl Contacts {
         let unit_axes = active.iter().map(|own| own.with_unit_axes(model));
         let active = &unit_axes.collect::<Vec<_>>()[..];
         let parts = active.iter().map(|a| &a.contact.part);
-        let told = |part: &Part| match part {
+        let kind_of = |part: &Part| match part {
             Part::Wheel(i) => ("wheel", i64::try_from(*i).unwrap_or(-1)),
             Part::Box(_) => ("box", -1),
             Part::Sphere(_) => ("sphere", -1),
@@ -114,7 +114,7 @@ impl Contacts {
             Part::Limit(..) => ("limit", -1),
             Part::Friction(_) => ("friction", -1),
         };
-        let (kinds, wheels): (_, Vec<i64>) = parts.clone().map(told).unzip();
+        let (kinds, wheels): (_, Vec<i64>) = parts.clone().map(kind_of).unzip();
         let columns = Columns::of(active);
         Self {
             bodies: parts.map(|part| part.name(model).to_owned()).collect(),

@@ -4,8 +4,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::simulation::RoverSimulation;
 use rover_task::draw::{
-    DomainDistribution, DrawnGround, Fixed, FixedStart, GroundDistribution, HillDistribution,
-    Order, Pcg64, Range, RockDistribution, SandDistribution, SceneDistribution, StartDistribution,
+    DomainDistribution, DrawnGround, FixedDraws, FixedStart, GroundDistribution, HillDistribution,
+    Interval, Order, Pcg64, RockDistribution, SandDistribution, SceneDistribution,
+    StartDistribution,
 };
 use rover_task::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 
@@ -17,7 +18,7 @@ use crate::generators::generators;
 use crate::options::SolverWords;
 use crate::reading::points;
 use crate::shared::{Release, Watch};
-use crate::simulation::{Origin, Simulation};
+use crate::simulation::{Simulation, SimulationInputs};
 use crate::terrain::{self, Terrain};
 
 /// Distribution of the episodes of a task.
@@ -64,7 +65,7 @@ pub struct DrawnEpisodes {
 }
 
 /// A range (low, high).
-pub fn range(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Range> {
+pub fn range(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Interval> {
     match vector(value, kind, field)?[..] {
         [low, high] if low.is_finite() && high.is_finite() && low <= high => Ok([low, high]),
         _ => Err(refused(
@@ -77,7 +78,7 @@ pub fn range(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Range>
 }
 
 /// What replaces draws, by name.
-fn fixed(given: &Bound<'_, PyAny>) -> Result<Fixed> {
+fn fixed(given: &Bound<'_, PyAny>) -> Result<FixedDraws> {
     let named = Named::mapping(given, "fixed", Kind::Option)?;
     let state = |name: &str| -> Result<Option<Vec<f64>>> {
         named
@@ -87,7 +88,7 @@ fn fixed(given: &Bound<'_, PyAny>) -> Result<Fixed> {
     };
     let further = |value: &Bound<'_, PyAny>, _, field: &str| points(value, field);
     let v = state("v")?;
-    Ok(Fixed {
+    Ok(FixedDraws {
         start: FixedStart {
             slope: named.maybe("slope")?,
             uphill: named.maybe("uphill")?,
@@ -112,8 +113,8 @@ fn list<'py>(given: &Bound<'py, PyAny>, n: usize, field: &str) -> Result<Vec<Bou
 /// Largest number of scenes drawn, and values that replace drawn ones.
 pub struct Request {
     randoms: Vec<Pcg64>,
-    difficulties: Vec<Option<Range>>,
-    fixed: Vec<Fixed>,
+    difficulties: Vec<Option<Interval>>,
+    fixed: Vec<FixedDraws>,
     attempts: usize,
 }
 
@@ -140,7 +141,7 @@ impl Request {
             }
         };
         let fixed = match given.some("fixed")? {
-            None => vec![Fixed::default()],
+            None => vec![FixedDraws::default()],
             Some(given) if given.cast::<PyMapping>().is_ok() => vec![fixed(&given)?],
             Some(given) => list(&given, n, "fixed")?
                 .iter()
@@ -333,7 +334,7 @@ impl DrawnEpisodes {
         let one = self.at(index)?;
         let made = RoverSimulation::placed(one.scene.placement.clone())?;
         let (terrain, words) = (one.scene.ground.clone(), self.words.clone());
-        let made = Simulation::of(made, Origin { terrain, words });
+        let made = Simulation::of(made, SimulationInputs { terrain, words });
         Ok(Py::new(index.py(), made)?)
     }
 

@@ -6,7 +6,7 @@ use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyRange, PyTuple};
 use rover_task::draw::Domain;
-use rover_task::episode::{Ending, Episode as CoreEpisode, EpisodeState, Rules, Setting};
+use rover_task::episode::{Ending, Episode as CoreEpisode, EpisodeSetting, EpisodeState, Rules};
 
 use crate::arguments::{Named, number, refused};
 use crate::arrays::{Array, array, fresh, vector};
@@ -144,7 +144,7 @@ impl EpisodeRun {
     ) -> Result<Option<Self>> {
         let given = Named::keywords(simulation.0.py(), options)?;
         let further = |value: &Bound<'_, PyAny>, _, field: &str| points(value, field);
-        let setting = Setting {
+        let setting = EpisodeSetting {
             goal: given.need("goal", |value, _, _| place(Some(value)))?,
             further: given.read("further", further)?.unwrap_or_default(),
             domain: given.need("domain", domain)?,
@@ -218,9 +218,12 @@ impl EpisodeRun {
         {
             let other = &seen.get().0;
             let EpisodeState {
-                observation, owed, ..
+                observation,
+                pending_normals,
+                ..
             } = other.state();
-            (rules, state.observation, state.owed) = (other.rules().clone(), observation, owed);
+            (rules, state.observation, state.pending_normals) =
+                (other.rules().clone(), observation, pending_normals);
         }
         given.finish()?;
         Ok(Self::of(CoreEpisode::resume(rules, state)?))

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_task::draw::{DrawnGround, Pcg64, RockDraw, Start};
-use rover_task::episode::{EpisodeBatch as CoreBatch, EpisodeError, Origin as Began, Stepped};
+use rover_task::episode::{
+    BatchOutcome, EpisodeBatch as CoreBatch, EpisodeError, EpisodeOrigin as Began,
+};
 
 use crate::arguments::{Named, at_least_one, below, refused, text, whole};
 use crate::arrays::{Array, fresh, fresh_rows};
@@ -14,11 +16,11 @@ use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request};
 use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, actions};
 use crate::errors::{Kind, Result};
 use crate::generators::generators;
-use crate::infos::{Told, info, infos};
+use crate::infos::{InfoSource, info, infos};
 use crate::options::SolverWords;
 use crate::rover_grains::{RoverGrainSimulation, Together};
 use crate::shared::{Open, Release, Shared, Watch};
-use crate::simulation::{Origin, Simulation};
+use crate::simulation::{Simulation, SimulationInputs};
 use crate::union;
 
 /// Observations, rewards, which episodes have ended, which have reached the time limit, and the
@@ -47,25 +49,25 @@ pub struct EpisodeBatch(Shared<Inner>);
 
 struct Inner {
     batch: CoreBatch,
-    origins: Vec<Origin>,
+    origins: Vec<SimulationInputs>,
     /// Simulations that Python has asked for.
-    lent: Vec<Option<Py<Simulation>>>,
+    handed_out: Vec<Option<Py<Simulation>>>,
 }
 
 impl Inner {
-    /// What the infos tell of a rover.
-    fn told(&self, index: usize) -> Result<Told<'_>, EpisodeError> {
+    /// Source of the infos of a rover.
+    fn info_source(&self, index: usize) -> Result<InfoSource<'_>, EpisodeError> {
         Ok((self.batch.episode(index)?, self.batch.message(index)))
     }
 
     /// Keeps the Python options of the simulation of an episode that has begun.
     fn set_origin(&mut self, index: usize, words: &SolverWords) -> Result<()> {
         let origin = self.batch.origin(index)?;
-        self.origins[index] = Origin {
+        self.origins[index] = SimulationInputs {
             terrain: origin.ground.clone(),
             words: words.clone(),
         };
-        self.lent[index] = None;
+        self.handed_out[index] = None;
         Ok(())
     }
 
@@ -165,7 +167,7 @@ impl EpisodeBatch {
         Ok(Self(Shared::new(Inner {
             batch,
             origins: vec![one.origin().clone(); n],
-            lent: (0..n).map(|_| None).collect(),
+            handed_out: (0..n).map(|_| None).collect(),
         })))
     }
 
@@ -235,7 +237,7 @@ impl EpisodeBatch {
                 link.step(rover, grains, n, &mut || watch.go_on()).map(drop)
             }),
         })?;
-        let Stepped {
+        let BatchOutcome {
             rewards,
             ended,
             truncated,
@@ -258,9 +260,9 @@ impl EpisodeBatch {
     ///     of the rovers that have the entry: all True.
     fn infos<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let held = self.0.open()?;
-        let told = (0..held.batch.rovers().len()).map(|i| held.told(i));
-        let told: Vec<_> = told.collect::<Result<_, _>>()?;
-        infos(py, &told)
+        let sources = (0..held.batch.rovers().len()).map(|i| held.info_source(i));
+        let sources: Vec<_> = sources.collect::<Result<_, _>>()?;
+        infos(py, &sources)
     }
 
     /// The info of one rover, of its last control period or of its start.
@@ -268,7 +270,7 @@ impl EpisodeBatch {
     /// Args:
     ///     index: Index of the rover.
     fn info<'py>(&self, index: &Bound<'py, PyAny>) -> Result<Bound<'py, PyDict>> {
-        self.one(index, |held, i| info(index.py(), &held.told(i)?))
+        self.one(index, |held, i| info(index.py(), &held.info_source(i)?))
     }
 
     /// The last observations of all rovers, (n_rovers, size) float32; zeros before an episode.
@@ -393,11 +395,11 @@ impl EpisodeBatch {
         let rover = one.open()?.clone();
         for index in places {
             let (rover, whole) = (rover.clone(), (episode.clone(), steps));
-            let (began, told) = (origin.clone(), message.clone());
+            let (began, failure) = (origin.clone(), message.clone());
             held.batch
-                .resume(index, rover, whole, began, random, told)?;
+                .resume(index, rover, whole, began, random, failure)?;
             held.origins[index] = one.origin().clone();
-            held.lent[index] = None;
+            held.handed_out[index] = None;
         }
         Ok(())
     }
@@ -502,12 +504,12 @@ impl EpisodeBatch {
     fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
         let py = index.py();
         self.one(index, |held, i| {
-            if let Some(known) = &held.lent[i] {
+            if let Some(known) = &held.handed_out[i] {
                 return Ok(known.clone_ref(py));
             }
             let rover = held.batch.rovers()[i].clone();
-            let made = Py::new(py, Simulation::lent(rover, held.origins[i].clone())?)?;
-            held.lent[i] = Some(made.clone_ref(py));
+            let made = Py::new(py, Simulation::shared(rover, held.origins[i].clone())?)?;
+            held.handed_out[i] = Some(made.clone_ref(py));
             Ok(made)
         })
     }

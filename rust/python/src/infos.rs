@@ -12,7 +12,7 @@ use crate::errors::Result;
 const STATUSES: [&str; 3] = ["converged", "not_converged", "failed"];
 
 /// An episode and the message of the physics step that failed in its last period.
-pub type Told<'a> = (&'a Episode, Option<String>);
+pub type InfoSource<'a> = (&'a Episode, Option<String>);
 
 /// A value of an entry.
 enum Value {
@@ -26,7 +26,7 @@ use Value::{Count, Flag, Name, Number, Text};
 
 /// Where the value of an entry comes from.
 enum Read {
-    One(fn(&Told<'_>) -> Value),
+    One(fn(&InfoSource<'_>) -> Value),
     /// A dictionary.
     Group(&'static [Entry]),
     /// The terms of the reward.
@@ -40,18 +40,18 @@ struct Entry {
     unit: &'static str,
     meaning: &'static str,
     /// Which tasks have it.
-    is_told: fn(&Settings) -> bool,
+    is_present: fn(&Settings) -> bool,
     read: Read,
 }
 
 /// Entries: name, unit, meaning, which tasks have them, and what they read.
 macro_rules! entries {
-    ($($name:literal [$unit:literal] $meaning:literal if $is_told:expr => $read:expr;)*) => {
+    ($($name:literal [$unit:literal] $meaning:literal if $is_present:expr => $read:expr;)*) => {
         &[$(Entry {
             name: $name,
             unit: $unit,
             meaning: $meaning,
-            is_told: $is_told,
+            is_present: $is_present,
             read: $read,
         }),*]
     };
@@ -69,41 +69,41 @@ fn has_trap(settings: &Settings) -> bool {
     settings.free_distance.is_some()
 }
 
-fn is_success(told: &Told<'_>) -> Value {
-    Flag(told.0.outcome().ending.is_success())
+fn is_success(source: &InfoSource<'_>) -> Value {
+    Flag(source.0.outcome().ending.is_success())
 }
 
 /// Goals that have been reached.
 #[allow(clippy::cast_possible_wrap)] // small numbers
-fn reached(told: &Told<'_>) -> i64 {
-    told.0.progress().reached as i64
+fn reached(source: &InfoSource<'_>) -> i64 {
+    source.0.progress().reached as i64
 }
 
 /// A number of the solver's; what there is of a step that failed.
-fn solved(told: &Told<'_>, number: f64, failed: f64) -> f64 {
-    if told.1.is_some() { failed } else { number }
+fn solved(source: &InfoSource<'_>, number: f64, failed: f64) -> f64 {
+    if source.1.is_some() { failed } else { number }
 }
 
 #[allow(clippy::cast_possible_truncation)] // counts far below 2^52
-fn solved_count(told: &Told<'_>, number: f64) -> Value {
-    Count(solved(told, number, 0.0) as i64)
+fn solved_count(source: &InfoSource<'_>, number: f64) -> Value {
+    Count(solved(source, number, 0.0) as i64)
 }
 
 /// Goals that remain.
 #[allow(clippy::cast_possible_wrap)] // small numbers
-fn remaining(told: &Told<'_>) -> Value {
-    Count(told.0.rules().settings().goals as i64 - reached(told))
+fn remaining(source: &InfoSource<'_>) -> Value {
+    Count(source.0.rules().settings().goals as i64 - reached(source))
 }
 
 /// Charge of the battery, J.
-fn charge(told: &Told<'_>) -> Value {
-    let battery = told.0.rules().settings().battery.unwrap_or(0.0);
-    Number((battery - told.0.progress().energy).max(0.0))
+fn charge(source: &InfoSource<'_>) -> Value {
+    let battery = source.0.rules().settings().battery.unwrap_or(0.0);
+    Number((battery - source.0.progress().energy).max(0.0))
 }
 
-fn status(told: &Told<'_>) -> Value {
-    let not_converged = usize::from(told.0.outcome().now.not_converged != 0.0);
-    Name(STATUSES[if told.1.is_some() { 2 } else { not_converged }])
+fn status(source: &InfoSource<'_>) -> Value {
+    let not_converged = usize::from(source.0.outcome().now.not_converged != 0.0);
+    Name(STATUSES[if source.1.is_some() { 2 } else { not_converged }])
 }
 
 const DOMAIN: &[Entry] = entries! {
@@ -196,7 +196,7 @@ fn column(py: Python<'_>, values: Vec<Value>) -> Result<Bound<'_, PyAny>> {
 }
 
 /// Makes a value of Python from what an entry reads.
-type Take<'py, 'a> = dyn Fn(&dyn Fn(&Told<'_>) -> Value) -> Result<Bound<'py, PyAny>> + 'a;
+type Take<'py, 'a> = dyn Fn(&dyn Fn(&InfoSource<'_>) -> Value) -> Result<Bound<'py, PyAny>> + 'a;
 
 /// A dictionary of some entries, whose values a function takes from what they read.
 fn dictionary<'py>(
@@ -214,7 +214,7 @@ fn dictionary<'py>(
         }
         Ok(())
     };
-    for entry in entries.iter().filter(|entry| (entry.is_told)(settings)) {
+    for entry in entries.iter().filter(|entry| (entry.is_present)(settings)) {
         let value = match &entry.read {
             One(read) => take(read)?,
             Group(parts) => dictionary(py, parts, settings, mask, take)?.into_any(),
@@ -224,7 +224,7 @@ fn dictionary<'py>(
                     put(
                         &terms,
                         name,
-                        take(&|told| Number(told.0.outcome().terms[i]))?,
+                        take(&|source| Number(source.0.outcome().terms[i]))?,
                     )?;
                 }
                 terms.into_any()
@@ -236,20 +236,22 @@ fn dictionary<'py>(
 }
 
 /// The info of one rover.
-pub fn info<'py>(py: Python<'py>, told: &Told<'_>) -> Result<Bound<'py, PyDict>> {
-    let settings = told.0.rules().settings();
-    dictionary(py, ENTRIES, settings, None, &|read| object(py, read(told)))
+pub fn info<'py>(py: Python<'py>, source: &InfoSource<'_>) -> Result<Bound<'py, PyDict>> {
+    let settings = source.0.rules().settings();
+    dictionary(py, ENTRIES, settings, None, &|read| {
+        object(py, read(source))
+    })
 }
 
 /// The infos of all rovers of a batch: for each entry an array, and the mask of those that have it,
 /// all.
-pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> Result<Bound<'py, PyDict>> {
-    let Some((first, _)) = told.first() else {
+pub fn infos<'py>(py: Python<'py>, sources: &[InfoSource<'_>]) -> Result<Bound<'py, PyDict>> {
+    let Some((first, _)) = sources.first() else {
         return Ok(PyDict::new(py));
     };
-    let everyone = PyArray1::from_vec(py, vec![true; told.len()]).into_any();
+    let everyone = PyArray1::from_vec(py, vec![true; sources.len()]).into_any();
     let settings = first.rules().settings();
     dictionary(py, ENTRIES, settings, Some(&everyone), &|read| {
-        column(py, told.iter().map(read).collect())
+        column(py, sources.iter().map(read).collect())
     })
 }

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_task::paths::search::STEPS;
 use rover_task::paths::{
-    Arcs, MapTask, Outline, PathCosts, PathSearch as Core, Pose, ScanShape, Search, SearchTask,
-    WayMap,
+    Arcs, MapTask, Outline, PathCosts, PathProblem, PathSearch as Core, PlanarPose, ScanShape,
+    SearchTask, WayMap,
 };
 
 use crate::arguments::{Named, at_least_one, count, finite, positive, refused};
@@ -61,10 +61,10 @@ fn rows<const M: usize>(
 }
 
 /// Poses of any leading shape.
-fn poses(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<Pose>> {
+fn poses(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<PlanarPose>> {
     let rows = rows(value, kind, field)?.into_iter();
     Ok(rows
-        .map(|[ahead, right, heading]| Pose {
+        .map(|[ahead, right, heading]| PlanarPose {
             ahead,
             right,
             heading,
@@ -182,7 +182,7 @@ impl PathSearch {
         let reach = given.need("reach", positive)?;
         let arrival = given.need("arrival", finite)?;
         given.finish()?;
-        let search = Search {
+        let search = PathProblem {
             scan,
             outline,
             costs,

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::{DMatrix, Vector2};
-use rover_core::planar::{ContactRule, Ground, PlanarTree};
+use rover_core::planar::{ContactRule, PlanarGround, PlanarTree};
 use rover_core::simulation::PlanarSimulation as Core;
 use std::sync::{Arc, MutexGuard};
 
@@ -67,7 +67,7 @@ impl PlanarSimulation {
         parameters: Bound<'_, PyDict>,
         given: Named<'_>,
     ) -> Result<PyClassInitializer<Self>> {
-        let terrain: Arc<dyn Ground> = parse(ground)?;
+        let terrain: Arc<dyn PlanarGround> = parse(ground)?;
         let (step, words, rule) = options(&given)?;
         given.finish()?;
         let inner = Arc::new(Shared::new(Core::new(machine, terrain, rule, step)?));

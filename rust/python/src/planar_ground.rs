@@ -2,8 +2,8 @@
 
 use pyo3::prelude::*;
 use rover_core::planar::{
-    Ground, Line as CoreLine, PlanarError, Polyline as CorePolyline, Sine as CoreSine,
-    Spline as CoreSpline,
+    Line as CoreLine, PlanarError, PlanarGround as CoreGround, Polyline as CorePolyline,
+    Sine as CoreSine, Spline as CoreSpline,
 };
 use rover_core::quantity::QuantityError;
 use std::sync::Arc;
@@ -37,7 +37,7 @@ pub fn quantity(kind: Kind, e: &QuantityError) -> BorderError {
 ///
 /// Its subclasses are `Line`, `Sine`, `Spline` and `Polyline`.
 #[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
-pub struct PlanarGround(Arc<dyn Ground>);
+pub struct PlanarGround(Arc<dyn CoreGround>);
 
 #[pymethods]
 impl PlanarGround {
@@ -64,7 +64,7 @@ impl PlanarGround {
 
 impl PlanarGround {
     /// A ground of the core, for the class of its kind.
-    fn base<G: Ground + Clone + 'static>(ground: &G) -> PyClassInitializer<Self> {
+    fn base<G: CoreGround + Clone + 'static>(ground: &G) -> PyClassInitializer<Self> {
         PyClassInitializer::from(Self(Arc::new(ground.clone())))
     }
 }
@@ -306,7 +306,7 @@ impl Polyline {
 }
 
 /// The ground in a Python object.
-pub fn parse(given: &Bound<'_, PyAny>) -> Result<Arc<dyn Ground>> {
+pub fn parse(given: &Bound<'_, PyAny>) -> Result<Arc<dyn CoreGround>> {
     match given.cast::<PlanarGround>() {
         Ok(ground) => Ok(ground.get().0.clone()),
         Err(_) => Err(refused(

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::multibody::Model;
 use rover_core::nalgebra::Vector2;
-use rover_core::planar::{Ball, MirroredRover, PlanarWheel, TwoWheelRover};
+use rover_core::planar::{MirroredRover, PlanarBall, PlanarWheel, TwoWheelRover};
 use std::sync::Arc;
 
 use crate::arguments::{Named, number};
@@ -47,7 +47,7 @@ impl BallSimulation {
         let inertia = own
             .maybe("inertia")?
             .unwrap_or(0.5 * mass * radius * radius);
-        let ball = Ball::new(mass, radius, inertia).map_err(|e| border(Kind::Model, &e))?;
+        let ball = PlanarBall::new(mass, radius, inertia).map_err(|e| border(Kind::Model, &e))?;
         let parameters = PyDict::new(ground.py());
         for (name, value) in [("mass", mass), ("radius", radius), ("inertia", inertia)] {
             parameters.set_item(name, value)?;
@@ -120,14 +120,14 @@ pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Res
     let mass = given.number("mass", 130.0)?;
     let masses = both("wheel_mass", [60.0; 2])?;
     let radii = both("wheel_radius", [0.2; 2])?;
-    // Discs, unless told otherwise.
+    // Discs by default.
     let of_disc = |i: usize| 0.5 * masses[i] * radii[i] * radii[i];
     let inertias = both("wheel_inertia", [of_disc(0), of_disc(1)])?;
     let axle = |field: &str, x: f64| -> Result<Vector2<f64>> {
         Ok(given.read(field, pair)?.unwrap_or(Vector2::new(x, 0.0)))
     };
     let axles = [axle("axle_a", -0.4)?, axle("axle_b", 0.4)?];
-    // A rod from axle to axle, unless told otherwise.
+    // A rod from axle to axle by default.
     let rod = mass * (axles[1] - axles[0]).norm_squared() / 12.0;
     let inertia = given.maybe("inertia")?.unwrap_or(rod);
     let wheel = |i: usize| PlanarWheel {

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::Support;
-use rover_core::planar::{Ground, PlanarTree, WheelRig};
+use rover_core::planar::{PlanarGround, PlanarTree, WheelRig};
 use rover_core::simulation::SoilSimulation as Core;
 use rover_core::system::grains::{GrainScene, Packing};
 use std::sync::{Arc, MutexGuard};
@@ -147,7 +147,7 @@ impl SoilSimulation {
         let gravity = given.read("gravity", pair)?.map(|g| g.push(0.0));
         let options = bed_arguments::step_options(&given, &disks, (gravity, false), USUAL)?;
         let walls = bed_arguments::walls(given.some("walls")?.as_ref())?;
-        let ground: Option<Arc<dyn Ground>> =
+        let ground: Option<Arc<dyn PlanarGround>> =
             given.some("ground")?.as_ref().map(parse).transpose()?;
         let machine = self::machine(&given)?;
         if let Some(machine) = given.of(Kind::State).read("machine", vector)? {

@@ -3,8 +3,8 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::sand::{
-    Bekker, Drive, Flow, Interface, Law, Measured, Resistive, SandState, SandWheel, Soil, Sunk,
-    TestBed,
+    Bekker, Flow, Interface, OperatingPoint, Resistive, SandState, SandWheel, Soil, StressLaw,
+    Sunk, TestBed, WheelPerformance,
 };
 
 use crate::arguments::{Given, number, refused, whole};
@@ -65,7 +65,7 @@ impl<'py> Numbers<'py> {
 pub fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
     let numbers = Numbers::of(given)?;
     let law = if numbers.0.contains("frictional_modulus")? {
-        Law::Bekker(Bekker {
+        StressLaw::Bekker(Bekker {
             cohesive_modulus: numbers.get("cohesive_modulus")?,
             frictional_modulus: numbers.get("frictional_modulus")?,
             exponent: numbers.get("exponent")?,
@@ -77,7 +77,7 @@ pub fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
             slip_sinkage: numbers.or_zero("slip_sinkage")?,
         })
     } else {
-        Law::Resistive(Resistive {
+        StressLaw::Resistive(Resistive {
             density: numbers.get("density")?,
             internal_friction: numbers.get("internal_friction")?,
             stiffness_factor: numbers.get("stiffness_factor")?,
@@ -160,8 +160,8 @@ pub struct WheelBed {
     bed: TestBed,
 }
 
-fn drive_of([speed, rate, slip_angle, load, gravity]: [f64; 5]) -> Drive {
-    Drive {
+fn drive_of([speed, rate, slip_angle, load, gravity]: [f64; 5]) -> OperatingPoint {
+    OperatingPoint {
         speed,
         rate,
         slip_angle,
@@ -170,8 +170,8 @@ fn drive_of([speed, rate, slip_angle, load, gravity]: [f64; 5]) -> Drive {
     }
 }
 
-fn listed(found: Measured) -> [f64; 5] {
-    let Measured {
+fn listed(found: WheelPerformance) -> [f64; 5] {
+    let WheelPerformance {
         sinkage,
         drawbar,
         lateral,

@@ -76,12 +76,12 @@ pub struct Simulation {
     pub inner: Arc<Shared<CoreSimulation>>,
     model: Arc<Model>,
     options: StepOptions,
-    origin: Origin,
+    origin: SimulationInputs,
 }
 
 /// What a simulation was made with and the core does not keep, for pickling.
 #[derive(Clone)]
-pub struct Origin {
+pub struct SimulationInputs {
     pub terrain: DrawnGround,
     pub words: SolverWords,
 }
@@ -92,7 +92,7 @@ fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
 
 impl Simulation {
     /// A simulation and its constructor arguments.
-    pub fn of(inner: CoreSimulation, origin: Origin) -> PyClassInitializer<Self> {
+    pub fn of(inner: CoreSimulation, origin: SimulationInputs) -> PyClassInitializer<Self> {
         let parts = (inner.model().clone(), inner.options().clone());
         Self::with(Arc::new(Shared::new(inner)), parts, origin)
     }
@@ -100,7 +100,7 @@ impl Simulation {
     fn with(
         inner: Arc<Shared<CoreSimulation>>,
         (model, options): (Arc<Model>, StepOptions),
-        origin: Origin,
+        origin: SimulationInputs,
     ) -> PyClassInitializer<Self> {
         AnySimulation::base(inner.clone()).add_subclass(Self {
             inner,
@@ -111,9 +111,9 @@ impl Simulation {
     }
 
     /// A simulation that others hold, too.
-    pub fn lent(
+    pub fn shared(
         inner: Arc<Shared<CoreSimulation>>,
-        origin: Origin,
+        origin: SimulationInputs,
     ) -> Result<PyClassInitializer<Self>> {
         let open = inner.open()?;
         let parts = (open.model().clone(), open.options().clone());
@@ -127,7 +127,7 @@ impl Simulation {
     }
 
     /// Origin of the simulation: what it was made with and the core does not keep.
-    pub fn origin(&self) -> &Origin {
+    pub fn origin(&self) -> &SimulationInputs {
         &self.origin
     }
 
@@ -171,7 +171,7 @@ impl Simulation {
         let (options, words) = options.read(&given)?;
         given.finish()?;
         let inner = CoreSimulation::new(model, terrain.terrain(), options)?;
-        Ok(Self::of(inner, Origin { terrain, words }))
+        Ok(Self::of(inner, SimulationInputs { terrain, words }))
     }
 
     /// The machine.

@@ -99,7 +99,7 @@ pub fn positive(field: &str, value: f64) -> Result<f64, QuantityError> {
 
 /// Admissible numbers of an argument, with their description in words.
 #[derive(Clone, Copy, Debug)]
-pub struct Range {
+pub struct AdmissibleRange {
     /// Smallest and largest size; either sign where the smallest is negative.
     pub ends: [f64; 2],
     /// In words.
@@ -107,25 +107,25 @@ pub struct Range {
 }
 
 /// Masses, kg.
-pub const MASSES: Range = Range {
+pub const MASSES: AdmissibleRange = AdmissibleRange {
     ends: [1e-9, 1e12],
     words: "from 1e-9 to 1e12 kg",
 };
 
 /// Lengths, m.
-pub const LENGTHS: Range = Range {
+pub const LENGTHS: AdmissibleRange = AdmissibleRange {
     ends: [1e-6, 1e6],
     words: "from 1e-6 to 1e6 m",
 };
 
 /// Inertias, kg m².
-pub const INERTIAS: Range = Range {
+pub const INERTIAS: AdmissibleRange = AdmissibleRange {
     ends: [1e-24, 1e24],
     words: "from 1e-24 to 1e24 kg m²",
 };
 
 /// Places, m.
-pub const PLACES: Range = Range {
+pub const PLACES: AdmissibleRange = AdmissibleRange {
     ends: [-1e6, 1e6],
     words: "at most 1e6 m either way",
 };
@@ -134,8 +134,12 @@ pub const PLACES: Range = Range {
 ///
 /// # Errors
 /// [`QuantityError::NotFinite`], [`QuantityError::NotPositive`] or [`QuantityError::OutOfRange`].
-pub fn within(field: impl Fn() -> String, value: f64, range: Range) -> Result<f64, QuantityError> {
-    let Range {
+pub fn within(
+    field: impl Fn() -> String,
+    value: f64,
+    range: AdmissibleRange,
+) -> Result<f64, QuantityError> {
+    let AdmissibleRange {
         ends: [low, high],
         words,
     } = range;

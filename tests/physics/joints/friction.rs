@@ -6,7 +6,7 @@ use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::Plane;
 use rover_core::integrator::Variant;
 use rover_core::multibody::{
-    Configuration, CouplingDescription, JointKind, Limits, LoopDescription, LoopKind, Model,
+    Configuration, CouplingDescription, JointKind, JointLimits, LoopDescription, LoopKind, Model,
     ModelDescription, SolidDescription, coordinates,
 };
 use rover_core::simulation::RoverSimulation;
@@ -165,7 +165,7 @@ fn a_gear_train_holds_its_load() {
 fn a_joint_with_friction_rests_on_its_stop() {
     for variant in VARIANTS {
         let mut bob = pendulum(0.2 * WEIGHT);
-        bob.limits = Some(Limits {
+        bob.limits = Some(JointLimits {
             lower: 0.7,
             upper: 1.5,
         });

@@ -7,7 +7,7 @@ use rover_core::contact::{ContactKey, Side};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{
-    Configuration, JointKind, Limits, ModelDescription, Shape, SolidDescription,
+    Configuration, JointKind, JointLimits, ModelDescription, Shape, SolidDescription,
 };
 use rover_core::simulation::RoverSimulation;
 
@@ -23,7 +23,7 @@ const INERTIA: f64 = LENGTH * LENGTH + 0.5 * 0.1 * 0.1;
 fn pendulum(lower: f64, upper: f64) -> SolidDescription {
     let mut bob = solid("bob", None, JointKind::Revolute);
     bob.centre_of_mass = Some([0.0, -LENGTH, 0.0]);
-    bob.limits = Some(Limits { lower, upper });
+    bob.limits = Some(JointLimits { lower, upper });
     bob
 }
 
@@ -135,7 +135,7 @@ fn a_slide_rests_on_its_stop() {
         for (up, side) in [(1.0, Side::Lower), (-1.0, Side::Upper)] {
             let mut slide = solid("slide", None, JointKind::Prismatic);
             slide.axis = Some([0.0, up, 0.0]);
-            slide.limits = Some(Limits {
+            slide.limits = Some(JointLimits {
                 lower: -0.3,
                 upper: 0.3,
             });
@@ -237,7 +237,7 @@ fn a_stop_carries_what_the_ground_presses() {
     }
     let mut arm = foot("arm", JointKind::Revolute);
     arm.centre_of_mass = Some([-0.5, -0.2, 0.0]);
-    arm.limits = Some(Limits {
+    arm.limits = Some(JointLimits {
         lower: 0.0,
         upper: 1.0,
     });

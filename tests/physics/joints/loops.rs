@@ -378,7 +378,7 @@ fn a_stop_holds_the_whole_linkage() {
     let (mut solids, pin) = four_bar_parts();
     let rocker = four_bar_angles(0.25)[1];
     assert!(rocker < 0.0);
-    solids[2].limits = Some(rover_core::multibody::Limits {
+    solids[2].limits = Some(rover_core::multibody::JointLimits {
         lower: rocker,
         upper: 2.0,
     });

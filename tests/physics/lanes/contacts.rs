@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use rover_core::contact::slots::contacts::{Contacts, Sight};
-use rover_core::contact::slots::ground::Ground;
-use rover_core::contact::slots::machine::Machine;
-use rover_core::contact::slots::rows::{Answer, Rows};
+use rover_core::contact::slots::contacts::{ContactSlots, DetectionInput};
+use rover_core::contact::slots::ground::BlockGround;
+use rover_core::contact::slots::machine::SharedMachine;
+use rover_core::contact::slots::rows::{ContactMatrices, ContactQuantity};
 use rover_core::contact::{
     self, Activation, Contact, ContactKey, ContactSystem, PairSearch, Part, generalized_impulse,
     relocate,
@@ -67,29 +67,29 @@ struct Found {
 /// The lane sources, with the memory that lasts from step to step.
 struct Block<T: Lane> {
     token: T::Token,
-    machine: Machine,
+    machine: SharedMachine,
     models: Vec<Option<Arc<Model>>>,
     inertias: Inertias<T>,
-    ground: Ground<T>,
-    contacts: Contacts<T>,
-    rows: Rows<T>,
+    ground: BlockGround<T>,
+    contacts: ContactSlots<T>,
+    rows: ContactMatrices<T>,
     problems: Vec<ContactProblem>,
 }
 
 impl<T: Lane> Block<T> {
     fn new(token: T::Token, model: &Model, rovers: &[Rover]) -> Self {
         assert_eq!(rovers.len(), T::LANES);
-        let machine = Machine::of(model);
+        let machine = SharedMachine::of(model);
         let mut inertias = Inertias::new(token, &machine);
-        let mut ground = Ground::new(token, machine.wheels.len(), machine.boxes.len());
+        let mut ground = BlockGround::new(token, machine.wheels.len(), machine.boxes.len());
         for (lane, rover) in rovers.iter().enumerate() {
             inertias.set_lane(lane, model.inertias());
             ground.set_lane(lane, &rover.terrain);
         }
-        let contacts = Contacts::new(token, &machine);
+        let contacts = ContactSlots::new(token, &machine);
         Self {
             token,
-            rows: Rows::new(token, &machine, contacts.n_slots()),
+            rows: ContactMatrices::new(token, &machine, contacts.n_slots()),
             machine,
             models: vec![Some(Arc::new(model.clone())); T::LANES],
             inertias,
@@ -125,7 +125,7 @@ impl<T: Lane> Block<T> {
         let (middle, end) = (&poses[0], &poses[1]);
         let gravity = Vec3::splat(token, [0.0, -G, 0.0]);
         let activation = Activation::of_step(gravity, step.h, step.gamma, (1.0 - THETA) * step.h);
-        let sight = Sight {
+        let input = DetectionInput {
             machine,
             models: &self.models,
             going: (1 << T::LANES) - 1,
@@ -135,7 +135,7 @@ impl<T: Lane> Block<T> {
             needs_pieces: false,
             activation: &activation,
         };
-        let fallbacks = self.contacts.detect(&mut self.ground, &sight);
+        let fallbacks = self.contacts.detect(&mut self.ground, &input);
         let mut M = MassMatrix::new(token, machine);
         M.update(machine, inertias, middle);
         let mut factor = Factor::new(token, machine);
@@ -159,8 +159,12 @@ impl<T: Lane> Block<T> {
         let mut impulse = vec![zero; v.len()];
         let all = T::mask(token, u32::MAX);
         T::vectorize(token, || {
-            self.rows
-                .read(&self.contacts, &self.problems, Answer::Impulses, &mut p);
+            self.rows.read(
+                &self.contacts,
+                &self.problems,
+                ContactQuantity::Impulses,
+                &mut p,
+            );
             (self.rows).add_impulses(&self.contacts, all, &p, &mut y, None);
             self.rows
                 .generalized_impulse(machine, &self.contacts, end, all, &p, &mut impulse);

@@ -9,7 +9,7 @@ use rover_core::integrator::moreau_jean::MoreauJean;
 use rover_core::integrator::{Phase, Probe, StepOptions};
 use rover_core::law::materials::{MaterialPair, Materials};
 use rover_core::multibody::description::{
-    CouplingDescription, JointKind, Limits, SolidDescription, Spring,
+    CouplingDescription, JointKind, JointLimits, SolidDescription, Spring,
 };
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription, Motor};
 use rover_core::simulation::RoverSimulation;
@@ -40,7 +40,7 @@ pub fn equipped() -> ModelDescription {
             });
             body.damping = Some(40.0);
             body.armature = Some(3.0);
-            body.limits = Some(Limits {
+            body.limits = Some(JointLimits {
                 lower: -0.06,
                 upper: 0.06,
             });
@@ -72,7 +72,7 @@ pub fn equipped() -> ModelDescription {
                 rest: 0.0,
             }),
             damping: Some(60.0),
-            limits: Some(Limits {
+            limits: Some(JointLimits {
                 lower: -0.035,
                 upper: 0.02,
             }),
@@ -465,7 +465,7 @@ fn a_machine_may_have_any_number_of_stops() {
     description.solids.extend((0..40).map(|i| SolidDescription {
         name: format!("arm {i}"),
         mass: 0.1,
-        limits: Some(Limits {
+        limits: Some(JointLimits {
             lower: -1.0,
             upper: 1.0,
         }),

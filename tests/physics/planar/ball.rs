@@ -4,14 +4,14 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::SVector;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::planar::{Ball, Line, Polyline, Sine, Spline};
+use rover_core::planar::{Line, PlanarBall, Polyline, Sine, Spline};
 use rover_core::simulation::PlanarSimulation;
 
 use super::scenes::{G, VARIANTS, ball_on, count, level, options, speed};
 
-fn disc() -> Ball {
+fn disc() -> PlanarBall {
     // A homogeneous disc: J = m r²/2.
-    Ball::new(2.0, 0.3, 0.09).unwrap()
+    PlanarBall::new(2.0, 0.3, 0.09).unwrap()
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn a_ball_rolls_down_a_line_at_the_closed_form() {
     // a = g sin α/(1 + J/(m r²)), as long as μ ≥ tan α/(1 + m r²/J).
     for (alpha, ratio) in [(0.2_f64, 0.5), (0.5, 0.4), (0.5, 1.0)] {
         let limit = alpha.tan() / (1.0 + 1.0 / ratio);
-        let ball = Ball::new(2.0, 0.3, ratio * 2.0 * 0.09).unwrap();
+        let ball = PlanarBall::new(2.0, 0.3, ratio * 2.0 * 0.09).unwrap();
         for (mu, acceleration) in [
             (1.001 * limit, G * alpha.sin() / (1.0 + ratio)),
             (0.9 * limit, G * (alpha.sin() - 0.9 * limit * alpha.cos())),
@@ -109,7 +109,7 @@ fn a_sliding_ball_rolls_when_and_as_fast_as_the_closed_form_says() {
     // v₀ without spin: rolls at t* = v₀/(μ g (1 + m r²/J)) with v₀/(1 + J/(m r²)).
     let (v0, mu) = (3.0, 0.25);
     for ratio in [0.5, 0.4] {
-        let ball = Ball::new(2.0, 0.3, ratio * 2.0 * 0.09).unwrap();
+        let ball = PlanarBall::new(2.0, 0.3, ratio * 2.0 * 0.09).unwrap();
         let rolling = v0 / (1.0 + ratio);
         let time = v0 / (mu * G * (1.0 + 1.0 / ratio));
         for h in [5e-3, 1e-3] {
@@ -139,7 +139,7 @@ fn a_sliding_ball_rolls_when_and_as_fast_as_the_closed_form_says() {
 #[test]
 fn a_ball_in_a_valley_narrower_than_itself_rests_on_two_points() {
     // y = sin x has radius of curvature 1 at its bottom, the ball 1.5.
-    let ball = Ball::new(3.0, 1.5, 3.375).unwrap();
+    let ball = PlanarBall::new(3.0, 1.5, 3.375).unwrap();
     let sine = Sine::new(1.0, TAU, 0.0, 0.0).unwrap();
     let mut simulation = ball_on(sine, ball, options(9.8, 0.6, 0.0, 5e-3));
     simulation

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{Kinematics, Limits, Model, ModelDescription, Motor, coordinates};
+use rover_core::multibody::{JointLimits, Kinematics, Model, ModelDescription, Motor, coordinates};
 use rover_core::planar::{ContactRule, Line, MirroredRover, PlanarError, Sine};
 use rover_core::simulation::{PlanarSimulation, RoverSimulation};
 
@@ -246,7 +246,7 @@ fn a_rover_without_a_mirror_image_is_refused_by_name() {
     let mut stopped = ModelDescription::rover();
     for solid in &mut stopped.solids {
         if solid.name.ends_with("bogie") {
-            solid.limits = Some(Limits {
+            solid.limits = Some(JointLimits {
                 lower: -0.5,
                 upper: 0.5,
             });

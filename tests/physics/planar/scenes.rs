@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
-use rover_core::planar::{Ball, ContactRule, Ground, Line, PlanarTree};
+use rover_core::planar::{ContactRule, Line, PlanarBall, PlanarGround, PlanarTree};
 use rover_core::simulation::PlanarSimulation;
 
 pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
@@ -31,8 +31,8 @@ pub fn unprojected(options: &StepOptions) -> StepOptions {
 
 /// A ball on a ground with true contact.
 pub fn ball_on(
-    ground: impl Ground + 'static,
-    ball: Ball,
+    ground: impl PlanarGround + 'static,
+    ball: PlanarBall,
     options: StepOptions,
 ) -> PlanarSimulation {
     PlanarSimulation::new(ball, Arc::new(ground), ContactRule::Nearest, options).unwrap()

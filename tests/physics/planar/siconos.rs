@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::planar::{Ball, ContactRule, Ground, Line, Sine};
+use rover_core::planar::{ContactRule, Line, PlanarBall, PlanarGround, Sine};
 use rover_core::simulation::PlanarSimulation;
 
 use super::scenes::{count, options, unprojected};
@@ -22,7 +22,7 @@ fn rows(name: &str) -> Vec<Vec<f64>> {
 }
 
 fn report_ball(
-    ground: impl Ground + 'static,
+    ground: impl PlanarGround + 'static,
     friction: f64,
     time_step: f64,
     variant: Variant,
@@ -31,7 +31,7 @@ fn report_ball(
         variant,
         ..unprojected(&options(9.8, friction, 0.7, time_step))
     };
-    let ball = Ball::new(3.0, 1.5, 4.05).unwrap();
+    let ball = PlanarBall::new(3.0, 1.5, 4.05).unwrap();
     let mut simulation =
         PlanarSimulation::new(ball, Arc::new(ground), ContactRule::CentreHeight, options).unwrap();
     simulation.set_state(&[5.0, 10.0, 0.0], &[0.0; 3]).unwrap();

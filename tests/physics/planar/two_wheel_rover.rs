@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector, Vector2};
 use rover_core::geometry::Support;
 use rover_core::integrator::StepOptions;
 use rover_core::planar::{
-    ContactRule, Ground, Line, PlanarTree, PlanarWheel, Polyline, Sine, TwoWheelRover,
+    ContactRule, Line, PlanarGround, PlanarTree, PlanarWheel, Polyline, Sine, TwoWheelRover,
 };
 use rover_core::simulation::PlanarSimulation;
 
@@ -48,7 +48,7 @@ fn lopsided() -> TwoWheelRover {
 }
 
 fn on(
-    ground: impl Ground + 'static,
+    ground: impl PlanarGround + 'static,
     rover: TwoWheelRover,
     options: StepOptions,
 ) -> PlanarSimulation {
@@ -381,7 +381,7 @@ fn it_drives_over_waves_and_up_a_step() {
     let waves = Sine::new(0.08, 1.5, 0.0, 0.0).unwrap();
     let step = Polyline::step(1.2, 0.05).unwrap();
     for (ground, torque, way) in [
-        (Arc::new(waves) as Arc<dyn Ground>, 45.0, 3.0),
+        (Arc::new(waves) as Arc<dyn PlanarGround>, 45.0, 3.0),
         (Arc::new(step), 90.0, 3.0),
     ] {
         let mut simulation = PlanarSimulation::new(

@@ -5,8 +5,9 @@ use rover_core::sand::patch::Relief;
 use rover_core::sand::ruts::RutsNear;
 use rover_core::sand::test_bed::rules_within;
 use rover_core::sand::{
-    Bed, Derivatives, Drive, Law, Measured, Memory, Points, Resistive, Rules, RutMap, SandWheel,
-    Soil, Sunk, TestBed, Twist, WheelPose, Window, react, react_with,
+    Bed, Derivatives, GaussRules, Memory, OperatingPoint, Points, Resistive, RutMap, SandWheel,
+    Soil, StressLaw, Sunk, TestBed, WheelPerformance, WheelPose, WheelTwist, Window, react,
+    react_with,
 };
 use rover_core::scalar::Instructions;
 
@@ -21,8 +22,8 @@ const WHEEL: SandWheel = SandWheel {
 };
 
 /// 24 points along every arc, and these numbers across the drum and along the radius of a wall.
-fn fine_rules(across: usize, radial: usize) -> Rules {
-    Rules::new(Points {
+fn fine_rules(across: usize, radial: usize) -> GaussRules {
+    GaussRules::new(Points {
         drum: [24, across],
         edge: 24,
         wall: [24, radial],
@@ -37,8 +38,8 @@ fn bed_of(soil: Soil) -> TestBed {
     }
 }
 
-fn drive(rate: f64, slip_angle: f64, load: f64) -> Drive {
-    Drive {
+fn drive(rate: f64, slip_angle: f64, load: f64) -> OperatingPoint {
+    OperatingPoint {
         speed: 0.1,
         rate,
         slip_angle,
@@ -49,8 +50,8 @@ fn drive(rate: f64, slip_angle: f64, load: f64) -> Drive {
 
 fn stiffness(soil: &Soil) -> f64 {
     match &soil.law {
-        Law::Resistive(sand) => sand.stiffness(9.81),
-        Law::Bekker(_) => panic!("invariant: a resistive soil"),
+        StressLaw::Resistive(sand) => sand.stiffness(9.81),
+        StressLaw::Bekker(_) => panic!("invariant: a resistive soil"),
     }
 }
 
@@ -289,7 +290,7 @@ fn the_number_of_points_follows_the_accuracy() {
     );
     assert!(coarse.n_points() < fine.n_points());
     let exact = fine_rules(12, 24);
-    let at = |rules: &Rules| {
+    let at = |rules: &GaussRules| {
         let bed = TestBed {
             wheel: WHEEL,
             soil: soil.clone(),
@@ -297,7 +298,7 @@ fn the_number_of_points_follows_the_accuracy() {
         };
         let drive = drive(1.3, 0.2, 1.0);
         let memory = Memory::steady(
-            &Twist {
+            &WheelTwist {
                 linear: Vector3::new(0.1, 0.0, 0.02),
                 angular: Vector3::new(0.0, 0.0, -1.3),
             },
@@ -330,12 +331,12 @@ fn forces_follow_the_scaling_laws_of_grains() {
         let rate = 1.0 / (1.0 - slip);
         let one = small.steady(&drive(rate, angle, 20.0)).unwrap();
         let two = large.steady(&drive(0.5 * rate, angle, 160.0)).unwrap();
-        let moon = Drive {
+        let moon = OperatingPoint {
             gravity: 9.81 / 6.0,
             ..drive(rate, angle, 20.0 / 6.0)
         };
         let moon = small.steady(&moon).unwrap();
-        let fast = Drive {
+        let fast = OperatingPoint {
             speed: 0.3,
             ..drive(3.0 * rate, angle, 20.0)
         };
@@ -366,7 +367,7 @@ fn a_run_ends_in_steady_motion() {
         let drive = drive(1.25, 0.2, 20.0);
         let steady = bed.steady(&drive).unwrap();
         let mut state = Sunk::default();
-        let mut last = Measured::default();
+        let mut last = WheelPerformance::default();
         for _ in 0..2000 {
             last = bed.advance(&mut state, &drive, 20.0 / 9.81, 0.005);
         }
@@ -386,7 +387,7 @@ fn wrong_numbers_are_refused_by_name() {
     let mut soil = dry_sand();
     soil.memory = 0.0;
     assert_eq!(soil.check().unwrap_err().field(), "memory");
-    let Law::Resistive(sand) = &dry_sand().law else {
+    let StressLaw::Resistive(sand) = &dry_sand().law else {
         panic!("invariant: a resistive soil");
     };
     let wrong = Resistive {
@@ -394,7 +395,7 @@ fn wrong_numbers_are_refused_by_name() {
         ..sand.clone()
     };
     let soil = Soil {
-        law: Law::Resistive(wrong),
+        law: StressLaw::Resistive(wrong),
         ..dry_sand()
     };
     assert_eq!(soil.check().unwrap_err().field(), "density");

@@ -2,7 +2,7 @@
 //! and Hanamoto.
 
 use rover_core::sand::test_bed::rules_within;
-use rover_core::sand::{Bekker, Drive, Law, SandWheel, Soil, TestBed};
+use rover_core::sand::{Bekker, OperatingPoint, SandWheel, Soil, StressLaw, TestBed};
 
 use super::sand_scenes::bekker_sand;
 
@@ -117,7 +117,7 @@ fn bed(soil: &Bekker, [radius, width]: [f64; 2]) -> TestBed {
         grousers: 0,
     };
     let soil = Soil {
-        law: Law::Bekker(*soil),
+        law: StressLaw::Bekker(*soil),
         ..bekker_sand()
     };
     TestBed {
@@ -132,7 +132,7 @@ fn compare(bed: &TestBed, load: f64, slip: f64, [depth, pull, torque]: [f64; 3])
     let radius = bed.wheel.radius;
     for forward in [1.0, -1.0] {
         let found = bed
-            .steady(&Drive {
+            .steady(&OperatingPoint {
                 speed: 0.02 * forward,
                 rate: 0.02 * forward / (1.0 - slip) / radius,
                 slip_angle: 0.0,
@@ -157,7 +157,7 @@ fn compare(bed: &TestBed, load: f64, slip: f64, [depth, pull, torque]: [f64; 3])
 #[test]
 fn options_out_of_range_are_refused_by_name() {
     let with = |law: Bekker| Soil {
-        law: Law::Bekker(law),
+        law: StressLaw::Bekker(law),
         ..bekker_sand()
     };
     let steep = Bekker {

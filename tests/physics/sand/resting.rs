@@ -1,7 +1,7 @@
 //! Rest on sand: sinkage under the weight, no creep, every step and mass.
 
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
-use rover_core::sand::{Bekker, Law, Soil};
+use rover_core::sand::{Bekker, Soil, StressLaw};
 
 use super::published_law::SIMULANT;
 use super::sand_scenes::{bekker_sand, dry_sand, placed, total_force, wide};
@@ -109,7 +109,7 @@ fn a_rover_rests_in_bekkers_soil_after_any_motion() {
         ..SIMULANT
     };
     let [moving, sinking] = [moving, sinking].map(|law| Soil {
-        law: Law::Bekker(law),
+        law: StressLaw::Bekker(law),
         ..bekker_sand()
     });
     let model = wide("open-rover", 0.08, 3.0 / 12.7);

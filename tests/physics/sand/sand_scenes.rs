@@ -6,7 +6,7 @@ use rover_core::geometry::{Plane, SoftGround, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::nalgebra::Vector3;
-use rover_core::sand::{Bekker, Flow, Interface, Law, Resistive, Soil};
+use rover_core::sand::{Bekker, Flow, Interface, Resistive, Soil, StressLaw};
 use rover_core::simulation::RoverSimulation;
 
 /// Dry sand with the fitted properties of `docs/sand.md`.
@@ -16,7 +16,7 @@ pub fn dry_sand() -> Soil {
         follow: 7.5,
     };
     Soil {
-        law: Law::Resistive(Resistive {
+        law: StressLaw::Resistive(Resistive {
             density: 1330.0,
             internal_friction: 0.554,
             stiffness_factor: 1.0,
@@ -42,7 +42,7 @@ pub fn dry_sand() -> Soil {
 /// The same ground in Bekker's model.
 pub fn bekker_sand() -> Soil {
     Soil {
-        law: Law::Bekker(Bekker {
+        law: StressLaw::Bekker(Bekker {
             cohesive_modulus: 0.0,
             frictional_modulus: 1.5e6,
             exponent: 1.1,

@@ -195,7 +195,7 @@ class Overlays {
     }
     this.arrows = channel("forces") ? new Arrows(view, n, colourOf(scene.force)) : null;
     this.chains = channel("chains") ? new (view.balls ? Beams : Chains)(view, channel("chains")) : null;
-    this.sights = new Sights(view);
+    this.markers = new Markers(view);
     this.tyres = scene.wheels.map(({ frame }) => (frame === undefined ? [] : view.frames[frame].children));
   }
 
@@ -205,7 +205,7 @@ class Overlays {
     const { scene, rocks } = this.view;
     const { balls } = this.view;
     const all = [["marks", "m", this.bands && !balls], ["trails", "v", this.bands], ["forces", "f", this.arrows || (balls && this.chains)],
-      ...this.sights.offers(),
+      ...this.markers.offers(),
       ["loads", "l", this.arrows], ["slope", "h", scene.rover && !balls], ["spheres", "k", rocks.children.length]];
     const reason = (name) => scene.missing?.[name] ?? (name === "spheres" ? "there are no rocks" : "not recorded in this run");
     return all.filter(([, , there]) => there || scene.rover).map(([name, key, there]) => [name, key, there ? "" : reason(name)]);
@@ -216,7 +216,7 @@ class Overlays {
     const marked = on.has("marks") && !scene.ruts && !this.view.balls;
     this.bands?.draw(this.live ? Infinity : k + 1, on.has("trails"), on.has("trails") || marked, scene.wheels);
     this.chains?.show(on.has("forces"), before.chains);
-    if (!this.arrows) this.sights.show({ before, after, share }, []);
+    if (!this.arrows) this.markers.show({ before, after, share }, []);
     if (!this.arrows) return;
     const value = (i, c) => before.forces.value(i, c, after.forces, share);
     const forces = scene.wheels.map((_, i) => ({
@@ -226,7 +226,7 @@ class Overlays {
     const axis = (i, c) => before.normals?.value(i, c, after.normals, share) ?? (c === 1 ? 1 : 0);
     const contacts = forces.map(({ foot, vector }, i) =>
       ({ foot, force: vector.clone(), normal: new THREE.Vector3(axis(i, 0), axis(i, 1), axis(i, 2)).normalize() }));
-    this.sights.show({ before, after, share }, contacts);
+    this.markers.show({ before, after, share }, contacts);
     this.tyres.forEach((meshes, i) => this.colour(meshes, on.has("loads") ? 0.5 * forces[i].vector.length() : null));
     const size = scene.arrow ?? scene.reach;
     for (const { vector } of forces) vector.multiplyScalar(ARROW * size);

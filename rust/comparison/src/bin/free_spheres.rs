@@ -9,14 +9,14 @@
 use std::error::Error;
 use std::time::Instant;
 
-use rover_comparison::sphere_scenes::{Scene, run};
+use rover_comparison::sphere_scenes::{SphereScene, run};
 use rover_core::nalgebra::Vector3;
 
 /// CPU time of this thread if the system provides it, otherwise wall time, s.
 fn clock(origin: Instant) -> f64 {
     // Nanoseconds on a processor come first.
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let first = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+    let statistics = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let first = statistics.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
     first.map_or_else(|| origin.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
 }
 
@@ -32,10 +32,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             step => steps.push(step.parse::<f64>()?),
         }
     }
-    let is_wanted = |scene: &Scene| wanted.as_deref().is_none_or(|name| name == scene.name());
+    let is_wanted = |scene: &SphereScene| wanted.as_deref().is_none_or(|name| name == scene.name());
     let origin = Instant::now();
     let mut scenes = Vec::new();
-    for scene in Scene::ALL.into_iter().filter(is_wanted) {
+    for scene in SphereScene::ALL.into_iter().filter(is_wanted) {
         let mut runs = Vec::new();
         for &treatment in scene.treatments().iter().filter(|_| !only_start) {
             for &step in &steps {

@@ -8,7 +8,7 @@
 use std::error::Error;
 
 use rover_comparison::SCHEMES;
-use rover_comparison::measure::{Measured, accumulation, measure};
+use rover_comparison::measure::{SchemeMeasurement, accumulation, measure};
 
 fn number(x: Option<f64>) -> String {
     x.map_or_else(|| "-".to_owned(), |x| format!("{x:.2}"))
@@ -18,7 +18,7 @@ fn power(x: Option<f64>) -> String {
     x.map_or_else(|| "-".to_owned(), |x| format!("{x:.1e}"))
 }
 
-fn print_row(m: &Measured) {
+fn print_row(m: &SchemeMeasurement) {
     print!("{:<40}", m.name);
     for order in m.orders {
         print!("{:>9}", number(order));

@@ -11,7 +11,9 @@ use super::limit;
 use super::pair::Contact;
 use super::part::Part;
 use super::rollers;
-use super::rows::{Path, Triple, add_product, add_scaled, along, close_stop, product, square};
+use super::rows::{
+    Triple, VelocityPath, add_product, add_scaled, along, close_stop, product, square,
+};
 use crate::multibody::{Factor, Mechanism, Model, Poses};
 
 /// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.
@@ -124,7 +126,7 @@ impl ContactSystem {
         } else {
             let u = match limit::joint_row(model, contact) {
                 Some((_, sign, row)) => {
-                    Path::of(mechanism, contact.body).write_joint(row, sign, motion.v, rows)
+                    VelocityPath::of(mechanism, contact.body).write_joint(row, sign, motion.v, rows)
                 }
                 None => write_rows(motion, contact, rows),
             };

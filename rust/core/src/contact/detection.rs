@@ -42,7 +42,7 @@ pub fn detect(
     out: &mut Vec<Contact>,
 ) -> Option<[f64; 2]> {
     out.clear();
-    let machine = Moving {
+    let machine = MovingMachine {
         model,
         middle: &Still::new(model.mechanism(), kinematics.poses(), v),
         end: &Still::new(model.mechanism(), end.poses(), v),
@@ -53,7 +53,7 @@ pub fn detect(
 /// A machine in a step: at its midpoint, where gaps and velocities are measured, and at its
 /// predicted end.
 #[derive(Clone, Copy)]
-pub(crate) struct Moving<'a, S> {
+pub(crate) struct MovingMachine<'a, S> {
     pub model: &'a Model,
     pub middle: &'a S,
     pub end: &'a S,
@@ -63,7 +63,7 @@ pub(crate) struct Moving<'a, S> {
 #[inline]
 pub(crate) fn detect_parts<S: BodyMotion>(
     parts: impl Iterator<Item = Part>,
-    machine: &Moving<'_, S>,
+    machine: &MovingMachine<'_, S>,
     terrain: &dyn Terrain,
     activation: &Activation,
     out: &mut Vec<Contact>,
@@ -126,7 +126,7 @@ pub(crate) fn fastest_way<S: BodyMotion>(shape: &PlacedShape<'_>, body: usize, m
 
 /// Admits the candidates that become contacts.
 struct Gate<'a, S> {
-    machine: &'a Moving<'a, S>,
+    machine: &'a MovingMachine<'a, S>,
     activation: &'a Activation,
     reach: f64,
     can_be_passed: bool,
@@ -229,7 +229,7 @@ impl<S: BodyMotion> Gate<'_, S> {
 /// Offers the ground contacts of one part.
 #[inline]
 fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<'_, S>) {
-    let Moving { model, middle, end } = *gate.machine;
+    let MovingMachine { model, middle, end } = *gate.machine;
     let body = part.body(model);
     let base = &middle.origin(body);
     let (R, r) = middle.pose(body);
@@ -399,7 +399,7 @@ fn on_surface(point: &SurfacePoint) -> SurfacePoint {
 /// passes the sphere.
 fn touch<S: BodyMotion>(
     placed: &Placed<'_>,
-    machine: &Moving<'_, S>,
+    machine: &MovingMachine<'_, S>,
     ground: &Sphere,
     base: &Vector3<f64>,
     half_way: &Vector3<f64>,

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use super::body_motion::{BodyMotion, Still};
 use super::limit;
 use super::pair::Contact;
-use super::rows::{Path, Place, Triple};
+use super::rows::{Place, Triple, VelocityPath};
 use crate::multibody::mechanism::Mechanism;
 use crate::multibody::{Model, Poses};
 use crate::scalar::Vec3;
@@ -42,7 +42,7 @@ pub(super) fn write_rows(
     rows: &mut [Triple<f64>],
 ) -> Triple<f64> {
     let place = place_at(motion, contact, contact.body);
-    let path = Path::of(motion.mechanism, contact.body);
+    let path = VelocityPath::of(motion.mechanism, contact.body);
     path.write(|m| motion.motion(m), &place, motion.v, rows)
 }
 
@@ -66,15 +66,16 @@ pub(crate) fn for_each_row(
 pub(crate) fn sides<'a>(
     mechanism: &'a Mechanism,
     contact: &Contact,
-) -> impl Iterator<Item = (usize, f64, Path<'a>)> {
-    let own = Path::of(mechanism, contact.body);
-    let other = (contact.other).map(|other| (other.body, -1.0, Path::of(mechanism, other.body)));
+) -> impl Iterator<Item = (usize, f64, VelocityPath<'a>)> {
+    let own = VelocityPath::of(mechanism, contact.body);
+    let other =
+        (contact.other).map(|other| (other.body, -1.0, VelocityPath::of(mechanism, other.body)));
     let base = other.and_then(|(.., path)| path.base);
     let is_common = base.is_some() && base == own.base;
     let all = std::iter::once((contact.body, 1.0, own)).chain(other);
     all.map(move |(body, sign, path)| {
         let base = path.base.filter(|_| !is_common);
-        (body, sign, Path { base, ..path })
+        (body, sign, VelocityPath { base, ..path })
     })
 }
 

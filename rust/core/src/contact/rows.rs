@@ -1,6 +1,6 @@
 //! Rows of the contact Jacobian H, and products with them, over lanes.
 //!
-//! A row is nonzero for the velocities that move the contact: along a [`Path`]. With
+//! A row is nonzero for the velocities that move the contact: along a [`VelocityPath`]. With
 //! `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H`, a column of Z is nonzero along the same path, and the
 //! Delassus operator is `W = Hᵀ M̂⁻¹ H = Zᵀ Z`. A block of W is a product over the velocities that
 //! two contacts share; no dense product is formed.
@@ -10,11 +10,9 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::multibody::Motion;
-use crate::multibody::mechanism::{BASE, Mechanism, Mover};
+use crate::multibody::mechanism::{BASE, Mechanism, PathVelocity};
 use crate::scalar::{Lane, Vec3};
-
-/// Numbers of a contact along n, t and b.
-pub(crate) type Triple<T> = [T; 3];
+pub(crate) use crate::solver::batch::problem::Triple;
 
 /// A contact point relative to the origin of a tree, m, and the contact's frame.
 #[derive(Clone, Copy, Debug)]
@@ -60,13 +58,13 @@ impl<T: Lane> Place<T> {
 /// The velocities that move a contact: of a free base, which are consecutive, then of joints,
 /// outwards.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Path<'a> {
+pub(crate) struct VelocityPath<'a> {
     /// First velocity of the base.
     pub base: Option<usize>,
-    pub movers: &'a [Mover],
+    pub movers: &'a [PathVelocity],
 }
 
-impl<'a> Path<'a> {
+impl<'a> VelocityPath<'a> {
     /// Path of a contact on a body.
     #[inline(always)]
     pub(crate) fn of(mechanism: &'a Mechanism, body: usize) -> Self {

@@ -30,15 +30,15 @@
 //! what contacts that yield release ([`super::yielding`]).
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use super::balance::{Balance, Conditions, Correction, Energies, Limits, select_both};
+use super::balance::{AuditLimits, Balance, Conditions, Correction, Energies, select_both};
 use super::data::{DataOf, Obstacle};
 use super::dynamics::Dynamics;
-use super::forces::{Forces, Start};
+use super::forces::{Forces, StepStart};
 use super::grouped::Grouped;
 use super::local::Local;
 use super::systems::Systems;
 use super::work::Work;
-use super::yielding::weigh_treads;
+use super::yielding::find_tread_energies;
 use crate::scalar::{Lane, LaneMask, Vec3};
 
 /// Finds the energies at the start of a step where they are not known.
@@ -61,13 +61,13 @@ pub(super) fn judge<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &S::Prob
         find_work(s, d);
         return;
     }
-    weigh(s, d);
+    find_energies_and_work(s, d);
     let token = d.token;
     let is_corrected = S::run(
         token,
         #[inline(always)]
         || {
-            let (is_lost, is_corrected) = audit(s, d, Limits::USUAL, |_| S::T::mask(token, 0));
+            let (is_lost, is_corrected) = audit(s, d, AuditLimits::USUAL, |_| S::T::mask(token, 0));
             if is_corrected.any() {
                 correct(s, d, problems);
             }
@@ -76,7 +76,7 @@ pub(super) fn judge<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &S::Prob
         },
     );
     if is_corrected.any() {
-        weigh_ends(s, d);
+        find_energies(s, d);
     }
     S::run(
         token,
@@ -90,21 +90,21 @@ pub(super) fn judge<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &S::Prob
 }
 
 /// Energies at the end of the step, and the work of the systems' own forces.
-pub(super) fn weigh<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
-    weigh_ends(s, d);
+pub(super) fn find_energies_and_work<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+    find_energies(s, d);
     find_work(s, d);
 }
 
 /// The work of the systems' own forces.
 pub(super) fn find_work<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
-    let start = Start::at(&d.start, &d.v[..]);
+    let start = StepStart::at(&d.start, &d.v[..]);
     let work = &mut d.energies.of_drives;
     work.fill(Work::none(S::T::splat(d.token, 0.0)));
     s.machine_mut().work(&d.options, start, &d.v_end, work);
 }
 
 /// Energies and momenta at the end of the step, of clusters and of groups.
-pub(super) fn weigh_ends<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+pub(super) fn find_energies<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     let mut own = std::mem::take(&mut d.energies);
     let none = Vec3::splat(d.token, [0.0; 3]);
     let (balances, is_held) = (&mut d.balances, &d.is_held);
@@ -159,13 +159,14 @@ fn gather<S: Systems>(
     }
 }
 
-/// Balances what was weighed. Returns the lanes of which a group must take its step otherwise, and
-/// those of which one is to be corrected. `last`: by leader, lanes with no other way to take it.
+/// Balances the energies that were found. Returns the lanes of which a group must take its step
+/// otherwise, and those of which one is to be corrected. `last`: by leader, lanes with no other way
+/// to take it.
 #[inline(always)]
 pub(super) fn audit<S: Systems>(
     s: &mut S,
     d: &mut DataOf<S>,
-    limits: Limits,
+    limits: AuditLimits,
     last: impl Fn(usize) -> <S::T as Lane>::Mask,
 ) -> (<S::T as Lane>::Mask, <S::T as Lane>::Mask) {
     let mut own = std::mem::take(&mut d.energies);
@@ -185,7 +186,7 @@ pub(super) fn audit<S: Systems>(
         gather(s, balances, number, |own| &mut own.work.of_springs);
         gather(s, balances, number, |own| &mut own.stored);
     }
-    weigh_treads(s, d, &mut own);
+    find_tread_energies(s, d, &mut own);
     for (cluster, mass) in own.mass.iter_mut().enumerate() {
         *mass = s.machine().mass(cluster).unwrap_or(d.number(0.0));
     }

@@ -23,14 +23,14 @@ pub(crate) struct Conditions<T: Lane> {
 
 /// Limits of an audit, as fractions of the kinetic energy.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Limits {
+pub(crate) struct AuditLimits {
     /// What may be gained, see [`GAIN`].
     pub gain: f64,
     /// What free flight may gain or lose: an error of the scheme's order that does not accumulate.
     pub drift: f64,
 }
 
-impl Limits {
+impl AuditLimits {
     /// The limits of a whole step.
     pub const USUAL: Self = Self {
         gain: GAIN,
@@ -198,7 +198,7 @@ impl<T: Lane> Balance<T> {
         &mut self,
         released: T,
         conditions: &Conditions<T>,
-        limits: Limits,
+        limits: AuditLimits,
         [going, last]: [T::Mask; 2],
     ) {
         let work = self.work.total();

@@ -28,7 +28,7 @@ const RAISE: f64 = 2.0;
 
 /// Kinetic energy, J, and linear momentum, kg m/s, of a state.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Moving<T> {
+pub(crate) struct EnergyMomentum<T> {
     pub kinetic: T,
     pub momentum: Vec3<T>,
 }
@@ -47,7 +47,12 @@ impl<T: Lane> Carried<T> {
     /// generalised velocity. `mass`: of the whole, kg. `is_alone`: where nothing outside touches
     /// the system.
     #[inline(always)]
-    pub(crate) fn new(before: Moving<T>, after: Moving<T>, mass: T, is_alone: T::Mask) -> Self {
+    pub(crate) fn new(
+        before: EnergyMomentum<T>,
+        after: EnergyMomentum<T>,
+        mass: T,
+        is_alone: T::Mask,
+    ) -> Self {
         let (zero, one) = (mass.like(0.0), mass.like(1.0));
         let share = |before: T, after: T| {
             let ratio = (before.max(zero) / after).min(mass.like(RAISE));
@@ -55,7 +60,7 @@ impl<T: Lane> Carried<T> {
             T::select(zero.lt(after), ratio, one).sqrt()
         };
         let whole = share(before.kinetic, after.kinetic);
-        let inner = |state: &Moving<T>| {
+        let inner = |state: &EnergyMomentum<T>| {
             state.kinetic - state.momentum.dot(state.momentum) / (mass.like(2.0) * mass)
         };
         let relative = share(inner(&before), inner(&after));
@@ -77,11 +82,11 @@ mod tests {
 
     const MASSES: [f64; 2] = [1.0, 100.0];
 
-    fn moving(velocities: &[Vec3<f64>; 2]) -> Moving<f64> {
+    fn moving(velocities: &[Vec3<f64>; 2]) -> EnergyMomentum<f64> {
         let both = || MASSES.iter().zip(velocities);
         let kinetic = both().map(|(m, v)| 0.5 * m * v.dot(*v)).sum();
         let momentum = both().map(|(m, v)| *v * *m);
-        Moving {
+        EnergyMomentum {
             kinetic,
             momentum: momentum.fold(Vec3::new(0.0, 0.0, 0.0), |sum, p| sum + p),
         }

@@ -138,7 +138,7 @@ impl HeldLaw {
 
     /// How the impulses answer changes. `W`: row-major. `is_common`: contacts whose friction is the
     /// common coefficient.
-    pub(crate) fn answer(&self, W: &[f64], is_common: &[bool]) -> Answer {
+    pub(crate) fn answer(&self, W: &[f64], is_common: &[bool]) -> ImpulseDerivative {
         let (d, size) = (self.d, self.p.len());
         let width = 2 * size + 1;
         // Rows of [law | −of_u | −of_mu] with law = of_u W + of_p.
@@ -192,13 +192,13 @@ impl HeldLaw {
 
 /// `dp = of_u du⁰ + of_mu dμ`.
 #[derive(Clone, Debug)]
-pub(crate) struct Answer {
+pub(crate) struct ImpulseDerivative {
     size: usize,
     /// Rows of of_u with the entry of of_mu behind.
     rows: Vec<f64>,
 }
 
-impl Answer {
+impl ImpulseDerivative {
     /// The rows of of_u, each with its entry of of_mu.
     pub(crate) fn rows(&self) -> impl Iterator<Item = (&[f64], f64)> {
         let rows = self.rows.chunks_exact(self.size + 1);
@@ -208,7 +208,7 @@ impl Answer {
 
 /// A solution X of `A X = B` with A square, be it singular; B must then be in its range. `rows`:
 /// those of [A | B].
-fn solve(n: usize, mut rows: Vec<f64>) -> Answer {
+fn solve(n: usize, mut rows: Vec<f64>) -> ImpulseDerivative {
     let width = rows.len().checked_div(n).unwrap_or(0);
     let mut order: Vec<usize> = (0..n).collect();
     let (mut rank, mut largest) = (0, 0.0_f64);
@@ -262,7 +262,7 @@ fn solve(n: usize, mut rows: Vec<f64>) -> Answer {
             *x = sum / row[k];
         }
     }
-    Answer {
+    ImpulseDerivative {
         size: m.saturating_sub(1),
         rows: X,
     }

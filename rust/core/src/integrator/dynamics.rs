@@ -7,7 +7,7 @@ use crate::scalar::{Lane, Vec3};
 const TOLERATED: f64 = 1e-8;
 
 /// A truth value for each lane of systems.
-pub type MaskOf<S> = <<S as Dynamics>::T as Lane>::Mask;
+pub type DynamicsMask<S> = <<S as Dynamics>::T as Lane>::Mask;
 
 /// What moves, and its inertia: one system, or one in each lane of the scalar. Vectors of factor
 /// coordinates as in [`super::mechanical_system`].
@@ -60,13 +60,13 @@ pub trait Dynamics {
     /// Takes the coordinates of each cluster from another configuration in the lanes of its mask.
     fn take(
         &self,
-        lanes: impl Fn(usize) -> MaskOf<Self>,
+        lanes: impl Fn(usize) -> DynamicsMask<Self>,
         from: &Self::Configuration,
         to: &mut Self::Configuration,
     );
 
     /// Whether every entry of a configuration is finite.
-    fn is_finite(&self, q: &Self::Configuration) -> MaskOf<Self>;
+    fn is_finite(&self, q: &Self::Configuration) -> DynamicsMask<Self>;
 
     /// Removes rounding from a configuration that is about to become the state (unit quaternions).
     fn normalise(&self, _q: &mut Self::Configuration) {}
@@ -79,12 +79,17 @@ pub trait Dynamics {
 
     /// Computes M at the middle pose, and the implicit weights of the stiff forces. `going`: lanes
     /// of the step. `is_first`: unless the step is taken again.
-    fn update_mass_matrix(&mut self, options: &StepOptions, going: MaskOf<Self>, is_first: bool);
+    fn update_mass_matrix(
+        &mut self,
+        options: &StepOptions,
+        going: DynamicsMask<Self>,
+        is_first: bool,
+    );
 
     /// Factors `M̂ = M + (implicit forces) = Fᵀ F`; false if it is not positive definite in
     /// floating point.
     #[must_use]
-    fn factorise(&mut self, options: &StepOptions) -> MaskOf<Self>;
+    fn factorise(&mut self, options: &StepOptions) -> DynamicsMask<Self>;
 
     /// `out = M v` (nv), kg m/s and kg m²/s. Called between `update_mass_matrix` and `factorise`,
     /// which may add implicit terms.
@@ -97,7 +102,7 @@ pub trait Dynamics {
         &mut self,
         _options: &StepOptions,
         _v: &[Self::T],
-        _is_gyroscopic: &mut [MaskOf<Self>],
+        _is_gyroscopic: &mut [DynamicsMask<Self>],
     ) -> Option<Self::T> {
         None
     }
@@ -152,7 +157,7 @@ pub trait Dynamics {
     /// without loops.
     fn close_end(
         &mut self,
-        _lanes: MaskOf<Self>,
+        _lanes: DynamicsMask<Self>,
         _p: &[Self::T],
         _q: &mut Self::Configuration,
         _v: &mut [Self::T],

@@ -1,6 +1,6 @@
 //! The forces of systems, without those of their contacts.
 
-use super::dynamics::{Dynamics, MaskOf};
+use super::dynamics::{Dynamics, DynamicsMask};
 use super::options::StepOptions;
 use super::work::Work;
 
@@ -10,30 +10,30 @@ pub(crate) const MOST_REVISIONS: usize = 6;
 
 /// Start of a step.
 #[derive(Debug)]
-pub struct Start<'a, Q, T = f64> {
+pub struct StepStart<'a, Q, T = f64> {
     /// Configuration.
     pub configuration: &'a Q,
     /// Velocity (nv).
     pub v: &'a [T],
 }
 
-impl<'a, Q, T> Start<'a, Q, T> {
+impl<'a, Q, T> StepStart<'a, Q, T> {
     /// At a configuration and a velocity (nv).
     pub fn at(configuration: &'a Q, v: &'a [T]) -> Self {
         Self { configuration, v }
     }
 }
 
-impl<Q, T> Clone for Start<'_, Q, T> {
+impl<Q, T> Clone for StepStart<'_, Q, T> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<Q, T> Copy for Start<'_, Q, T> {}
+impl<Q, T> Copy for StepStart<'_, Q, T> {}
 
 /// Start of a step of a kind of systems.
-pub type StartOf<'a, S> = Start<'a, <S as Dynamics>::Configuration, <S as Dynamics>::T>;
+pub type StartOf<'a, S> = StepStart<'a, <S as Dynamics>::Configuration, <S as Dynamics>::T>;
 
 /// The impulse of the forces over a step, their branches and their work.
 pub trait Forces: Dynamics {
@@ -98,13 +98,18 @@ pub trait Forces: Dynamics {
     /// Moves each piecewise force of some lanes, at least one, a branch towards that which holds at
     /// `v_end`. Returns the lanes of which a branch has changed, whose step must be repeated. By
     /// default there is none.
-    fn revise(&mut self, lanes: MaskOf<Self>, _v: &[Self::T], _v_end: &[Self::T]) -> MaskOf<Self> {
+    fn revise(
+        &mut self,
+        lanes: DynamicsMask<Self>,
+        _v: &[Self::T],
+        _v_end: &[Self::T],
+    ) -> DynamicsMask<Self> {
         lanes & !lanes
     }
 
     /// Lanes whose repetitions are used up and whose forces are not those at the solution. By
     /// default there is none.
-    fn unsettled(&mut self, lanes: MaskOf<Self>, _v_end: &[Self::T]) -> MaskOf<Self> {
+    fn unsettled(&mut self, lanes: DynamicsMask<Self>, _v_end: &[Self::T]) -> DynamicsMask<Self> {
         lanes & !lanes
     }
 
@@ -143,7 +148,7 @@ pub trait Forces: Dynamics {
 
     /// The step (or part of a step) whose work was last requested becomes the state in some lanes.
     /// By default nothing is recorded.
-    fn accept(&mut self, _lanes: MaskOf<Self>) {}
+    fn accept(&mut self, _lanes: DynamicsMask<Self>) {}
 
     /// [`Self::load`] for the iterate `v_end`: implicit forces enter with their value there. By
     /// default there are none.

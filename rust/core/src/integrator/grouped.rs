@@ -43,7 +43,7 @@ pub(crate) trait Grouped<T: Lane> {
     fn cluster_of(&self, place: usize) -> Option<usize>;
 
     /// The leader of the group of a place's contact in a lane.
-    fn home(&self, place: usize, lane: usize) -> usize;
+    fn group_leader(&self, place: usize, lane: usize) -> usize;
 
     /// Lanes in which a cluster leads its group.
     #[inline(always)]
@@ -136,7 +136,7 @@ pub(crate) trait Grouped<T: Lane> {
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            each(lane, self.home(place, lane));
+            each(lane, self.group_leader(place, lane));
         }
     }
 

@@ -12,7 +12,7 @@
 //! step: dp follows from du, then dλ from the gaps at the end ([`super::contact_modes`]). This page
 //! has what that needs of a step that was taken; `crate::system::tangent` differentiates.
 
-use super::contact_modes::{Answer, HeldLaw};
+use super::contact_modes::{HeldLaw, ImpulseDerivative};
 use super::dynamics::Dynamics;
 use super::local::Local;
 use super::mechanical_system::{MechanicalSystem, UnilateralContact};
@@ -27,7 +27,7 @@ pub(crate) struct HeldStep<C> {
     /// Contacts where the step evaluated them.
     pub contacts: Vec<C>,
     pub law: HeldLaw,
-    pub answer: Answer,
+    pub answer: ImpulseDerivative,
     pub projection: Option<Projection>,
     /// `W` (d n_c, d n_c), row-major.
     pub W: Vec<f64>,
@@ -43,7 +43,7 @@ pub(crate) struct HeldStep<C> {
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
     pub law: HeldLaw,
-    pub answer: Answer,
+    pub answer: ImpulseDerivative,
 }
 
 /// Relative violation of the modes' equations up to which they count as those of the step.
@@ -112,7 +112,7 @@ impl Projection {
                     (u, contact.gap() + options.theta * h * (u - before))
                 }
             };
-            let is_moved = ws.data.is_deep[ws.list.home_of(i)];
+            let is_moved = ws.data.is_deep[ws.list.group_leader_of(i)];
             let may_move = is_moved && !system.is_immovable(i);
             let is_counted = may_move && (gap >= 0.0 || gap + h * u < 0.0);
             displacement[d * i] += if is_counted { gap } else { 0.0 };

@@ -80,7 +80,7 @@ fn compare_impulses<S: Systems>(s: &S, d: &mut DataOf<S>) {
 /// friction of the others counts with its value at the end. That of one that yields is the work of
 /// its slip, and of the deflection that leaves it with the tread.
 #[inline(always)]
-pub(super) fn weigh_contacts<S: Systems>(s: &S, d: &mut DataOf<S>) {
+pub(super) fn find_contact_work<S: Systems>(s: &S, d: &mut DataOf<S>) {
     let half = d.number(0.5);
     let zero = half.like(0.0);
     let mut sums = std::mem::take(&mut d.energies.of_contacts);

@@ -37,7 +37,7 @@ pub(super) struct List<C: UnilateralContact> {
     /// Cluster of each contact that touches no other; empty if the system is one cluster.
     clusters: Vec<Option<usize>>,
     /// Leader of each contact's group.
-    homes: Vec<usize>,
+    group_leaders: Vec<usize>,
     /// Leaders of the groups with contacts, ascending.
     pub groups: Vec<usize>,
     /// By leader: whether an impact without elastic answer is taken as inelastic, by these options.
@@ -88,7 +88,7 @@ impl<C: UnilateralContact> List<C> {
             leaders: Vec::new(),
             is_joined: false,
             clusters: Vec::new(),
-            homes: Vec::new(),
+            group_leaders: Vec::new(),
             groups: Vec::new(),
             is_inelastic: Vec::new(),
             is_last: Vec::new(),
@@ -109,8 +109,8 @@ impl<C: UnilateralContact> List<C> {
     }
 
     /// Leader of the group of a contact.
-    pub fn home_of(&self, i: usize) -> usize {
-        self.homes.get(i).copied().unwrap_or(0)
+    pub fn group_leader_of(&self, i: usize) -> usize {
+        self.group_leaders.get(i).copied().unwrap_or(0)
     }
 
     /// Number of the clusters.
@@ -135,7 +135,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         list.is_inelastic.clear();
         list.is_inelastic.resize(n, false);
         list.clusters.clear();
-        list.homes.clear();
+        list.group_leaders.clear();
         list.groups.clear();
         if n == 1 {
             list.groups.extend((!list.contacts.is_empty()).then_some(0));
@@ -157,10 +157,10 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         }
         for contact in &list.contacts {
             let [cluster, _] = self.system.clusters_of(&contact.key());
-            let home = list.leaders[cluster];
-            list.homes.push(home);
-            if let Err(place) = list.groups.binary_search(&home) {
-                list.groups.insert(place, home);
+            let leader = list.leaders[cluster];
+            list.group_leaders.push(leader);
+            if let Err(place) = list.groups.binary_search(&leader) {
+                list.groups.insert(place, leader);
             }
         }
     }
@@ -168,7 +168,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
     /// The options by which a contact's impact is taken.
     fn law_of(&self, i: usize) -> &StepOptions {
         match &self.list.inelastic {
-            Some(law) if self.list.is_inelastic[self.list.home_of(i)] => law,
+            Some(law) if self.list.is_inelastic[self.list.group_leader_of(i)] => law,
             _ => self.options,
         }
     }
@@ -255,7 +255,7 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
         for (i, contact) in list.contacts.iter().enumerate() {
             let wanted = contact.key();
             if !memory.impulses.iter().any(|(key, _)| *key == wanted) {
-                is_same[list.home_of(i)] = false;
+                is_same[list.group_leader_of(i)] = false;
             }
         }
         for (known, _) in &memory.impulses {
@@ -408,7 +408,7 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
         u: &[Self::Local],
     ) -> Option<[f64; 2]> {
         let (mut lost, mut free) = (0.0, 0.0);
-        for i in (0..u.len()).filter(|i| self.list.home_of(*i) == leader) {
+        for i in (0..u.len()).filter(|i| self.list.group_leader_of(*i) == leader) {
             if problems.p[i][0] > 0.0 {
                 lost += u[i][0] * u[i][0];
             }
@@ -430,7 +430,7 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
         problems.q.fill(Local::splat(0.0));
         problems.p.fill(Local::splat(0.0));
         for (i, gap) in gaps.iter().enumerate() {
-            if is_deep[self.list.home_of(i)] {
+            if is_deep[self.list.group_leader_of(i)] {
                 problems.q[i] = *gap;
             }
         }
@@ -458,7 +458,7 @@ impl<S: MechanicalSystem> Systems for Listed<'_, S> {
         }
         for (i, (u, q)) in problems.u.iter().zip(&problems.q).enumerate() {
             let lever = self.system.lever(&self.list.contacts[i]);
-            let most = &mut farthest[self.list.home_of(i)];
+            let most = &mut farthest[self.list.group_leader_of(i)];
             for k in 0..Self::Local::N {
                 *most = most.max((u[k] - q[k]).abs() * lever);
             }
@@ -517,7 +517,7 @@ impl<C: UnilateralContact> Grouped<f64> for List<C> {
         self.clusters.get(i).copied().unwrap_or(Some(0))
     }
 
-    fn home(&self, i: usize, _: usize) -> usize {
-        self.home_of(i)
+    fn group_leader(&self, i: usize, _: usize) -> usize {
+        self.group_leader_of(i)
     }
 }

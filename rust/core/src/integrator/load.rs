@@ -8,7 +8,7 @@
 
 use super::data::DataOf;
 use super::dynamics::Dynamics;
-use super::forces::{Forces, Start};
+use super::forces::{Forces, StepStart};
 use super::systems::Systems;
 use super::yielding::add_shifts;
 use crate::scalar::{Lane, LaneMask};
@@ -26,7 +26,7 @@ pub(super) fn load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
             || s.generalized_impulse(persists, &d.p_last, &mut d.pushed),
         );
     }
-    let start = Start::at(&d.start, &d.v[..]);
+    let start = StepStart::at(&d.start, &d.v[..]);
     (s.machine_mut()).begin_load(&d.options, start, &mut d.y);
     S::run(
         d.token,
@@ -34,14 +34,14 @@ pub(super) fn load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
         || find_mean(s, d, is_any),
     );
     if d.is_any_implicit() {
-        let start = Start::at(&d.start, &d.v[..]);
+        let start = StepStart::at(&d.start, &d.v[..]);
         let (v_mean, foreseen) = (&d.v_mean, &d.foreseen);
         (s.machine_mut()).load_gyroscopic(&d.options, start, v_mean, foreseen, &mut d.y);
         correct(s, d, is_any);
         d.y_implicit.copy_from_slice(&d.y);
     }
     if d.is_any_explicit() {
-        let start = Start::at(&d.start, &d.v[..]);
+        let start = StepStart::at(&d.start, &d.v[..]);
         (s.machine_mut()).load(&d.options, start, &d.v_mean, &mut d.y);
         correct(s, d, is_any);
     }

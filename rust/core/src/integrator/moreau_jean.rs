@@ -4,7 +4,7 @@
 //! take it is accepted, and its report says what is wrong with it.
 
 use super::audit::note_energies;
-use super::balance::{GAIN, Limits};
+use super::balance::{AuditLimits, GAIN};
 use super::data::{MOST_TURN, Obstacle};
 use super::dynamics::Dynamics;
 use super::error::StepError;
@@ -15,7 +15,7 @@ use super::probe::{Phase, Probe};
 use super::projection::{measure, set_gaps};
 use super::report::StepReport;
 use super::scheme::{finish, prepare, retake, take_answers};
-use super::scratch::{Scratch, ScratchOf, StateMut};
+use super::scratch::{ScratchOf, StateMut, StepScratch};
 use super::shortening::judge_at_last;
 use super::stepping::Integrator;
 use super::warm_start::WarmStart;
@@ -112,7 +112,7 @@ impl Part<'_> {
     ) -> Result<Option<StepReport>, StepError> {
         // Where sweeps end early by design they would do so in a smaller step too.
         let may_halve = self.depth < MOST_HALVINGS && system.solves_to_the_end();
-        let Scratch {
+        let StepScratch {
             data: d,
             list,
             problems,
@@ -124,7 +124,7 @@ impl Part<'_> {
             options: self.options,
             list,
         };
-        let limits = Limits {
+        let limits = AuditLimits {
             gain: GAIN * self.share,
             drift: 0.0,
         };

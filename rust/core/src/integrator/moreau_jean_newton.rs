@@ -19,12 +19,12 @@
 //! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and
 //! the correction r as in [`super::scheme`].
 
-use super::balance::{GAIN, Limits};
+use super::balance::{AuditLimits, GAIN};
 use super::closing::close_end;
 use super::dynamics::Dynamics;
 use super::error::StepError;
-use super::forces::{Forces, MOST_REVISIONS, Start};
-use super::impacts::{find_impacts, weigh_contacts};
+use super::forces::{Forces, MOST_REVISIONS, StepStart};
+use super::impacts::{find_contact_work, find_impacts};
 use super::listed::{Listed, ListedData, PosedOf};
 use super::load::correct_impulse;
 use super::local::Local;
@@ -34,7 +34,7 @@ use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
 use super::scheme::recall;
-use super::scratch::{Scratch, ScratchOf, StateMut};
+use super::scratch::{ScratchOf, StateMut, StepScratch};
 use super::shortening::judge_at_last;
 use super::stepping::Integrator;
 use super::systems::Systems;
@@ -67,7 +67,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         scratch.load(system, &state, warm_start);
-        let Scratch {
+        let StepScratch {
             data: d,
             list,
             problems,
@@ -119,8 +119,8 @@ fn conclude<S: MechanicalSystem>(
     let is_solved = d.reports[0].is_converged();
     s.machine().normalise(&mut d.end);
     find_impacts(s, d);
-    weigh_contacts(s, d);
-    let limits = Limits {
+    find_contact_work(s, d);
+    let limits = AuditLimits {
         gain: GAIN,
         drift: drift(s, d),
     };
@@ -221,7 +221,7 @@ fn begin_iteration<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedDat
     d.shares.clear();
     d.is_gyroscopic.fill(false);
     s.machine_mut().choose_branches(&d.v);
-    s.system.begin_residual(Start {
+    s.system.begin_residual(StepStart {
         configuration: &d.start,
         v: &d.v,
     });
@@ -273,7 +273,7 @@ fn iterate<S: MechanicalSystem>(
     probe.end(Phase::Detection);
     s.machine_mut().update_mass_matrix(options, true, true);
     probe.end(Phase::MassMatrix);
-    let start = Start {
+    let start = StepStart {
         configuration: &d.start,
         v: &d.v,
     };

@@ -13,11 +13,11 @@
 
 use super::audit::each_held;
 use super::balance::select_both;
-use super::carried_velocity::{Carried, Moving};
+use super::carried_velocity::{Carried, EnergyMomentum};
 use super::closing::close_end;
 use super::data::{DataOf, Obstacle};
 use super::dynamics::Dynamics;
-use super::forces::{Forces, Start};
+use super::forces::{Forces, StepStart};
 use super::grouped::Grouped;
 use super::local::Local;
 use super::systems::{MaskOf, Systems};
@@ -208,10 +208,10 @@ pub(super) fn carry_velocity<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     if !is_moved.any() || !s.machine().is_audited() {
         return;
     }
-    let start = Start::at(&d.start, &d.v[..]);
+    let start = StepStart::at(&d.start, &d.v[..]);
     let work = (s.machine_mut()).work_of_displacement(&d.options, start, &d.v_end, &d.y);
     let work = work.unwrap_or(d.number(0.0));
-    weigh_moved(s, d);
+    find_projected_energies(s, d);
     S::run(
         d.token,
         #[inline(always)]
@@ -248,7 +248,7 @@ pub(super) fn carry_velocity<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
 
 /// `energies.kinetic` and `energies.momentum`: kinetic energies and momenta of the groups at the
 /// projected position, with the velocity before it.
-fn weigh_moved<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
+fn find_projected_energies<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     let mut own = std::mem::take(&mut d.energies);
     let zero = d.number(0.0);
     let is_held = &d.is_held;
@@ -276,12 +276,12 @@ fn weigh_moved<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
 fn scale_carried<S: Systems>(s: &S, d: &mut DataOf<S>) {
     let mut own = std::mem::take(&mut d.energies);
     for (cluster, balance) in d.balances.iter().enumerate() {
-        let before = Moving {
+        let before = EnergyMomentum {
             kinetic: balance.after[0],
             momentum: balance.momentum,
         };
         let [x, y, z] = own.momentum.each_ref().map(|all| all[cluster]);
-        let after = Moving {
+        let after = EnergyMomentum {
             kinetic: own.kinetic[cluster],
             momentum: Vec3::new(x, y, z),
         };

@@ -69,7 +69,7 @@ pub struct StepReport {
     pub energy_lost: f64,
     /// Energy that contacts which yield gave off, all steps together, J; negative where they stored
     /// some. What they hold is remembered, so the sum over any run is no more than they held at its
-    /// start. See [`crate::law::compliance::Held`].
+    /// start. See [`crate::law::compliance::SpringEnergy`].
     pub energy_released: f64,
     /// Energy that position projection added against gravity and springs, beyond the actuators'
     /// work on the way, all steps together, J.

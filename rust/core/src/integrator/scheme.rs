@@ -35,7 +35,7 @@ use super::data::{DataOf, Obstacle};
 use super::dynamics::Dynamics;
 use super::forces::Forces;
 use super::grouped::Grouped;
-use super::impacts::{find_impacts, weigh_contacts};
+use super::impacts::{find_contact_work, find_impacts};
 use super::load::load;
 use super::options::Stabilisation;
 use super::probe::{Phase, Probe};
@@ -232,7 +232,7 @@ fn move_on<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &S::Problems) {
     machine.normalise(&mut d.end);
     find_impacts(s, d);
     if s.machine().is_audited() {
-        weigh_contacts(s, d);
+        find_contact_work(s, d);
     }
 }
 

@@ -26,7 +26,7 @@ pub struct StateMut<'a, Q> {
 /// After a step it holds the step's contacts, impulses and local velocities, all measured at its
 /// end. Of a step that was taken in parts it holds the sums of the impulses (`Whole`).
 #[derive(Clone, Debug)]
-pub struct Scratch<Q, C: UnilateralContact> {
+pub struct StepScratch<Q, C: UnilateralContact> {
     pub(super) data: Data<f64, Q, C::Local, C::Key>,
     pub(super) list: List<C>,
     /// The friction-contact problem, and that of the position projection.
@@ -36,7 +36,7 @@ pub struct Scratch<Q, C: UnilateralContact> {
 }
 
 /// Scratch of a system's steps.
-pub type ScratchOf<S> = Scratch<ConfigurationOf<S>, <S as MechanicalSystem>::Contact>;
+pub type ScratchOf<S> = StepScratch<ConfigurationOf<S>, <S as MechanicalSystem>::Contact>;
 
 /// The contacts of all parts of a step that was taken in parts; empty otherwise.
 #[derive(Clone, Debug)]
@@ -80,7 +80,7 @@ impl<C: UnilateralContact + Clone> Whole<C> {
     }
 }
 
-impl<Q: Clone, C: UnilateralContact + Clone> Scratch<Q, C> {
+impl<Q: Clone, C: UnilateralContact + Clone> StepScratch<Q, C> {
     /// Room for n contacts; `q` is any configuration.
     #[must_use]
     pub fn new(q: &Q, n: usize) -> Self {

@@ -4,11 +4,11 @@
 //! A step that ends at rest and still gained energy was stopped before its end: the machine jammed
 //! while the actuators' work was counted to the end, or a contact closed on its way up.
 
-use super::audit::{audit, correct, find_work, weigh, weigh_ends};
-use super::balance::Limits;
+use super::audit::{audit, correct, find_energies, find_energies_and_work, find_work};
+use super::balance::AuditLimits;
 use super::closing::close_end;
 use super::dynamics::Dynamics;
-use super::forces::{Forces, Start};
+use super::forces::{Forces, StepStart};
 use super::listed::{Listed, ListedData, PosedOf};
 use super::local::Local;
 use super::mechanical_system::{LocalOf, MechanicalSystem};
@@ -33,13 +33,13 @@ pub(super) fn judge_at_last<S: MechanicalSystem>(
     s: &mut Listed<'_, S>,
     d: &mut ListedData<S>,
     problems: &PosedOf<S>,
-    limits: Limits,
+    limits: AuditLimits,
 ) -> bool {
     if !s.machine().is_audited() {
         find_work(s, d);
         return true;
     }
-    weigh(s, d);
+    find_energies_and_work(s, d);
     let mut last = std::mem::take(&mut s.list.is_last);
     last.clear();
     last.extend(d.is_gyroscopic.iter().map(|own| *own && d.is_last));
@@ -53,7 +53,7 @@ fn judge_by<S: MechanicalSystem>(
     s: &mut Listed<'_, S>,
     d: &mut ListedData<S>,
     problems: &PosedOf<S>,
-    limits: Limits,
+    limits: AuditLimits,
     last: &[bool],
 ) -> bool {
     let is_last = |leader: usize| last[leader];
@@ -62,7 +62,7 @@ fn judge_by<S: MechanicalSystem>(
         if !shorten_both(s, d, last) {
             break;
         }
-        weigh(s, d);
+        find_energies_and_work(s, d);
         (is_lost, is_corrected) = audit(s, d, limits, is_last);
     }
     if is_lost {
@@ -77,7 +77,7 @@ fn judge_by<S: MechanicalSystem>(
                 hold_back(s, d, leader);
             }
         }
-        weigh_ends(s, d);
+        find_energies(s, d);
     }
     for balance in &d.balances {
         balance.report(&mut d.reports);
@@ -114,7 +114,7 @@ fn shorten_both<S: MechanicalSystem>(
     }
     for (i, u) in d.u.iter_mut().enumerate() {
         for k in 0..LocalOf::<S>::N {
-            u[k] *= shares[s.list.home_of(i)];
+            u[k] *= shares[s.list.group_leader_of(i)];
         }
     }
     let way = s.options.theta * s.options.time_step;
@@ -147,7 +147,7 @@ fn hold_back<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedData<S>, 
         *mean = theta * end + (1.0 - theta) * begin;
     }
     let mut works = vec![Work::default(); is_own.len()];
-    let start = Start::at(&d.start, &d.v[..]);
+    let start = StepStart::at(&d.start, &d.v[..]);
     s.machine_mut().work(options, start, &d.v_end, &mut works);
     let own = works
         .into_iter()
@@ -223,7 +223,8 @@ fn relax<S: MechanicalSystem>(
     share: f64,
 ) {
     let step = (s.options.time_step, s.options.theta);
-    let own = (0..d.laws.len()).filter(|i| s.list.home_of(*i) == leader && d.laws[*i].is_soft());
+    let own =
+        (0..d.laws.len()).filter(|i| s.list.group_leader_of(*i) == leader && d.laws[*i].is_soft());
     let own: Vec<usize> = own.collect();
     if own.is_empty() {
         return;

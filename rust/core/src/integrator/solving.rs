@@ -65,7 +65,8 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         laws: &[Yielding],
         problems: &mut PosedOf<S>,
     ) {
-        let own = (0..self.list.contacts.len()).filter(|i| groups.contains(&self.list.home_of(*i)));
+        let own = (0..self.list.contacts.len())
+            .filter(|i| groups.contains(&self.list.group_leader_of(*i)));
         let own: Vec<usize> = own.collect();
         let elastic: Vec<f64> = own.iter().map(|&i| self.shift(i)).collect();
         self.list.inelastic = Some(StepOptions {
@@ -157,7 +158,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         let list = &mut *self.list;
         let mut own = std::mem::take(&mut list.island.contacts);
         own.clear();
-        own.extend((0..list.contacts.len()).filter(|i| list.home_of(*i) == group));
+        own.extend((0..list.contacts.len()).filter(|i| list.group_leader_of(*i) == group));
         let budget = options.budget_of(own.len());
         list.island.contacts = own;
         let spent = list.island.spent.get(group).copied().unwrap_or(0);
@@ -233,7 +234,8 @@ impl<S: MechanicalSystem> Listed<'_, S> {
     /// Relative residual asked of the displacement of a group.
     fn tolerance(&self, d: &ListedData<S>, leader: usize) -> f64 {
         let own = self.options.solver.tolerance;
-        let contacts = || (0..self.list.contacts.len()).filter(|i| self.list.home_of(*i) == leader);
+        let contacts =
+            || (0..self.list.contacts.len()).filter(|i| self.list.group_leader_of(*i) == leader);
         if contacts().count() <= self.options.solver.direct_contacts {
             return own;
         }
@@ -255,7 +257,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         (leader, compliance): (usize, f64),
     ) -> SolveReport {
         for (i, p) in problems.p.iter_mut().enumerate() {
-            if self.list.home_of(i) == leader {
+            if self.list.group_leader_of(i) == leader {
                 *p = Local::splat(0.0);
             }
         }
@@ -299,7 +301,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         self.machine().half_solve_back(&mut d.y);
         let mut most = 0.0_f64;
         for (i, (u, q)) in problems.u.iter().zip(&problems.q).enumerate() {
-            if self.list.home_of(i) == leader {
+            if self.list.group_leader_of(i) == leader {
                 let lever = self.system.lever(&self.list.contacts[i]);
                 for k in 0..LocalOf::<S>::N {
                     most = most.max((u[k] - q[k]).abs() * lever);

@@ -14,7 +14,7 @@ use super::dynamics::Dynamics;
 use super::grouped::Grouped;
 use super::local::Local;
 use super::systems::Systems;
-use crate::law::compliance::{Held, Yielding};
+use crate::law::compliance::{SpringEnergy, Yielding};
 use crate::scalar::{Lane, LaneMask};
 
 /// The laws of contacts that yield. Where a cluster remembers no contact, each of its contacts may
@@ -142,7 +142,7 @@ pub(super) fn forget_bounces<S: Systems>(s: &S, d: &mut DataOf<S>) {
 
 /// `own.released`: what the contacts that yield give off, by group, J; `own.elastic`: what they
 /// hold before and after the step.
-pub(super) fn weigh_treads<S: Systems>(s: &S, d: &mut DataOf<S>, own: &mut Energies<S::T>) {
+pub(super) fn find_tread_energies<S: Systems>(s: &S, d: &mut DataOf<S>, own: &mut Energies<S::T>) {
     own.released.fill(d.number(0.0));
     if !s.yields() {
         return;
@@ -161,7 +161,7 @@ pub(super) fn weigh_treads<S: Systems>(s: &S, d: &mut DataOf<S>, own: &mut Energ
     for (cluster, before) in before.iter_mut().enumerate() {
         let known = own.number[cluster];
         *before = S::T::select(known.is_finite(), known, *before);
-        let own = Held {
+        let own = SpringEnergy {
             before: *before,
             most: after[cluster],
             given: given[cluster],

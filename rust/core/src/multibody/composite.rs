@@ -11,7 +11,7 @@ pub(super) const BLOCK: usize = BASE * (BASE + 1) / 2;
 
 /// Momentum, and angular momentum about the tree's origin.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Momentum<T> {
+pub(super) struct TreeMomentum<T> {
     pub linear: Vec3<T>,
     pub angular: Vec3<T>,
 }
@@ -121,8 +121,8 @@ impl<T: Lane> Composite<T> {
 
     /// Momentum at unit rate of a motion.
     #[inline(always)]
-    pub(super) fn momentum(&self, motion: &Motion<T>) -> Momentum<T> {
-        Momentum {
+    pub(super) fn momentum(&self, motion: &Motion<T>) -> TreeMomentum<T> {
+        TreeMomentum {
             linear: motion.swing * self.mass + motion.axis.cross(self.moment),
             angular: self.inertia.times(motion.axis) + self.moment.cross(motion.swing),
         }
@@ -154,7 +154,7 @@ impl<T: Lane> Composite<T> {
     }
 }
 
-impl<T: Lane> Momentum<T> {
+impl<T: Lane> TreeMomentum<T> {
     pub(super) fn zero(zero: T) -> Self {
         let nothing = Vec3::new(zero, zero, zero);
         Self {

@@ -31,7 +31,7 @@
 
 use std::cmp::Ordering;
 
-use super::composite::{BLOCK, Composite, Momentum};
+use super::composite::{BLOCK, Composite, TreeMomentum};
 use super::inertias::Inertias;
 use super::joint::{Joint, JointModel, Motion};
 use super::mechanism::{BASE, Mechanism};
@@ -65,9 +65,9 @@ struct Turning<T> {
 #[derive(Clone, Copy, Debug)]
 struct Share<T> {
     /// `I Ṡ + B S`.
-    column: Momentum<T>,
+    column: TreeMomentum<T>,
     /// `I S`.
-    row: Momentum<T>,
+    row: TreeMomentum<T>,
     /// `Bᵀ S`, whose linear part is zero.
     turned: Vec3<T>,
 }
@@ -300,9 +300,9 @@ impl<T: Lane> Turning<T> {
     /// The share of a joint with a screw S and its rate.
     #[inline(always)]
     fn share(&self, S: &Motion<T>, S_dot: &Motion<T>) -> Share<T> {
-        let Momentum { linear, angular } = self.I.momentum(S_dot);
+        let TreeMomentum { linear, angular } = self.I.momentum(S_dot);
         Share {
-            column: Momentum {
+            column: TreeMomentum {
                 linear: linear - self.f.cross(S.axis),
                 angular: angular + self.K.times(S.axis),
             },
@@ -313,8 +313,8 @@ impl<T: Lane> Turning<T> {
 
     /// Force and moment in balance with its weight.
     #[inline(always)]
-    fn weight(&self, gravity: Vec3<T>) -> Momentum<T> {
-        Momentum {
+    fn weight(&self, gravity: Vec3<T>) -> TreeMomentum<T> {
+        TreeMomentum {
             linear: -gravity * self.I.mass,
             angular: gravity.cross(self.I.moment),
         }

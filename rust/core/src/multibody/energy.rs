@@ -1,7 +1,7 @@
 //! Energy and linear momentum of a state in one sweep, without poses for any other use.
 
 use super::inertias::{Inertia, Inertias};
-use super::joint::{Free, Joint, JointModel, Motion, Placement, free};
+use super::joint::{Free, Joint, JointModel, JointPlacement, Motion, free};
 use super::lane_configuration::LaneConfiguration;
 use super::mechanism::{BASE, Link, Mechanism};
 use super::poses::{JointAngles, NextAngle};
@@ -245,7 +245,7 @@ impl<T: Lane> Moving<T> {
         let mut lever = link.lever(&self.R);
         let frame = link.frame(&self.R);
         let turn = || (!link.is_spinner).then(|| angles.next());
-        let Placement { R, shift } = joint.place(&frame, q, turn);
+        let JointPlacement { R, shift } = joint.place(&frame, q, turn);
         if let Some(shift) = shift {
             lever += shift;
         }

@@ -11,7 +11,7 @@ use crate::scalar::Lane;
 /// A symmetric matrix or its factor along the paths of a mechanism; see
 /// [`super::mass_matrix`].
 #[derive(Debug)]
-pub(super) struct Rows<T> {
+pub(super) struct PathFactor<T> {
     /// Block of each tree's base: the lower triangle by rows.
     pub blocks: Vec<[T; BLOCK]>,
     /// Entries of each row with the base of its tree.
@@ -19,7 +19,7 @@ pub(super) struct Rows<T> {
     pub joints: Vec<T>,
 }
 
-impl<T: Lane> Rows<T> {
+impl<T: Lane> PathFactor<T> {
     pub(super) fn new(token: T::Token, mechanism: &Mechanism) -> Self {
         let zero = T::splat(token, 0.0);
         Self {
@@ -68,7 +68,7 @@ impl<T: Lane> Rows<T> {
     }
 }
 
-impl<T: Clone> Clone for Rows<T> {
+impl<T: Clone> Clone for PathFactor<T> {
     fn clone(&self) -> Self {
         Self {
             blocks: self.blocks.clone(),
@@ -88,7 +88,7 @@ impl<T: Clone> Clone for Rows<T> {
 /// `M = Lᵀ D L`, L unit lower triangular with M's sparsity. Holds `L` and `D^(-1/2)`.
 #[derive(Clone, Debug)]
 pub struct Factor<T: Lane> {
-    pub(super) rows: Rows<T>,
+    pub(super) rows: PathFactor<T>,
     /// Entries of `D^(-1/2)` for each tree's base.
     block_roots: Vec<[T; BASE]>,
     /// Entry of `D^(-1/2)` for each row.
@@ -101,7 +101,7 @@ impl<T: Lane> Factor<T> {
     pub fn new(token: T::Token, mechanism: &Mechanism) -> Self {
         let zero = T::splat(token, 0.0);
         Self {
-            rows: Rows::new(token, mechanism),
+            rows: PathFactor::new(token, mechanism),
             block_roots: vec![[zero; BASE]; mechanism.trees.len()],
             roots: vec![zero; mechanism.rows.len()],
         }

@@ -14,8 +14,8 @@ use std::cmp::Ordering;
 
 use nalgebra::DMatrix;
 
-use super::composite::{Composite, Momentum};
-use super::factor::{Factor, Rows};
+use super::composite::{Composite, TreeMomentum};
+use super::factor::{Factor, PathFactor};
 use super::inertias::Inertias;
 use super::mechanism::{Mechanism, TreeSpan};
 use super::path_matrix::{PathMatrix, product};
@@ -26,10 +26,10 @@ use crate::scalar::Lane;
 #[derive(Clone, Debug)]
 pub struct MassMatrix<T: Lane> {
     token: T::Token,
-    pub(super) rows: Rows<T>,
+    pub(super) rows: PathFactor<T>,
     composites: Vec<Composite<T>>,
     /// Momenta at a unit of each coupled joint's motion.
-    coupled: Vec<Momentum<T>>,
+    coupled: Vec<TreeMomentum<T>>,
 }
 
 impl<T: Lane> MassMatrix<T> {
@@ -39,9 +39,9 @@ impl<T: Lane> MassMatrix<T> {
         let zero = T::splat(token, 0.0);
         Self {
             token,
-            rows: Rows::new(token, mechanism),
+            rows: PathFactor::new(token, mechanism),
             composites: vec![Composite::zero(zero); mechanism.n_bodies()],
-            coupled: vec![Momentum::zero(zero); mechanism.coupled.len()],
+            coupled: vec![TreeMomentum::zero(zero); mechanism.coupled.len()],
         }
     }
 

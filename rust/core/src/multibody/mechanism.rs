@@ -60,7 +60,7 @@ pub struct Mechanism {
     pub(super) sizes: Vec<f64>,
     pub(super) n_motions: usize,
     pub(super) paths: Vec<usize>,
-    pub(super) movers: Vec<Mover>,
+    pub(super) movers: Vec<PathVelocity>,
 }
 
 /// Bodies, velocities and rows of a tree.
@@ -110,7 +110,7 @@ pub struct OwnJoint {
 
 /// A velocity that moves a body, and the motion that a unit of it imparts to the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mover {
+pub struct PathVelocity {
     /// Index among all velocities.
     pub velocity: usize,
     /// Index in [`Poses::motions`](super::poses::Poses::motions).
@@ -330,7 +330,7 @@ impl Mechanism {
     /// The velocities of the joints that move body `b`, outwards.
     #[inline(always)]
     #[must_use]
-    pub fn movers(&self, b: usize) -> &[Mover] {
+    pub fn movers(&self, b: usize) -> &[PathVelocity] {
         &self.movers[self.links[b].movers.clone()]
     }
 }

@@ -67,16 +67,16 @@ pub mod state;
 
 pub use chart::Chart;
 pub use description::{
-    CouplingDescription, DrawingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits,
-    LoopDescription, LoopKind, MAX_SHAPES, MAX_SOLIDS, MachineDescription, MassProperties,
-    MaterialDescription, ModelDescription, Shape, ShapeDescription, SolidDescription, Spring,
-    TagDescription, TrackDescription, WheelDescription,
+    CouplingDescription, DrawingDescription, DriveDescription, FORMAT, Hold, JointKind,
+    JointLimits, LoopDescription, LoopKind, MAX_SHAPES, MAX_SOLIDS, MachineDescription,
+    MassProperties, MaterialDescription, ModelDescription, Shape, ShapeDescription,
+    SolidDescription, Spring, TagDescription, TrackDescription, WheelDescription,
 };
 pub use energy::{Energy, EnergyScratch};
 pub use error::{ModelError, StateError};
 pub use factor::Factor;
 pub use inertias::Inertias;
-pub use joint::{Joint, JointAxis, JointModel, Motion, Pose};
+pub use joint::{FreePose, Joint, JointAxis, JointModel, Motion};
 pub use kinematics::Kinematics;
 pub use lane_configuration::LaneConfiguration;
 pub use mass_matrix::MassMatrix;

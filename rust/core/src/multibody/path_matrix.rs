@@ -5,16 +5,16 @@
 //! sparsity: a velocity changes only rows and columns of its own path.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-use super::factor::{Rows, split_base, subtract};
+use super::factor::{PathFactor, split_base, subtract};
 use super::mechanism::{BASE, Mechanism};
 use crate::scalar::Lane;
 
 /// A matrix (nv, nv) without entries between velocities of which none moves the other's body.
 #[derive(Clone, Debug)]
 pub(crate) struct PathMatrix<T: Lane> {
-    pub(super) lower: Rows<T>,
+    pub(super) lower: PathFactor<T>,
     /// Transposed; its diagonal has no meaning.
-    pub(super) upper: Rows<T>,
+    pub(super) upper: PathFactor<T>,
 }
 
 /// Index of an entry of a base's block, `j <= i`.
@@ -27,8 +27,8 @@ impl<T: Lane> PathMatrix<T> {
     /// Room for a mechanism.
     pub(crate) fn new(token: T::Token, mechanism: &Mechanism) -> Self {
         Self {
-            lower: Rows::new(token, mechanism),
-            upper: Rows::new(token, mechanism),
+            lower: PathFactor::new(token, mechanism),
+            upper: PathFactor::new(token, mechanism),
         }
     }
 
@@ -160,7 +160,7 @@ impl<T: Lane> PathMatrix<T> {
 #[inline(always)]
 pub(super) fn product<T: Lane>(
     mechanism: &Mechanism,
-    [lower, upper]: [&Rows<T>; 2],
+    [lower, upper]: [&PathFactor<T>; 2],
     x: &[T],
     out: &mut [T],
 ) {

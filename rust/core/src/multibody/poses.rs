@@ -5,7 +5,7 @@
 //! free, otherwise the world's. A rover far from the world's origin thus loses no precision.
 
 use super::inertias::{Inertia, Inertias};
-use super::joint::{Free, Joint, JointModel, Motion, Placement};
+use super::joint::{Free, Joint, JointModel, JointPlacement, Motion};
 use super::lane_configuration::LaneConfiguration;
 use super::mechanism::{Link, Mechanism};
 use crate::scalar::elementary::{sin_cos, sines_cosines};
@@ -224,7 +224,7 @@ fn follow<T: Lane, J: JointModel>(
     let mut lever = link.lever(&carrier.R);
     let frame = link.frame(&carrier.R);
     let turn = || (!link.is_spinner).then(|| angles.next());
-    let Placement { R, shift } = joint.place(&frame, q, turn);
+    let JointPlacement { R, shift } = joint.place(&frame, q, turn);
     if let Some(shift) = shift {
         lever += shift;
     }

@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::joint::joint_model::{JointCoordinates, JointModel, advanced};
-use super::joint::{Free, Pose};
+use super::joint::{Free, FreePose};
 use super::model::Model;
 use crate::scalar::Vec3;
 
@@ -22,7 +22,7 @@ pub struct Configuration {
     /// (n_joints).
     pub joints: Vec<f64>,
     /// Poses of the free bodies other than the first.
-    pub others: Vec<Pose>,
+    pub others: Vec<FreePose>,
     /// Rotations of the spherical joints, from the body's frame to the joint's.
     pub rotations: Vec<UnitQuaternion<f64>>,
 }
@@ -56,7 +56,7 @@ impl Configuration {
             position: Vector3::zeros(),
             attitude: UnitQuaternion::identity(),
             joints: vec![0.0; model.n_joints()],
-            others: vec![Pose::default(); model.n_poses() - 1],
+            others: vec![FreePose::default(); model.n_poses() - 1],
             rotations: vec![UnitQuaternion::identity(); model.n_rotations()],
         }
     }
@@ -64,9 +64,9 @@ impl Configuration {
     /// Pose of a free body.
     #[inline]
     #[must_use]
-    pub fn pose(&self, free: Free) -> Pose {
+    pub fn pose(&self, free: Free) -> FreePose {
         match free.pose.checked_sub(1) {
-            None => Pose {
+            None => FreePose {
                 position: self.position,
                 attitude: self.attitude,
             },
@@ -76,7 +76,7 @@ impl Configuration {
 
     /// Sets the pose of a free body.
     #[inline]
-    pub fn set_pose(&mut self, free: Free, pose: Pose) {
+    pub fn set_pose(&mut self, free: Free, pose: FreePose) {
         match free.pose.checked_sub(1) {
             None => (self.position, self.attitude) = (pose.position, pose.attitude),
             Some(i) => self.others[i] = pose,
@@ -162,12 +162,12 @@ impl JointCoordinates<f64> for Configuration {
     }
 
     fn pose_at(&self, index: usize) -> (Vec3<f64>, [f64; 4]) {
-        let Pose { position, attitude } = self.pose(Free { pose: index });
+        let FreePose { position, attitude } = self.pose(Free { pose: index });
         (position.into(), components(&attitude))
     }
 
     fn set_pose_at(&mut self, index: usize, (position, attitude): (Vec3<f64>, [f64; 4])) {
-        let pose = Pose {
+        let pose = FreePose {
             position: position.into(),
             attitude: rotation_of(attitude),
         };

@@ -12,18 +12,18 @@
 use nalgebra::Vector2;
 
 use super::error::PlanarError;
-use super::tree::{Part, PlanarTree, Wheel, fingerprint};
+use super::tree::{DiscWheel, PlanarBody, PlanarTree, fingerprint};
 use crate::quantity::{INERTIAS, LENGTHS, MASSES, within};
 
 /// A disc.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball {
+pub struct PlanarBall {
     mass: f64,
     radius: f64,
     inertia: f64,
 }
 
-impl Ball {
+impl PlanarBall {
     /// `mass` in kg, `radius` in m, `inertia` about the centre in kg m².
     ///
     /// # Errors
@@ -37,16 +37,16 @@ impl Ball {
     }
 }
 
-impl From<Ball> for PlanarTree {
-    fn from(ball: Ball) -> Self {
-        let Ball {
+impl From<PlanarBall> for PlanarTree {
+    fn from(ball: PlanarBall) -> Self {
+        let PlanarBall {
             mass,
             radius,
             inertia,
         } = ball;
         Self::new(
-            vec![Part::centred(Vector2::zeros(), mass, inertia)],
-            vec![Wheel::driven(0, radius)],
+            vec![PlanarBody::centred(Vector2::zeros(), mass, inertia)],
+            vec![DiscWheel::driven(0, radius)],
             fingerprint("ball", [mass, radius, inertia]),
         )
     }

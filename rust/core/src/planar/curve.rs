@@ -17,25 +17,25 @@ use std::sync::Arc;
 use nalgebra::Vector2;
 
 use super::error::PlanarError;
-use super::ground::{Facing, Ground, MAX_FACING};
+use super::ground::{MAX_FACING, PlanarFacing, PlanarGround};
 use crate::geometry::Support;
-use crate::quantity::{PLACES, QuantityError, Range, finite, within};
+use crate::quantity::{AdmissibleRange, PLACES, QuantityError, finite, within};
 use crate::scalar::elementary::{hypot, sin_cos};
 
 /// Slopes, m/m.
-const SLOPES: Range = Range {
+const SLOPES: AdmissibleRange = AdmissibleRange {
     ends: [-1e3, 1e3],
     words: "at most 1000 either way",
 };
 
 /// Wavelengths, m: shorter ones are mere roughness to a disc.
-const WAVELENGTHS: Range = Range {
+const WAVELENGTHS: AdmissibleRange = AdmissibleRange {
     ends: [1e-3, 1e9],
     words: "from 1e-3 to 1e9 m",
 };
 
 /// Phases, rad.
-const PHASES: Range = Range {
+const PHASES: AdmissibleRange = AdmissibleRange {
     ends: [-1e6, 1e6],
     words: "at most 1e6 rad either way",
 };
@@ -88,22 +88,22 @@ impl Line {
     }
 }
 
-impl Ground for Line {
+impl PlanarGround for Line {
     fn height(&self, x: f64) -> f64 {
         self.slope * x + self.offset
     }
 
-    fn below(&self, centre: &Vector2<f64>) -> Facing {
+    fn below(&self, centre: &Vector2<f64>) -> PlanarFacing {
         let y = self.height(centre.x);
         tangent_facing(centre, y, self.slope)
     }
 }
 
 impl Support<2> for Line {
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<PlanarFacing>) {
         let facing = self.below(centre);
         if facing.distance <= reach {
-            out.push(Facing {
+            out.push(PlanarFacing {
                 foot: centre - facing.n * facing.distance,
                 ..facing
             });
@@ -112,9 +112,9 @@ impl Support<2> for Line {
 }
 
 /// The point (c_x, y) of a curve with the given slope there, seen from a centre above it.
-fn tangent_facing(centre: &Vector2<f64>, y: f64, slope: f64) -> Facing {
+fn tangent_facing(centre: &Vector2<f64>, y: f64, slope: f64) -> PlanarFacing {
     let length = hypot(slope, 1.0);
-    Facing {
+    PlanarFacing {
         foot: Vector2::new(centre.x, y),
         n: Vector2::new(-slope, 1.0) / length,
         distance: (centre.y - y) / length,
@@ -345,53 +345,53 @@ pub(super) fn check_points(x: &[f64], y: &[f64]) -> Result<(), PlanarError> {
     Ok(())
 }
 
-impl Ground for Sine {
+impl PlanarGround for Sine {
     fn height(&self, x: f64) -> f64 {
         self.jet(x)[0]
     }
 
-    fn below(&self, centre: &Vector2<f64>) -> Facing {
+    fn below(&self, centre: &Vector2<f64>) -> PlanarFacing {
         let [y, slope, ..] = self.jet(centre.x);
         tangent_facing(centre, y, slope)
     }
 }
 
 impl Support<2> for Sine {
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<PlanarFacing>) {
         facing(self, centre, reach, out);
     }
 }
 
-impl Ground for Spline {
+impl PlanarGround for Spline {
     fn height(&self, x: f64) -> f64 {
         self.jet(x)[0]
     }
 
-    fn below(&self, centre: &Vector2<f64>) -> Facing {
+    fn below(&self, centre: &Vector2<f64>) -> PlanarFacing {
         let [y, slope, ..] = self.jet(centre.x);
         tangent_facing(centre, y, slope)
     }
 }
 
 impl Support<2> for Spline {
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<PlanarFacing>) {
         facing(self, centre, reach, out);
     }
 }
 
 /// `Arc`s of grounds are grounds, so that scenes can share them.
-impl Ground for Arc<dyn Ground> {
+impl PlanarGround for Arc<dyn PlanarGround> {
     fn height(&self, x: f64) -> f64 {
         (**self).height(x)
     }
 
-    fn below(&self, centre: &Vector2<f64>) -> Facing {
+    fn below(&self, centre: &Vector2<f64>) -> PlanarFacing {
         (**self).below(centre)
     }
 }
 
 /// The points of a smooth curve that face a centre, see the page above.
-fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<PlanarFacing>) {
     let below = centre.y - curve.jet(centre.x)[0];
     let is_inside = below < 0.0;
     // The nearest point is no farther than the one straight above or below.
@@ -417,7 +417,7 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
         let distance = away.norm();
         let side = away.dot(&n);
         if distance <= limit && (side < 0.0) == is_inside {
-            out.push(Facing {
+            out.push(PlanarFacing {
                 foot: Vector2::new(x, y),
                 n,
                 distance: side,
@@ -443,7 +443,7 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
 }
 
 /// Keeps the shallowest of the points appended since `begin`.
-pub(super) fn keep_nearest(out: &mut Vec<Facing>, begin: usize) {
+pub(super) fn keep_nearest(out: &mut Vec<PlanarFacing>, begin: usize) {
     let nearest = out[begin..]
         .iter()
         .copied()
@@ -592,7 +592,7 @@ fn root(curve: &dyn Curve, centre: &Vector2<f64>, mut a: f64, mut b: f64) -> f64
 mod tests {
     use super::*;
 
-    fn all(ground: &dyn Ground, c: [f64; 2], reach: f64) -> Vec<Facing> {
+    fn all(ground: &dyn PlanarGround, c: [f64; 2], reach: f64) -> Vec<PlanarFacing> {
         let mut out = Vec::new();
         ground.facing(&Vector2::new(c[0], c[1]), reach, &mut out);
         out
@@ -621,7 +621,7 @@ mod tests {
             .map(|x| (1.7 * x).sin() + 0.3 * (5.1 * x).cos())
             .collect();
         let spline = Spline::new(&table, &heights).expect("sound");
-        for (ground, shift) in [(&sine as &dyn Ground, 0.0), (&spline, 11.0)] {
+        for (ground, shift) in [(&sine as &dyn PlanarGround, 0.0), (&spline, 11.0)] {
             for i in 0..200 {
                 let i = f64::from(i);
                 let centre = [shift + 0.037 * i, 1.8 * (0.9 * i).sin() + 0.4];

@@ -10,13 +10,17 @@ use nalgebra::Vector2;
 use crate::geometry::Support;
 
 /// A point of the ground that faces a disc's centre.
-pub type Facing = crate::geometry::Facing<2>;
+pub type PlanarFacing = crate::geometry::Facing<2>;
 
 /// Most points of the ground that face one disc: the nearest of more.
 pub const MAX_FACING: usize = 64;
 
 /// Filters the points appended since `begin`, in their order.
-pub(super) fn keep_if(out: &mut Vec<Facing>, begin: usize, is_wanted: impl Fn(&Facing) -> bool) {
+pub(super) fn keep_if(
+    out: &mut Vec<PlanarFacing>,
+    begin: usize,
+    is_wanted: impl Fn(&PlanarFacing) -> bool,
+) {
     let mut kept = begin;
     for k in begin..out.len() {
         if is_wanted(&out[k]) {
@@ -28,7 +32,7 @@ pub(super) fn keep_if(out: &mut Vec<Facing>, begin: usize, is_wanted: impl Fn(&F
 }
 
 /// Keeps the [`MAX_FACING`] nearest of the points appended since `begin`, in their order.
-pub(super) fn keep_few(out: &mut Vec<Facing>, begin: usize) {
+pub(super) fn keep_few(out: &mut Vec<PlanarFacing>, begin: usize) {
     if out.len() - begin <= MAX_FACING {
         return;
     }
@@ -44,7 +48,7 @@ pub(super) fn keep_few(out: &mut Vec<Facing>, begin: usize) {
 /// The points that face a centre are the local minima of the distance, in the order of x, and at
 /// most the [`MAX_FACING`] nearest. From inside the ground only the nearest of all counts, at any
 /// depth.
-pub trait Ground: Support<2> {
+pub trait PlanarGround: Support<2> {
     /// Height of the ground at x, m; the upper one at a vertical face.
     fn height(&self, x: f64) -> f64;
 
@@ -52,7 +56,7 @@ pub trait Ground: Support<2> {
     /// nearest; its normal is the curve's there.
     ///
     /// The distance is that to the tangent, `(y − f(x))/√(1 + f'²)`, exact on a line.
-    fn below(&self, centre: &Vector2<f64>) -> Facing;
+    fn below(&self, centre: &Vector2<f64>) -> PlanarFacing;
 }
 
 /// Contact rule of a disc on a curve.

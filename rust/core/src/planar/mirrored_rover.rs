@@ -19,7 +19,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::error::PlanarError;
-use super::tree::{Part, PlanarTree, Wheel};
+use super::tree::{DiscWheel, PlanarBody, PlanarTree};
 use crate::multibody::{Body, Joint, JointAxis, JointModel, JointProperties, Model, Passive};
 
 /// Relative difference up to which two sides count as mirror images.
@@ -114,7 +114,7 @@ impl MirroredRover {
 }
 
 /// Groups the bodies of a planar tree by mirror images: the parts, and the bodies of each.
-fn pair_bodies(model: &Model) -> Result<(Vec<Part>, Vec<Vec<usize>>), PlanarError> {
+fn pair_bodies(model: &Model) -> Result<(Vec<PlanarBody>, Vec<Vec<usize>>), PlanarError> {
     let bodies = model.bodies();
     // Nothing rotates out of the plane, so z adds up along the tree.
     let mut z = vec![0.0; bodies.len()];
@@ -180,7 +180,7 @@ fn pair_bodies(model: &Model) -> Result<(Vec<Part>, Vec<Vec<usize>>), PlanarErro
         for &b in &group {
             part_of[b] = Some(parts.len());
         }
-        parts.push(Part {
+        parts.push(PlanarBody {
             parent,
             joint: body.position.xy(),
             mass: group.iter().map(|&b| bodies[b].mass).sum(),
@@ -199,8 +199,8 @@ fn pair_bodies(model: &Model) -> Result<(Vec<Part>, Vec<Vec<usize>>), PlanarErro
 fn pair_wheels(
     model: &Model,
     bodies: &[Vec<usize>],
-) -> Result<(Vec<Wheel>, Vec<Vec<String>>), PlanarError> {
-    let mut pairs: Vec<(Wheel, f64, Vec<String>)> = Vec::new();
+) -> Result<(Vec<DiscWheel>, Vec<Vec<String>>), PlanarError> {
+    let mut pairs: Vec<(DiscWheel, f64, Vec<String>)> = Vec::new();
     for wheel in model.wheels() {
         let refused = || PlanarError::NotMirrored {
             body: wheel.name.clone(),
@@ -227,7 +227,7 @@ fn pair_wheels(
             pair.gain += gain;
             names.push(wheel.name.clone());
         } else {
-            let pair = Wheel {
+            let pair = DiscWheel {
                 part,
                 centre: wheel.centre.xy(),
                 radius: wheel.radius,

@@ -19,7 +19,7 @@
 //! q ──► PlanarTree::place ──► PlanarPoses                               │
 //!           ├──► mass_matrix, force         M, F(q, v)  ◄───────────────┘
 //!           ├──► disc                       the wheels in the world
-//!           │       └──► Ground::facing     points of the curve that face a disc
+//!           │       └──► PlanarGround::facing  points of the curve that face a disc
 //!           └──► push_rows                  rows of Hᵀ of a wheel's point
 //! ```
 //!
@@ -42,12 +42,12 @@ pub mod rig;
 pub mod tree;
 pub mod two_wheel_rover;
 
-pub use ball::Ball;
+pub use ball::PlanarBall;
 pub use curve::{Curve, Line, Sine, Spline};
 pub use error::PlanarError;
-pub use ground::{ContactRule, Facing, Ground, MAX_FACING};
+pub use ground::{ContactRule, MAX_FACING, PlanarFacing, PlanarGround};
 pub use mirrored_rover::MirroredRover;
 pub use polyline::Polyline;
 pub use rig::WheelRig;
-pub use tree::{Disc, PlanarMotor, PlanarPoses, PlanarTree};
+pub use tree::{PlanarDisc, PlanarMotor, PlanarPoses, PlanarTree};
 pub use two_wheel_rover::{PlanarWheel, TwoWheelRover};

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use super::curve::{check_points, keep_nearest};
 use super::error::PlanarError;
-use super::ground::{Facing, Ground, keep_few, keep_if};
+use super::ground::{PlanarFacing, PlanarGround, keep_few, keep_if};
 use crate::geometry::Support;
 use crate::quantity::{PLACES, QuantityError, within};
 use crate::scalar::elementary::hypot;
@@ -87,7 +87,7 @@ impl Polyline {
     }
 
     /// All points that face the centre, whatever their distance and side.
-    fn candidates(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+    fn candidates(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<PlanarFacing>) {
         let n_points = self.points.len();
         // Only pieces within reach in x; they are in the order of x.
         let first = self.points.partition_point(|p| p.x < centre.x - reach);
@@ -109,7 +109,7 @@ impl Polyline {
             let is_before = i == n_points || before < 0.0;
             if is_after && is_before {
                 let distance = (centre - from).dot(&n);
-                out.push(Facing {
+                out.push(PlanarFacing {
                     foot: centre - n * distance,
                     n,
                     distance,
@@ -127,7 +127,7 @@ impl Polyline {
         i: usize,
         centre: &Vector2<f64>,
         before: &Vector2<f64>,
-        out: &mut Vec<Facing>,
+        out: &mut Vec<PlanarFacing>,
     ) {
         let after = self.direction(i + 1);
         let away = centre - self.points[i];
@@ -146,7 +146,7 @@ impl Polyline {
             } else {
                 straight
             };
-            out.push(Facing {
+            out.push(PlanarFacing {
                 foot: self.points[i],
                 n,
                 distance,
@@ -155,7 +155,7 @@ impl Polyline {
             // Concave: nearest from inside the ground only.
             let inside = away.dot(&straight) < 0.0;
             if inside && distance > 0.0 {
-                out.push(Facing {
+                out.push(PlanarFacing {
                     foot: self.points[i],
                     n: -away / distance,
                     distance: -distance,
@@ -165,7 +165,7 @@ impl Polyline {
     }
 }
 
-impl Ground for Polyline {
+impl PlanarGround for Polyline {
     fn height(&self, x: f64) -> f64 {
         let i = self.points.partition_point(|p| p.x <= x);
         let t = self.direction(i);
@@ -179,12 +179,12 @@ impl Ground for Polyline {
         y
     }
 
-    fn below(&self, centre: &Vector2<f64>) -> Facing {
+    fn below(&self, centre: &Vector2<f64>) -> PlanarFacing {
         let i = self.points.partition_point(|p| p.x <= centre.x);
         let t = self.direction(i);
         let n = Vector2::new(-t.y, t.x);
         let y = self.height(centre.x);
-        Facing {
+        PlanarFacing {
             foot: Vector2::new(centre.x, y),
             n,
             distance: (centre.y - y) * n.y,
@@ -193,7 +193,7 @@ impl Ground for Polyline {
 }
 
 impl Support<2> for Polyline {
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<PlanarFacing>) {
         let begin = out.len();
         let depth = (self.height(centre.x) - centre.y).max(0.0);
         self.candidates(centre, reach.max(depth) * (1.0 + 1e-9), out);
@@ -218,7 +218,7 @@ impl Support<2> for Polyline {
 mod tests {
     use super::*;
 
-    fn all(ground: &Polyline, c: [f64; 2], reach: f64) -> Vec<Facing> {
+    fn all(ground: &Polyline, c: [f64; 2], reach: f64) -> Vec<PlanarFacing> {
         let mut out = Vec::new();
         ground.facing(&Vector2::new(c[0], c[1]), reach, &mut out);
         out

@@ -8,7 +8,7 @@
 use nalgebra::Vector2;
 
 use super::error::PlanarError;
-use super::tree::{Part, PlanarTree, Wheel, fingerprint};
+use super::tree::{DiscWheel, PlanarBody, PlanarTree, fingerprint};
 use crate::quantity::{LENGTHS, MASSES, within};
 
 /// A wheel of the test rig.
@@ -39,10 +39,10 @@ impl From<WheelRig> for PlanarTree {
         let WheelRig { mass, radius } = rig;
         let heavy = HEAVY * mass;
         let turning = heavy * radius * radius;
-        let part = |mass: f64| Part::centred(Vector2::zeros(), mass, 0.0);
+        let part = |mass: f64| PlanarBody::centred(Vector2::zeros(), mass, 0.0);
         Self::new(
             vec![part(mass), part(0.0), part(0.0)],
-            vec![Wheel::driven(1, radius)],
+            vec![DiscWheel::driven(1, radius)],
             fingerprint("rig", [mass, radius]),
         )
         .held_by(vec![heavy, 0.0, turning, turning, turning])

@@ -1,9 +1,9 @@
 //! A tree of rigid bodies in the plane: the kinematics and dynamics of every planar machine.
 //!
 //! The coordinates are x, y of the base's origin, m, then an angle of each part, rad, positive to
-//! the left: relative to the part that carries it, or in the world ([`Part::is_absolute`]). On the
-//! path from part b to the base, each part i turns about its origin o_i. A point x of part b thus
-//! moves with
+//! the left: relative to the part that carries it, or in the world ([`PlanarBody::is_absolute`]).
+//! On the path from part b to the base, each part i turns about its origin o_i. A point x of part b
+//! thus moves with
 //!
 //! ```text
 //! (ẋ, ẏ) + Σ_i e_z × (x_i − o_i) q̇_i
@@ -19,7 +19,7 @@ use crate::scalar::elementary::sin_cos;
 
 /// A body of the tree.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct PlanarBody {
     /// The part that carries it; 0 for the base itself. It stands before this one.
     pub parent: usize,
     /// Joint in the parent's axes, m.
@@ -36,7 +36,7 @@ pub struct Part {
     pub is_spinner: bool,
 }
 
-impl Part {
+impl PlanarBody {
     /// A base, or a wheel on the base's axle at `joint`, with its mass centre at its origin.
     pub(super) fn centred(joint: Vector2<f64>, mass: f64, inertia: f64) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl Part {
 
 /// A wheel, or a pair of them, that touches the ground as one disc.
 #[derive(Clone, Debug)]
-pub struct Wheel {
+pub struct DiscWheel {
     /// The part that it is fixed to.
     pub part: usize,
     /// In the part's axes, m.
@@ -69,7 +69,7 @@ pub struct Wheel {
     pub motor: Option<Motor>,
 }
 
-impl Wheel {
+impl DiscWheel {
     /// A wheel about its part's origin whose motor drives it forward at any speed.
     pub(super) fn driven(part: usize, radius: f64) -> Self {
         Self {
@@ -86,7 +86,7 @@ impl Wheel {
 
 /// A disc of a machine in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Disc {
+pub struct PlanarDisc {
     /// m.
     pub centre: Vector2<f64>,
     /// m.
@@ -134,8 +134,8 @@ fn left(r: &Vector2<f64>) -> Vector2<f64> {
 /// A planar machine: parts, wheels and, for a test rig, inertia added to single coordinates.
 #[derive(Clone, Debug)]
 pub struct PlanarTree {
-    parts: Vec<Part>,
-    wheels: Vec<Wheel>,
+    parts: Vec<PlanarBody>,
+    wheels: Vec<DiscWheel>,
     n_inputs: usize,
     armature: Vec<f64>,
     arms: Vec<f64>,
@@ -146,7 +146,7 @@ impl PlanarTree {
     /// A machine of these parts, the first of which is the base. `fingerprint`: a number that is
     /// equal for two machines only if they are of the same kind, with the same masses, inertias and
     /// lengths.
-    pub(super) fn new(parts: Vec<Part>, wheels: Vec<Wheel>, fingerprint: u64) -> Self {
+    pub(super) fn new(parts: Vec<PlanarBody>, wheels: Vec<DiscWheel>, fingerprint: u64) -> Self {
         let arms = arms(&parts, &wheels);
         let armature = vec![0.0; arms.len()];
         Self {
@@ -186,7 +186,7 @@ impl PlanarTree {
         self.wheels.len()
     }
 
-    /// See [`Wheel::torque_limit`].
+    /// See [`DiscWheel::torque_limit`].
     #[must_use]
     pub fn torque_limit(&self, wheel: usize) -> f64 {
         self.wheels[wheel].torque_limit
@@ -355,7 +355,7 @@ impl PlanarTree {
     /// Potential energy `−Σ m g · x`, J.
     #[must_use]
     pub fn potential(&self, poses: &PlanarPoses, gravity: &Vector2<f64>) -> f64 {
-        let of = |(b, part): (usize, &Part)| {
+        let of = |(b, part): (usize, &PlanarBody)| {
             let centre = poses.base + poses.point(b, &part.centre);
             part.mass * gravity.dot(&centre)
         };
@@ -398,9 +398,9 @@ impl PlanarTree {
 
     /// The disc of a wheel.
     #[must_use]
-    pub fn disc(&self, wheel: usize, poses: &PlanarPoses) -> Disc {
+    pub fn disc(&self, wheel: usize, poses: &PlanarPoses) -> PlanarDisc {
         let wheel = &self.wheels[wheel];
-        Disc {
+        PlanarDisc {
             centre: poses.base + poses.point(wheel.part, &wheel.centre),
             radius: wheel.radius,
         }
@@ -452,7 +452,7 @@ impl PlanarTree {
 
 /// Lengths that convert the change of a coordinate into a displacement, m: 1 for places, the
 /// longest reach to a wheel's rim for angles.
-fn arms(parts: &[Part], wheels: &[Wheel]) -> Vec<f64> {
+fn arms(parts: &[PlanarBody], wheels: &[DiscWheel]) -> Vec<f64> {
     let mut arms = vec![0.0_f64; 2 + parts.len()];
     (arms[0], arms[1]) = (1.0, 1.0);
     for wheel in wheels {

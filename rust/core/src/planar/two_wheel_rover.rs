@@ -25,7 +25,7 @@
 use nalgebra::Vector2;
 
 use super::error::PlanarError;
-use super::tree::{Part, PlanarTree, Wheel, fingerprint};
+use super::tree::{DiscWheel, PlanarBody, PlanarTree, fingerprint};
 use crate::quantity::{INERTIAS, LENGTHS, MASSES, PLACES, within};
 
 /// A wheel and where its axle sits.
@@ -118,17 +118,20 @@ impl From<TwoWheelRover> for PlanarTree {
             inertia,
             wheels,
         } = rover;
-        let body = Part {
+        let body = PlanarBody {
             is_spinner: false,
-            ..Part::centred(Vector2::zeros(), mass, inertia)
+            ..PlanarBody::centred(Vector2::zeros(), mass, inertia)
         };
-        let part = |w: PlanarWheel| Part::centred(w.axle, w.mass, w.inertia);
+        let part = |w: PlanarWheel| PlanarBody::centred(w.axle, w.mass, w.inertia);
         let [a, b] = wheels;
         let of_wheel = |w: &PlanarWheel| [w.mass, w.radius, w.inertia, w.axle.x, w.axle.y];
         let numbers = wheels.iter().flat_map(of_wheel);
         Self::new(
             vec![body, part(a), part(b)],
-            vec![Wheel::driven(1, a.radius), Wheel::driven(2, b.radius)],
+            vec![
+                DiscWheel::driven(1, a.radius),
+                DiscWheel::driven(2, b.radius),
+            ],
             fingerprint("two wheels", [mass, inertia].into_iter().chain(numbers)),
         )
     }

@@ -16,17 +16,17 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::error::LinearisationError;
 use super::rover::{RoverScene, RoverSimulation};
 use super::rover_command::RoverCommand;
-use super::scene::{Scene, SceneKey, Usual};
+use super::scene::{Scene, SceneKey, UsualOutcome};
 use super::step_parameter::StepParameter;
 use crate::contact::loops::check_closed;
 use crate::integrator::held_step::{is_projected, law_of_last};
-use crate::integrator::{NoProbe, Start, StepReport, UnilateralContact, Variant};
+use crate::integrator::{NoProbe, StepReport, StepStart, UnilateralContact, Variant};
 use crate::law::mode::ContactMode;
 use crate::multibody::{Configuration, Model, coordinates};
 use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Instructions, Single};
 use crate::system::TreeSystem;
-use crate::system::tangent::{Direction, HeldSand, HeldTree, OF_WHEEL, Tangent, TangentScene};
+use crate::system::tangent::{Direction, HeldSand, HeldTree, OF_WHEEL, TangentPass, TangentScene};
 
 /// Cosine of the pitch below which the coordinates count as singular.
 const SINGULAR: f64 = 1e-6;
@@ -43,7 +43,7 @@ pub(super) type Modes = (
 );
 
 /// A step with its derivatives.
-pub(super) struct Columns {
+pub(super) struct DifferentiatedStep {
     /// Derivatives of the next state by state, command and parameters, a column each.
     pub all: DMatrix<f64>,
     pub next_state: Vec<f64>,
@@ -65,23 +65,23 @@ pub struct Differentiator {
 
 /// Passes over a step with this machine's widest lanes.
 enum Passes {
-    Singles(Box<Tangent<f64>>),
+    Singles(Box<TangentPass<f64>>),
     #[cfg(target_arch = "x86_64")]
-    Fours(Box<Tangent<crate::scalar::Fours>>),
+    Fours(Box<TangentPass<crate::scalar::Fours>>),
     #[cfg(target_arch = "x86_64")]
-    Eights(Box<Tangent<crate::scalar::Eights>>),
+    Eights(Box<TangentPass<crate::scalar::Eights>>),
 }
 
 impl Passes {
     fn new(instructions: Instructions, model: &Model) -> Self {
         match instructions {
             Instructions::Baseline => {
-                Self::Singles(Box::new(Tangent::new(Single::Baseline, model)))
+                Self::Singles(Box::new(TangentPass::new(Single::Baseline, model)))
             }
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(token) => Self::Fours(Box::new(Tangent::new(token, model))),
+            Instructions::Avx2(token) => Self::Fours(Box::new(TangentPass::new(token, model))),
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512(token) => Self::Eights(Box::new(Tangent::new(token, model))),
+            Instructions::Avx512(token) => Self::Eights(Box::new(TangentPass::new(token, model))),
         }
     }
 
@@ -189,7 +189,7 @@ impl Differentiator {
         let command = self.sim.command.clone();
         let sim = &mut self.sim;
         let is_rigid = !sim.model().has_compliance();
-        if is_rigid && matches!(sim.usual_step(&mut NoProbe)?, Usual::Taken(_)) {
+        if is_rigid && matches!(sim.usual_step(&mut NoProbe)?, UsualOutcome::Taken(_)) {
             let mut found = sim.warm_start.clone();
             found.persistent.clear();
             self.set(state)?;
@@ -312,7 +312,7 @@ impl Differentiator {
         &mut self,
         state: &[f64],
         parameters: &[StepParameter],
-    ) -> Result<Columns, LinearisationError> {
+    ) -> Result<DifferentiatedStep, LinearisationError> {
         self.check_angles(state)?;
         self.set(state)?;
         let (begin, v) = (self.sim.q().clone(), self.sim.v().to_vec());
@@ -327,7 +327,7 @@ impl Differentiator {
         let directions = self.directions(state, parameters, &numbers);
         let (nv, nx) = (self.nv(), state.len());
         let sim = &mut self.sim;
-        let start = Start {
+        let start = StepStart {
             configuration: &begin,
             v: &v,
         };
@@ -372,7 +372,7 @@ impl Differentiator {
         if !holds || off.is_nan() || off > SAME * size {
             return Err(LinearisationError::NotHeld);
         }
-        Ok(Columns {
+        Ok(DifferentiatedStep {
             all,
             next_state,
             held,

@@ -6,10 +6,10 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::active_contact::LocatedContact;
-use super::scene::{Scene, Snapshot, StepTaken};
+use super::scene::{AcceptedStep, Scene, Snapshot};
 use super::state::State;
 use super::stepping::Simulation;
-use crate::integrator::{OptionsError, Scratch, Stabilisation, StepOptions};
+use crate::integrator::{OptionsError, Stabilisation, StepOptions, StepScratch};
 use crate::multibody::Energy;
 use crate::problem::BodyPairs;
 use crate::quantity::finite;
@@ -177,7 +177,7 @@ where
     }
 
     /// Lets grains sleep and wake.
-    fn after_step(&self, taken: StepTaken<'_, Self>) {
+    fn after_step(&self, taken: AcceptedStep<'_, Self>) {
         (taken.memory).count_step(taken.options.time_step, taken.parts);
         let Some(options) = &self.sleep else {
             return;
@@ -407,7 +407,7 @@ where
         self.memory.moments = moments
             .filter_map(|(key, s)| Some((renumbering.key(*key)?, *s)))
             .collect();
-        self.scratch = Scratch::new(&self.state.configuration, room);
+        self.scratch = StepScratch::new(&self.state.configuration, room);
         self.active.clear();
     }
 

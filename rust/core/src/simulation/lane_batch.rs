@@ -9,12 +9,12 @@ use std::sync::Arc;
 
 use super::rover::RoverSimulation;
 use crate::caught::caught;
-use crate::contact::slots::machine::Machine;
+use crate::contact::slots::machine::SharedMachine;
 use crate::integrator::{NoProbe, StepError, StepOptions, StepReport};
 use crate::scalar::{Instructions, Lane};
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;
-use crate::system::block::{Block, Next, are_alike};
+use crate::system::block::{Next, RoverBlock, are_alike};
 
 /// Rovers that together cost less alone than as a block, as a fraction of its lanes.
 const FEW: f64 = 0.4;
@@ -100,8 +100,8 @@ struct Slot {
 
 struct Lanes<T: Lane> {
     token: T::Token,
-    machine: Option<Arc<Machine>>,
-    blocks: Vec<Block<T>>,
+    machine: Option<Arc<SharedMachine>>,
+    blocks: Vec<RoverBlock<T>>,
     /// How far each block is.
     courses: Vec<Course>,
     queue: Queue<T>,
@@ -248,14 +248,14 @@ impl<T: Lane> Lanes<T> {
         }
         let n_slots = self.slots.len().next_multiple_of(T::LANES);
         self.slots.resize(n_slots, None);
-        let is_own = |own: &Arc<Machine>| Arc::ptr_eq(own, &machine) || **own == *machine;
+        let is_own = |own: &Arc<SharedMachine>| Arc::ptr_eq(own, &machine) || **own == *machine;
         if !self.machine.as_ref().is_some_and(is_own) {
             self.machine = None;
             self.blocks.clear();
         }
         let own = self.machine.get_or_insert(machine);
         while self.blocks.len() < n_slots / T::LANES {
-            self.blocks.push(Block::new(self.token, own));
+            self.blocks.push(RoverBlock::new(self.token, own));
         }
         self.size = T::LANES * own.n_problems();
         let n_problems = n_slots / T::LANES * self.size;
@@ -308,7 +308,7 @@ impl<T: Lane> Lanes<T> {
         let problems = &mut self.problems[b * self.size..][..self.size];
         block.prepare(problems, &mut NoProbe);
         (self.queue).enter(b, &mut self.problems, |problem| {
-            block.needs_queue() && block.is_going(Block::<T>::lane_of(problem))
+            block.needs_queue() && block.is_going(RoverBlock::<T>::lane_of(problem))
         });
     }
 
@@ -322,7 +322,7 @@ impl<T: Lane> Lanes<T> {
             match block.conclude(problems, &mut NoProbe) {
                 Next::Retake => {
                     (self.queue).enter(b, &mut self.problems, |problem| {
-                        block.needs_queue() && block.is_retaken(Block::<T>::lane_of(problem))
+                        block.needs_queue() && block.is_retaken(RoverBlock::<T>::lane_of(problem))
                     });
                     return true;
                 }

@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::differentiator::{Columns, Differentiator, Modes};
+use super::differentiator::{DifferentiatedStep, Differentiator, Modes};
 use super::error::LinearisationError;
 use super::rover::RoverSimulation;
 use super::step_parameter::StepParameter;
@@ -81,7 +81,7 @@ impl RoverSimulation {
         let mut differentiator = Differentiator::new(self)?;
         let state = differentiator.state_of(self);
         let columns = differentiator.differentiate(&state, parameters)?;
-        let Columns {
+        let DifferentiatedStep {
             all,
             next_state,
             held,

@@ -82,11 +82,11 @@ pub use grains::{
 pub use linearisation::{ColumnCheck, Linearisation};
 pub use planar::{PlanarScene, PlanarSimulation};
 pub use reading::{ReadingLayout, ReadingRequest, ReadingScratch, seen_from};
-pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
+pub use rover::{LastCall, PlacedRover, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use rover_in_grains::{RoverInGrains, TogetherError};
 pub use scene::{
-    DenseOperator, Scene, SceneKey, SceneScratch, Snapshot, StepTaken, Usual, UsualStep,
+    AcceptedStep, DenseOperator, Scene, SceneKey, SceneScratch, Snapshot, UsualOutcome, UsualStep,
 };
 pub use state::State;
 pub use step_parameter::StepParameter;

@@ -5,13 +5,13 @@ use std::sync::OnceLock;
 use crate::solver::SolverOptions;
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;
-use crate::system::block::Block;
+use crate::system::block::RoverBlock;
 
 /// A rover's own block, made when first needed. It holds no state: a copy has no block, only the
 /// operator of the last step.
 #[derive(Default)]
 pub(super) struct OwnBlock {
-    pub(super) block: Option<Box<Block<f64>>>,
+    pub(super) block: Option<Box<RoverBlock<f64>>>,
     /// The solver's scratch.
     pub(super) queue: Option<Box<Queue<f64>>>,
     pub(super) problems: Vec<ContactProblem>,
@@ -57,7 +57,7 @@ impl OwnBlock {
     }
 
     /// The problems of the last step taken here, and its block.
-    pub(super) fn last(&self) -> Option<(&Block<f64>, &[ContactProblem])> {
+    pub(super) fn last(&self) -> Option<(&RoverBlock<f64>, &[ContactProblem])> {
         let block = self.block.as_deref().filter(|_| self.is_last)?;
         Some((block, &self.problems))
     }

@@ -10,7 +10,7 @@ use super::state::State;
 use super::stepping::Simulation;
 use crate::integrator::{OptionsError, StepOptions};
 use crate::multibody::{Energy, StateError};
-use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarTree};
+use crate::planar::{ContactRule, PlanarDisc, PlanarFacing, PlanarGround, PlanarTree};
 use crate::system::{PlanarContact, PlanarScratch, PlanarSystem};
 
 /// A machine on a ground. Both are shared.
@@ -19,7 +19,7 @@ pub struct PlanarScene {
     /// The machine.
     pub machine: Arc<PlanarTree>,
     /// The ground.
-    pub ground: Arc<dyn Ground>,
+    pub ground: Arc<dyn PlanarGround>,
     /// Contact rule of discs on the ground.
     pub rule: ContactRule,
 }
@@ -129,7 +129,7 @@ impl PlanarSimulation {
     /// An option out of its range.
     pub fn new(
         machine: impl Into<PlanarTree>,
-        ground: Arc<dyn Ground>,
+        ground: Arc<dyn PlanarGround>,
         rule: ContactRule,
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
@@ -201,7 +201,7 @@ impl PlanarSimulation {
 
     /// Discs of the wheels now.
     #[must_use]
-    pub fn discs(&self) -> Vec<Disc> {
+    pub fn discs(&self) -> Vec<PlanarDisc> {
         let poses = self.machine().poses(self.q());
         let discs = 0..self.machine().n_wheels();
         discs.map(|i| self.machine().disc(i, &poses)).collect()
@@ -211,8 +211,8 @@ impl PlanarSimulation {
     #[must_use]
     pub fn gaps(&self) -> Vec<f64> {
         let PlanarScene { ground, rule, .. } = &self.scene;
-        let mut facing: Vec<Facing> = Vec::new();
-        let gap = |disc: &Disc| match rule {
+        let mut facing: Vec<PlanarFacing> = Vec::new();
+        let gap = |disc: &PlanarDisc| match rule {
             ContactRule::CentreHeight => ground.below(&disc.centre).distance,
             ContactRule::Nearest => {
                 // The nearest point is no farther than the one straight below.

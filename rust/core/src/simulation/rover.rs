@@ -9,11 +9,13 @@ use serde::{Deserialize, Serialize};
 use super::active_contact::LocatedContact;
 use super::own_block::OwnBlock;
 use super::rover_command::RoverCommand;
-use super::scene::{DenseOperator, Scene, SceneScratch, Snapshot, StepTaken, Usual, UsualStep};
+use super::scene::{
+    AcceptedStep, DenseOperator, Scene, SceneScratch, Snapshot, UsualOutcome, UsualStep,
+};
 use super::state::State;
 use super::stepping::Simulation;
 use crate::contact::loops;
-use crate::contact::slots::machine::Machine;
+use crate::contact::slots::machine::SharedMachine;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
@@ -33,14 +35,14 @@ pub struct RoverScene {
     /// The ground.
     pub terrain: Arc<dyn Terrain>,
     /// What rovers in a block have in common.
-    pub(super) machine: Arc<Machine>,
+    pub(super) machine: Arc<SharedMachine>,
 }
 
 impl RoverScene {
     /// A machine on a terrain.
     #[must_use]
     pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>) -> Self {
-        let machine = Arc::new(Machine::of(&model));
+        let machine = Arc::new(SharedMachine::of(&model));
         Self {
             model,
             terrain,
@@ -80,7 +82,7 @@ pub type RoverSimulation = Simulation<RoverScene>;
 
 /// A rover in a state on a terrain, before it is simulated.
 #[derive(Clone, Debug)]
-pub struct Placement {
+pub struct PlacedRover {
     /// The rover and the ground.
     pub scene: RoverScene,
     /// Options of the steps.
@@ -225,7 +227,7 @@ impl Scene for RoverScene {
     }
 
     /// Records torques and work of the drives.
-    fn after_step(&self, taken: StepTaken<'_, Self>) {
+    fn after_step(&self, taken: AcceptedStep<'_, Self>) {
         let drives = taken.parts.tree.drives();
         drives.to_lane(0, &mut taken.parts.drive_work);
         let RoverMemory { wheel_torque, sand } = taken.memory;
@@ -236,7 +238,7 @@ impl Scene for RoverScene {
         taken.parts.tree.end_sand(sand.as_mut());
     }
 
-    fn usual_step(&self, step: &mut UsualStep<'_, Self>, probe: &mut dyn Probe) -> Usual {
+    fn usual_step(&self, step: &mut UsualStep<'_, Self>, probe: &mut dyn Probe) -> UsualOutcome {
         self.take_usual_step(step, probe)
     }
 
@@ -342,8 +344,8 @@ impl RoverSimulation {
     ///
     /// # Panics
     /// If the sizes of the state do not fit the model.
-    pub fn placed(placement: Placement) -> Result<Self, OptionsError> {
-        let Placement {
+    pub fn placed(placement: PlacedRover) -> Result<Self, OptionsError> {
+        let PlacedRover {
             scene,
             options,
             configuration,
@@ -367,7 +369,7 @@ impl RoverSimulation {
     ///
     /// # Panics
     /// If the sizes of the state do not fit the model.
-    pub fn begin(&mut self, placement: Placement) -> Result<(), OptionsError> {
+    pub fn begin(&mut self, placement: PlacedRover) -> Result<(), OptionsError> {
         if placement.scene.model.fingerprint() != self.model().fingerprint() {
             *self = Self::placed(placement)?;
             return Ok(());
@@ -412,7 +414,7 @@ impl RoverSimulation {
         self.place(closed.unwrap_or(configuration), v);
     }
 
-    fn restart(&mut self, placement: Placement) {
+    fn restart(&mut self, placement: PlacedRover) {
         self.command = placement.scene.command();
         self.scene = placement.scene;
         self.options = with_laws_of(&self.scene.model, placement.options);

@@ -8,14 +8,14 @@
 use super::active_contact::ActiveContact;
 use super::grains::GrainSimulation;
 use super::rover::RoverSimulation;
-use super::scene::{Scene, StepTaken};
+use super::scene::{AcceptedStep, Scene};
 use super::state::Moved;
 use crate::caught::caught;
 use crate::contact::Part;
 use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Sphere, SupportMap};
 use crate::integrator::{
-    Integrator, NoProbe, Scratch, StateMut, StepError, StepOptions, StepReport, WarmStart,
+    Integrator, NoProbe, StateMut, StepError, StepOptions, StepReport, StepScratch, WarmStart,
 };
 use crate::multibody::{Kinematics, LaneConfiguration};
 use crate::system::grains::{self, GrainContact, GrainError, Grid, Mover, OVERLAP};
@@ -59,7 +59,7 @@ pub enum TogetherError {
 pub struct RoverInGrains {
     friction: f64,
     warm_start: WarmStart<CompositeKey>,
-    scratch: Scratch<Both, CompositeContact>,
+    scratch: StepScratch<Both, CompositeContact>,
     parts: CompositeScratch,
 }
 
@@ -104,7 +104,7 @@ impl RoverInGrains {
         Self {
             friction,
             warm_start: WarmStart::with_capacity(room, 0),
-            scratch: Scratch::new(&q, room),
+            scratch: StepScratch::new(&q, room),
             parts: CompositeScratch::default(),
         }
     }
@@ -238,7 +238,7 @@ impl RoverInGrains {
         bed.state.time = time;
         rover.state.time += options.time_step;
         self.part_warm_starts(rover, bed);
-        rover.scene.after_step(StepTaken {
+        rover.scene.after_step(AcceptedStep {
             options,
             state: &mut rover.state,
             memory: &mut rover.memory,

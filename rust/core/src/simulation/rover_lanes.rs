@@ -5,14 +5,14 @@ use std::sync::Arc;
 use super::active_contact::ActiveContact;
 use super::own_block::solve;
 use super::rover::{RoverScene, RoverSimulation};
-use super::scene::{Usual, UsualStep};
-use crate::contact::slots::machine::Machine;
+use super::scene::{UsualOutcome, UsualStep};
+use crate::contact::slots::machine::SharedMachine;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepReport, Variant};
 use crate::scalar::{Instructions, Lane, Single};
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;
 use crate::system::block::lane_rover::LaneRover;
-use crate::system::block::{Block, Next};
+use crate::system::block::{Next, RoverBlock};
 
 impl RoverScene {
     /// Takes a step in the rover's own block.
@@ -20,14 +20,15 @@ impl RoverScene {
         &self,
         step: &mut UsualStep<'_, Self>,
         probe: &mut dyn Probe,
-    ) -> Usual {
+    ) -> UsualOutcome {
         let own = &mut step.parts.own;
         own.set_last(false);
         if step.options.variant != Variant::Linearised {
-            return Usual::None;
+            return UsualOutcome::None;
         }
         let token = Single::best();
-        let block = (own.block).get_or_insert_with(|| Box::new(Block::new(token, &self.machine)));
+        let block =
+            (own.block).get_or_insert_with(|| Box::new(RoverBlock::new(token, &self.machine)));
         let queue = own.queue.get_or_insert_with(|| Box::new(Queue::new(token)));
         let mut lane_rover = LaneRover {
             model: &self.model,
@@ -53,7 +54,7 @@ impl RoverScene {
         if !block.is_going(0) {
             // Its problems may have more contacts than fit.
             block.return_ruts(0, &mut lane_rover);
-            return Usual::Refused;
+            return UsualOutcome::Refused;
         }
         let solver = &step.options.solver;
         let mut next = Next::Retake;
@@ -75,12 +76,12 @@ impl RoverScene {
         block.finish(is_deep.then_some(&mut gap_problems[..]), probe);
         if block.fallback(0).is_some() {
             block.return_ruts(0, &mut lane_rover);
-            return Usual::Refused;
+            return UsualOutcome::Refused;
         }
         block.store_rover(0, &mut lane_rover);
         let report = *block.report(0);
         own.set_last(true);
-        Usual::Taken(report)
+        UsualOutcome::Taken(report)
     }
 }
 
@@ -96,12 +97,12 @@ impl RoverSimulation {
     }
 
     /// What rovers in its block have in common; none if its steps are taken alone.
-    pub(super) fn machine(&self) -> Option<&Arc<Machine>> {
+    pub(super) fn machine(&self) -> Option<&Arc<SharedMachine>> {
         (self.options.variant == Variant::Linearised).then_some(&self.scene.machine)
     }
 
     /// Whether the machine of another rover is its own. An equal one becomes its own.
-    pub(super) fn shares(&mut self, other: &Arc<Machine>) -> bool {
+    pub(super) fn shares(&mut self, other: &Arc<SharedMachine>) -> bool {
         let Some(own) = self.machine() else {
             return false;
         };
@@ -115,30 +116,30 @@ impl RoverSimulation {
         is_equal
     }
 
-    /// Takes a lane of a block. [`Block::begin`] follows.
-    pub(super) fn load<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+    /// Takes a lane of a block. [`RoverBlock::begin`] follows.
+    pub(super) fn load<T: Lane>(&mut self, block: &mut RoverBlock<T>, lane: usize) {
         block.load_rover(lane, &mut self.lane_rover());
     }
 
     /// Takes back what the block has made of it.
-    pub(super) fn store<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+    pub(super) fn store<T: Lane>(&mut self, block: &mut RoverBlock<T>, lane: usize) {
         block.store_rover(lane, &mut self.lane_rover());
     }
 
     /// Leaves a block that has made nothing of it since it was loaded.
-    pub(super) fn leave<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+    pub(super) fn leave<T: Lane>(&mut self, block: &mut RoverBlock<T>, lane: usize) {
         block.return_ruts(lane, &mut self.lane_rover());
     }
 
     /// Leaves a block in whose step something panicked: whatever it holds of the rover comes back.
-    pub(super) fn recover_from<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+    pub(super) fn recover_from<T: Lane>(&mut self, block: &mut RoverBlock<T>, lane: usize) {
         if let Some(sand) = &mut self.memory.sand {
             block.recover_ruts(lane, &mut sand.ruts);
         }
     }
 
     /// Lists the contacts of its last step in a block.
-    pub(super) fn list_from<T: Lane>(&mut self, block: &Block<T>, lane: usize) {
+    pub(super) fn list_from<T: Lane>(&mut self, block: &RoverBlock<T>, lane: usize) {
         self.active.clear();
         let active = &mut self.active;
         block.visit_contacts(lane, |contact, position, impulse, velocity| {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::active_contact::{ActiveContact, LocatedContact};
 use super::state::{Moved, State};
 use crate::integrator::{
-    Dynamics, MechanicalSystem, Probe, Scratch, StepOptions, StepReport, UnilateralContact,
+    Dynamics, MechanicalSystem, Probe, StepOptions, StepReport, StepScratch, UnilateralContact,
     WarmStart,
 };
 use crate::multibody::Energy;
@@ -19,7 +19,7 @@ use crate::multibody::Energy;
 pub type SceneKey<S> = <<S as Scene>::Contact as UnilateralContact>::Key;
 
 /// Scratch of a scene's steps.
-pub type SceneScratch<S> = Scratch<<S as Scene>::Moved, <S as Scene>::Contact>;
+pub type SceneScratch<S> = StepScratch<<S as Scene>::Moved, <S as Scene>::Contact>;
 
 /// A system that can be simulated.
 pub trait Scene: Clone {
@@ -86,12 +86,12 @@ pub trait Scene: Clone {
     }
 
     /// Called after each accepted step. By default it does nothing.
-    fn after_step(&self, _taken: StepTaken<'_, Self>) {}
+    fn after_step(&self, _taken: AcceptedStep<'_, Self>) {}
 
     /// Takes a step with the usual effort, by the law of the options' variant. By default all steps
     /// are taken with all effort.
-    fn usual_step(&self, _step: &mut UsualStep<'_, Self>, _probe: &mut dyn Probe) -> Usual {
-        Usual::None
+    fn usual_step(&self, _step: &mut UsualStep<'_, Self>, _probe: &mut dyn Probe) -> UsualOutcome {
+        UsualOutcome::None
     }
 
     /// Called at the end of a call: makes `scratch` that of the last step, whichever way it was
@@ -175,7 +175,7 @@ impl<S: Scene> Snapshot<S> {
 
 /// What came of a step with the usual effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Usual {
+pub enum UsualOutcome {
     /// The scene has no such steps.
     None,
     /// The step takes more effort; nothing has changed.
@@ -201,7 +201,7 @@ pub struct UsualStep<'a, S: Scene> {
 }
 
 /// A step that was just accepted.
-pub struct StepTaken<'a, S: Scene> {
+pub struct AcceptedStep<'a, S: Scene> {
     /// The step's options.
     pub options: &'a StepOptions,
     /// Configuration, velocity and time, which the scene may correct.

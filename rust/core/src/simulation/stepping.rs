@@ -4,13 +4,13 @@ use super::active_contact::ActiveContact;
 use super::error::SnapshotError;
 use super::profile::Stopwatch;
 use super::scene::{
-    DenseOperator, Scene, SceneKey, SceneScratch, Snapshot, StepTaken, Usual, UsualStep,
+    AcceptedStep, DenseOperator, Scene, SceneKey, SceneScratch, Snapshot, UsualOutcome, UsualStep,
 };
 use super::state::{Moved, State};
 use crate::caught::caught;
 use crate::integrator::{
-    Integrator, Local, NoProbe, OptionsError, Probe, Scratch, StateMut, StepError, StepOptions,
-    StepReport, UnilateralContact, WarmStart,
+    Integrator, Local, NoProbe, OptionsError, Probe, StateMut, StepError, StepOptions, StepReport,
+    StepScratch, UnilateralContact, WarmStart,
 };
 use crate::multibody::Energy;
 use crate::problem::{Dimension, FrictionContactProblem, undetermined_loads};
@@ -55,7 +55,7 @@ impl<S: Scene> Simulation<S> {
             command: scene.command(),
             memory: scene.memory(),
             parts: scene.parts(),
-            scratch: Scratch::new(&scene.moved(&configuration), n),
+            scratch: StepScratch::new(&scene.moved(&configuration), n),
             moved: scene.moved(&configuration),
             state: State::at_rest(configuration, nv),
             warm_start: WarmStart::with_capacity(n, nv),
@@ -283,12 +283,12 @@ impl<S: Scene> Simulation<S> {
             let usual = if may_be_usual {
                 self.usual_step(probe)?
             } else {
-                Usual::None
+                UsualOutcome::None
             };
             let report = match usual {
-                Usual::Taken(report) => report,
-                Usual::None | Usual::Refused => StepReport {
-                    fallbacks: usize::from(usual == Usual::Refused),
+                UsualOutcome::Taken(report) => report,
+                UsualOutcome::None | UsualOutcome::Refused => StepReport {
+                    fallbacks: usize::from(usual == UsualOutcome::Refused),
                     ..self.step_with_all_effort(integrator, probe)?
                 },
             };
@@ -333,13 +333,13 @@ impl<S: Scene> Simulation<S> {
         caught(|| step(self)).map_err(|fault| {
             self.scene.recover(&mut self.parts, &mut self.memory);
             let n = self.scene.contact_capacity();
-            self.scratch = Scratch::new(&self.moved, n);
+            self.scratch = StepScratch::new(&self.moved, n);
             StepError::Internal { time, fault }
         })
     }
 
     /// A step with the usual effort.
-    pub(super) fn usual_step(&mut self, probe: &mut dyn Probe) -> Result<Usual, StepError> {
+    pub(super) fn usual_step(&mut self, probe: &mut dyn Probe) -> Result<UsualOutcome, StepError> {
         self.guard(|own| {
             let mut step = UsualStep {
                 options: &own.options,
@@ -391,7 +391,7 @@ impl<S: Scene> Simulation<S> {
         )?;
         drop(system);
         self.moved.write(&mut self.state.configuration);
-        self.scene.after_step(StepTaken {
+        self.scene.after_step(AcceptedStep {
             options: &self.options,
             state: &mut self.state,
             memory: &mut self.memory,

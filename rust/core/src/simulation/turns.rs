@@ -51,7 +51,7 @@ pub struct Done<'a> {
 }
 
 /// A rover with its data.
-pub type Slot<'a, P> = (
+pub type RoverTurn<'a, P> = (
     (&'a mut RoverSimulation, &'a mut Option<StepError>),
     &'a mut P,
 );
@@ -121,7 +121,7 @@ impl Workers {
     /// As [`Self::pool`]. No rover has moved then.
     pub fn take_turns<'a, P: Send + 'a>(
         &mut self,
-        slots: impl ExactSizeIterator<Item = Slot<'a, P>> + Send,
+        slots: impl ExactSizeIterator<Item = RoverTurn<'a, P>> + Send,
         n: usize,
         turn: &impl Turn<P>,
         go_on: &mut dyn FnMut() -> bool,
@@ -143,7 +143,7 @@ fn note(rover: &RoverSimulation, fault: Fault, error: &mut Option<StepError>) {
 /// `workers`: one for each thread, at least one; `pool`: the threads besides the calling one. Once
 /// `go_on` returns false, each rover stops after a whole step.
 fn take_turns<'a, P: Send + 'a>(
-    slots: impl ExactSizeIterator<Item = Slot<'a, P>> + Send,
+    slots: impl ExactSizeIterator<Item = RoverTurn<'a, P>> + Send,
     n: usize,
     turn: &impl Turn<P>,
     workers: &mut [Worker],

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use crate::integrator::Start;
+use crate::integrator::StepStart;
 use crate::multibody::joint::joint_model::JointCoordinates;
 use crate::multibody::momentum::body_momenta;
 use crate::multibody::{Joint, LaneConfiguration, Model, Momentum, Poses, Tree};
@@ -56,7 +56,7 @@ impl MomentumBalance {
     pub(super) fn residual(
         &mut self,
         scene: &BalanceScene<'_>,
-        start: Start<'_, LaneConfiguration<f64>>,
+        start: StepStart<'_, LaneConfiguration<f64>>,
         v_end: &[f64],
         y: &mut [f64],
     ) {

@@ -8,10 +8,12 @@ use super::fitted_theta::implicit_weight;
 use super::planar_matrices::{PlanarMatrices, sum_of_products};
 use crate::contact::Activation;
 use crate::integrator::{
-    Dynamics, Forces, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
+    Dynamics, Forces, MechanicalSystem, StepOptions, StepStart, UnilateralContact, Work,
 };
 use crate::multibody::MotorLine;
-use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMotor, PlanarPoses, PlanarTree};
+use crate::planar::{
+    ContactRule, PlanarDisc, PlanarFacing, PlanarGround, PlanarMotor, PlanarPoses, PlanarTree,
+};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::scalar::{Single, Vec3};
 
@@ -46,7 +48,7 @@ impl PlanarContact {
         Vector2::new(self.n.y, -self.n.x)
     }
 
-    fn meet(&mut self, disc: &Disc, facing: &Facing, rule: ContactRule) {
+    fn meet(&mut self, disc: &PlanarDisc, facing: &PlanarFacing, rule: ContactRule) {
         self.n = facing.n;
         self.foot = facing.foot;
         self.point = disc.centre - facing.n * disc.radius;
@@ -79,7 +81,7 @@ pub struct PlanarScratch {
     /// Rows n, t of Zᵀ of each contact (nv each).
     Z: Vec<f64>,
     W: Vec<f64>,
-    facing: Vec<Facing>,
+    facing: Vec<PlanarFacing>,
     motors: Vec<Driven>,
     torques: Vec<f64>,
     /// Their generalized force (nv).
@@ -101,7 +103,7 @@ pub struct PlanarSystem<'a> {
     /// The machine.
     pub machine: &'a PlanarTree,
     /// The ground.
-    pub ground: &'a dyn Ground,
+    pub ground: &'a dyn PlanarGround,
     /// How discs meet it.
     pub rule: ContactRule,
     /// Commanded torques, N m, positive forward.
@@ -111,7 +113,13 @@ pub struct PlanarSystem<'a> {
 }
 
 /// The points of the ground that face a disc, with their contact's number.
-fn facing(ground: &dyn Ground, rule: ContactRule, disc: &Disc, reach: f64, out: &mut Vec<Facing>) {
+fn facing(
+    ground: &dyn PlanarGround,
+    rule: ContactRule,
+    disc: &PlanarDisc,
+    reach: f64,
+    out: &mut Vec<PlanarFacing>,
+) {
     out.clear();
     match rule {
         ContactRule::Nearest => ground.facing(&disc.centre, disc.radius + reach, out),
@@ -268,7 +276,7 @@ impl Forces for PlanarSystem<'_> {
     fn load(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
+        start: StepStart<'_, Vec<f64>>,
         v_mean: &[f64],
         y: &mut [f64],
     ) {
@@ -305,7 +313,7 @@ impl Forces for PlanarSystem<'_> {
     fn load_at_end(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
+        start: StepStart<'_, Vec<f64>>,
         v_end: &[f64],
         v_mean: &[f64],
         y: &mut [f64],
@@ -324,7 +332,7 @@ impl Forces for PlanarSystem<'_> {
     fn work_of_displacement(
         &mut self,
         _options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
+        start: StepStart<'_, Vec<f64>>,
         v_end: &[f64],
         displacement: &[f64],
     ) -> Option<f64> {
@@ -335,7 +343,7 @@ impl Forces for PlanarSystem<'_> {
     fn work(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Vec<f64>>,
+        start: StepStart<'_, Vec<f64>>,
         v_end: &[f64],
         out: &mut [Work],
     ) {
@@ -413,10 +421,10 @@ impl MechanicalSystem for PlanarSystem<'_> {
             // The same minimum of the distance is the one whose foot is next to the old foot.
             facing(self.ground, self.rule, &disc, moved, &mut self.parts.facing);
             let next = self.parts.facing.iter().min_by(|a, b| {
-                let away = |f: &Facing| (f.foot - contact.foot).norm();
+                let away = |f: &PlanarFacing| (f.foot - contact.foot).norm();
                 away(a).total_cmp(&away(b))
             });
-            let tangent = Facing {
+            let tangent = PlanarFacing {
                 foot: contact.foot,
                 n: contact.n,
                 distance: contact.n.dot(&(disc.centre - contact.foot)),

@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 use nalgebra::{Vector3, Vector6};
 
-use super::sand_patch::{Layers, Patch, SandScene, SandStep, depth, each};
+use super::sand_patch::{Layers, SandPatch, SandScene, SandStep, depth, each};
 use super::sand_wheel::LaneWheel;
 use super::six::{self, Six};
 use crate::contact::placed_wheel::PlacedWheel;
@@ -60,7 +60,7 @@ pub(crate) const MOST_REVISIONS_IN_SAND: usize = 24;
 #[derive(Clone, Debug)]
 pub(crate) struct SandContact<T: Lane> {
     token: T::Token,
-    pub(super) patches: Vec<Patch<T>>,
+    pub(super) patches: Vec<SandPatch<T>>,
     /// Velocity at which the forces are taken (nv); that of the last trial if they are given.
     pub(super) guess: Vec<T>,
     /// Soil of each lane; none on firm ground.
@@ -87,7 +87,7 @@ impl<T: Lane> SandContact<T> {
         Self {
             token,
             patches: wheels
-                .map(|wheel| Patch::new(token, mechanism, wheel))
+                .map(|wheel| SandPatch::new(token, mechanism, wheel))
                 .collect(),
             guess: vec![zero; mechanism.nv()],
             soils: std::array::from_fn(|_| None),
@@ -281,7 +281,7 @@ impl<T: Lane> SandContact<T> {
             T::vectorize(
                 self.token,
                 #[inline(always)]
-                || *own += patch.weigh(step, lanes, v, (&twist, sinkage)),
+                || *own += patch.try_work(step, lanes, v, (&twist, sinkage)),
             );
         }
     }
@@ -310,7 +310,7 @@ impl<T: Lane> SandContact<T> {
     }
 }
 
-impl<T: Lane> Patch<T> {
+impl<T: Lane> SandPatch<T> {
     /// Depth of the lowest point at the end of a trial, m.
     pub(super) fn sinkage(&self, layers: &Layers<'_>, lanes: T::Mask) -> T {
         let radius = self.wheel.shape.radius;
@@ -327,7 +327,7 @@ impl<T: Lane> Patch<T> {
     /// Work over a step from the velocity `v` to one with a twist, J; it is then tried. The wheel's
     /// sinkage there in m.
     #[inline(always)]
-    fn weigh(
+    fn try_work(
         &mut self,
         step: &SandStep<T>,
         lanes: T::Mask,

@@ -11,13 +11,13 @@ use super::sand_tangent::{Evaluated, LaneEvaluated, TangentForce, TwistMap};
 use super::sand_wheel::{LanePose, LaneWheel};
 use super::six::{self, SIX, Six, minus, scaled, size};
 use crate::contact::placed_wheel::PlacedWheel;
-use crate::geometry::{SoftLayer, Tangent};
+use crate::geometry::{SoftLayer, TangentPlane};
 use crate::multibody::{Factor, Mechanism, Poses};
 use crate::sand::memory::after_step;
 use crate::sand::patch::{Height, Relief};
 use crate::sand::ruts::RutsNear;
 use crate::sand::{
-    Bed, Derivatives, Memory, Reaction, Rules, RutMap, SandWheel, WheelPose, Window, react,
+    Bed, Derivatives, GaussRules, Memory, Reaction, RutMap, SandWheel, WheelPose, Window, react,
 };
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
@@ -95,10 +95,10 @@ pub(super) struct SandStep<T> {
 
 /// A wheel of a machine in sand: geometry, linearised force and trial.
 #[derive(Clone, Debug)]
-pub(super) struct Patch<T: Lane> {
+pub(super) struct SandPatch<T: Lane> {
     pub(super) wheel: PlacedWheel,
     /// Gauss rules for the points of the wheel, by lane.
-    pub(super) rules: [Option<Arc<Rules>>; MAX_LANES],
+    pub(super) rules: [Option<Arc<GaussRules>>; MAX_LANES],
     pub(super) map: TwistMap<T>,
     pub(super) pose: LanePose<T>,
     /// The pose at the end of the last trial.
@@ -118,7 +118,7 @@ pub(super) struct Patch<T: Lane> {
     pub(super) tried: LaneWheel<T>,
 }
 
-impl<T: Lane> Patch<T> {
+impl<T: Lane> SandPatch<T> {
     /// Patch of a wheel that is clear of the ground.
     pub(super) fn new(token: T::Token, mechanism: &Mechanism, wheel: PlacedWheel) -> Self {
         let (map, nobody) = (
@@ -454,7 +454,7 @@ fn product(a: &Matrix6<f64>, b: &Matrix6<f64>) -> Matrix6<f64> {
 }
 
 /// Depth of the lowest point of a wheel under a tangent plane, m.
-pub(super) fn depth(wheel: &SandWheel, pose: &WheelPose, tangent: &Tangent) -> f64 {
+pub(super) fn depth(wheel: &SandWheel, pose: &WheelPose, tangent: &TangentPlane) -> f64 {
     let lean = pose.axle.dot(&tangent.normal);
     let upright = (1.0 - lean * lean).max(0.0).sqrt();
     let height = (pose.centre - tangent.place).dot(&tangent.normal);

@@ -10,7 +10,7 @@ use super::momentum_balance::BalanceScene;
 use super::tree_lanes::TreeLanes;
 use super::tree_scratch::TreeScratch;
 use crate::contact::body_motion::Still;
-use crate::contact::detection::{Moving, detect_parts};
+use crate::contact::detection::{MovingMachine, detect_parts};
 use crate::contact::loops::each;
 use crate::contact::pair_detection::detect_pairs_of;
 use crate::contact::relocation::relocate_to;
@@ -20,7 +20,7 @@ use crate::contact::{
     generalized_impulse, joint_friction, list_friction, relocate_limit,
 };
 use crate::geometry::Terrain;
-use crate::integrator::{Dynamics, MechanicalSystem, Start, StepOptions, UnilateralContact};
+use crate::integrator::{Dynamics, MechanicalSystem, StepOptions, StepStart, UnilateralContact};
 use crate::law::compliance::Compliance;
 use crate::law::newton_impact::rebound;
 use crate::multibody::{LaneConfiguration, Model};
@@ -151,7 +151,7 @@ impl<'a> TreeSystem<'a> {
 }
 
 /// A start of a step.
-type At<'a> = Start<'a, LaneConfiguration<f64>>;
+type At<'a> = StepStart<'a, LaneConfiguration<f64>>;
 
 impl MechanicalSystem for TreeSystem<'_> {
     type Machine = TreeLanes<f64>;
@@ -182,7 +182,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         } = &mut *self.parts;
         let at = |poses| Still::new(model.mechanism(), poses, v);
         let (middle, end) = (at(&tree.poses_middle), at(&tree.poses_end));
-        let machine = Moving {
+        let machine = MovingMachine {
             model,
             middle: &middle,
             end: &end,

@@ -43,5 +43,5 @@ pub use shape::{
 pub use support::{Drum, Facing, Floor, Silo, Support, TerrainSupport};
 pub use terrain::{
     Clearing, Coverage, HeightField, Neighbourhood, Plane, Primitive, Rocks, SoftGround, SoftLayer,
-    SphereField, Tangent, Terrain, TerrainError, TriangleMesh, Union,
+    SphereField, TangentPlane, Terrain, TerrainError, TriangleMesh, Union,
 };

@@ -20,7 +20,7 @@
 //! *Analytical determination of drawbar pull as a function of slip*; Wong and Reece 1967.
 
 use super::checks::{in_range, not_negative};
-use super::piece::{Piece, Setting, Stress};
+use super::piece::{Piece, Stress, WheelConditions};
 use super::wheel::Skin;
 use friction_contact::quantity::{QuantityError, positive};
 use friction_contact::scalar::elementary::{exp_m1, ln};
@@ -89,7 +89,7 @@ impl Bekker {
     pub fn stress<T: Lane>(
         &self,
         piece: &Piece<T>,
-        setting: &Setting,
+        setting: &WheelConditions,
         wants_slopes: bool,
     ) -> Stress<T> {
         let (n, slid) = (piece.normal, &piece.slid);
@@ -193,7 +193,7 @@ mod tests {
         slip_sinkage: 0.0,
     };
 
-    const SETTING: Setting = Setting {
+    const SETTING: WheelConditions = WheelConditions {
         held: 0.0,
         width: 0.1,
         gravity: 9.81,

@@ -21,14 +21,14 @@ use friction_contact::scalar::Lane;
 
 /// Velocity of a wheel: of its centre, m/s, and angular, rad/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Twist {
+pub struct WheelTwist {
     /// m/s.
     pub linear: Vector3<f64>,
     /// rad/s.
     pub angular: Vector3<f64>,
 }
 
-impl Twist {
+impl WheelTwist {
     /// Twist from six components, the linear ones first.
     #[must_use]
     pub fn of(six: &Vector6<f64>) -> Self {
@@ -87,7 +87,7 @@ impl Memory {
 
     /// Memory of the steady motion of a wheel of this radius, m; zero at rest.
     #[must_use]
-    pub fn steady(twist: &Twist, radius: f64) -> Self {
+    pub fn steady(twist: &WheelTwist, radius: f64) -> Self {
         let rate = rate(&twist.six().into(), radius);
         if rate > 0.0 {
             Self::of(&(twist.six() / rate))
@@ -99,7 +99,7 @@ impl Memory {
     /// After a step of h with a twist, for a wheel of this radius in sand that forgets over
     /// `length`, m.
     #[must_use]
-    pub fn after(&self, twist: &Twist, radius: f64, (h, length): (f64, f64)) -> Recalled {
+    pub fn after(&self, twist: &WheelTwist, radius: f64, (h, length): (f64, f64)) -> Recalled {
         let six = twist.six();
         let rate = rate(&six.into(), radius);
         let (end, fresh) = after_step::<f64>(&self.six().into(), &six.into(), radius, (h, length));
@@ -193,8 +193,8 @@ pub fn rate<T: Lane>(twist: &[T; 6], radius: f64) -> T {
 mod tests {
     use super::*;
 
-    fn twist() -> Twist {
-        Twist {
+    fn twist() -> WheelTwist {
+        WheelTwist {
             linear: Vector3::new(0.2, -0.05, 0.1),
             angular: Vector3::new(0.3, 0.1, -2.0),
         }
@@ -209,7 +209,9 @@ mod tests {
         }
         assert!((memory.six() - steady.six()).norm() < 1e-9);
         assert_eq!(
-            memory.after(&Twist::default(), 0.1, (0.01, 0.005)).memory,
+            memory
+                .after(&WheelTwist::default(), 0.1, (0.01, 0.005))
+                .memory,
             memory
         );
         let at_once = Memory::default().after(&twist, 0.1, (1e9, 0.005)).memory;
@@ -222,7 +224,7 @@ mod tests {
             shift: [0.3, -0.2, 0.1],
             turn: [1.0, 0.0, -3.0],
         };
-        let of = |six: &Vector6<f64>| start.after(&Twist::of(six), 0.1, (0.01, 0.005));
+        let of = |six: &Vector6<f64>| start.after(&WheelTwist::of(six), 0.1, (0.01, 0.005));
         let found = of(&twist().six());
         for k in 0..6 {
             let mut step = Vector6::zeros();

@@ -13,7 +13,7 @@
 //! A wheel in sand; `rover_core::system` makes a force of the machine of it:
 //!
 //! ```text
-//! WheelPose, Twist ──► patch::react          Bed: tangent plane and relief under the wheel
+//! WheelPose, WheelTwist ──► patch::react     Bed: tangent plane and relief under the wheel
 //!                         │
 //!                         ▼
 //!                      points, pieces        groups of eight; depth and velocity of each
@@ -45,11 +45,11 @@ pub mod test_bed;
 pub mod wheel;
 
 pub use bekker::Bekker;
-pub use memory::{Memory, Twist};
+pub use memory::{Memory, WheelTwist};
 pub use patch::{Bed, Derivatives, Reaction, WheelPose, react, react_with};
 pub use resistive_force::{Flow, Interface};
 pub use ruts::{RutMap, Window};
-pub use soil::{Law, Resistive, Soil};
+pub use soil::{Resistive, Soil, StressLaw};
 pub use state::{SandState, WheelInSand};
-pub use test_bed::{Drive, Measured, Sunk, TestBed};
-pub use wheel::{Points, Rules, SandWheel};
+pub use test_bed::{OperatingPoint, Sunk, TestBed, WheelPerformance};
+pub use wheel::{GaussRules, Points, SandWheel};

@@ -8,12 +8,12 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::bekker::mobilised;
 use super::memory::Memory;
-use super::piece::{Piece, Setting};
-use super::points::{Feed, Group, Immersed, Motion};
+use super::piece::{Piece, WheelConditions};
+use super::points::{Feed, Group, Immersed, MemorySize};
 use super::ruts::RutsNear;
 use super::sliding::{OnRing, Rolling, Slid};
-use super::soil::{Law, Soil};
-use super::wheel::{Rules, SandWheel, Skin};
+use super::soil::{Soil, StressLaw};
+use super::wheel::{GaussRules, SandWheel, Skin};
 #[cfg(target_arch = "x86_64")]
 use friction_contact::scalar::{Eights, Fours};
 use friction_contact::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
@@ -92,7 +92,7 @@ struct Frame<'a> {
     bed: &'a Bed<'a>,
     pose: &'a WheelPose,
     want: Derivatives,
-    setting: Setting,
+    setting: WheelConditions,
     /// Columns: down, along and axle in world axes.
     axes: Matrix3<f64>,
 }
@@ -126,7 +126,7 @@ const SIX: usize = 6;
 /// The force of a soil on a wheel in a pose, with what the sand remembers.
 #[must_use]
 pub fn react(
-    wheel: (&SandWheel, &Rules),
+    wheel: (&SandWheel, &GaussRules),
     soil: &Soil,
     bed: &Bed<'_>,
     pose: &WheelPose,
@@ -141,7 +141,7 @@ pub fn react(
 #[must_use]
 pub fn react_with(
     instructions: Instructions,
-    (wheel, rules): (&SandWheel, &Rules),
+    (wheel, rules): (&SandWheel, &GaussRules),
     soil: &Soil,
     bed: &Bed<'_>,
     (pose, memory): (&WheelPose, &Memory),
@@ -180,7 +180,7 @@ pub fn react_with(
             place.copy_from(&turned);
         }
     }
-    if let Law::Bekker(_) = soil.law {
+    if let StressLaw::Bekker(_) = soil.law {
         reaction.mobilise(wheel, memory, want);
     }
     reaction
@@ -215,7 +215,7 @@ fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
 
 impl<'a> Frame<'a> {
     fn new(
-        (wheel, rules): (&'a SandWheel, &'a Rules),
+        (wheel, rules): (&'a SandWheel, &'a GaussRules),
         soil: &'a Soil,
         bed: &'a Bed<'a>,
         (pose, memory): (&'a WheelPose, &Memory),
@@ -237,7 +237,7 @@ impl<'a> Frame<'a> {
             (wheel.drum(), memory.size(wheel.drum())),
             sine,
         );
-        if let Law::Bekker(law) = &soil.law {
+        if let StressLaw::Bekker(law) = &soil.law {
             rolling.greatest = law.greatest(rolling.slip);
         }
         let height = (pose.centre - bed.place).dot(&bed.normal);
@@ -250,7 +250,7 @@ impl<'a> Frame<'a> {
                 g: Vector3::new(sine, 0.0, -lean),
                 shift,
                 turn,
-                motion: Motion::of(&shift, &turn),
+                motion: MemorySize::of(&shift, &turn),
                 rolling,
                 height,
                 highest: bed.highest,
@@ -259,7 +259,7 @@ impl<'a> Frame<'a> {
             bed,
             pose,
             want,
-            setting: Setting {
+            setting: WheelConditions {
                 held: wheel.held(),
                 width: wheel.width,
                 gravity: bed.gravity,
@@ -350,8 +350,8 @@ impl<'a> Frame<'a> {
     #[inline(always)]
     fn slid<T: Lane>(&self, at: &OnRing<T>) -> Slid<T> {
         match &self.immersed.soil.law {
-            Law::Bekker(_) => self.immersed.rolling.slid(at),
-            Law::Resistive(_) => Slid::none(at.end.token()),
+            StressLaw::Bekker(_) => self.immersed.rolling.slid(at),
+            StressLaw::Resistive(_) => Slid::none(at.end.token()),
         }
     }
 
@@ -443,7 +443,7 @@ impl<'a> Frame<'a> {
             memory[1] * r.x - memory[0] * r.y,
         ];
         let mut columns = [[a, b, c], by_turn];
-        if let Law::Bekker(_) = &self.immersed.soil.law {
+        if let StressLaw::Bekker(_) = &self.immersed.soil.law {
             let by_way = stress.by_way.map(|column| column * fresh);
             let six = columns.iter_mut().flatten().zip(piece.slid.by_memory);
             for (column, [along, across]) in six {

@@ -24,7 +24,7 @@ pub struct Piece<T: Lane> {
 
 /// What all pieces of a wheel share.
 #[derive(Clone, Copy, Debug)]
-pub struct Setting {
+pub struct WheelConditions {
     /// Part of the rim at which grousers hold sand.
     pub held: f64,
     /// Width of the wheel, m.

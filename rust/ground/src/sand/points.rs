@@ -8,22 +8,22 @@
 use nalgebra::Vector3;
 
 use super::sliding::Rolling;
-use super::soil::{Law, Resistive, Soil};
-use super::wheel::{Gauss, Ring, Rules, SandWheel, Skin};
+use super::soil::{Resistive, Soil, StressLaw};
+use super::wheel::{Gauss, GaussRules, Ring, SandWheel, Skin};
 use friction_contact::scalar::elementary::{acos, sin_cos};
 use friction_contact::scalar::{Lane, LaneMask, MAX_LANES};
 
 /// A wheel in the sand, in its own axes: down and forward in its plane, and its axle.
 pub(super) struct Immersed<'a> {
     pub wheel: &'a SandWheel,
-    pub rules: &'a Rules,
+    pub rules: &'a GaussRules,
     pub soil: &'a Soil,
     /// Into the sand.
     pub g: Vector3<f64>,
     /// What the sand remembers.
     pub shift: Vector3<f64>,
     pub turn: Vector3<f64>,
-    pub motion: Motion,
+    pub motion: MemorySize,
     pub rolling: Rolling,
     /// Height of the wheel's centre over the plane of the bed, m.
     pub height: f64,
@@ -36,7 +36,7 @@ pub(super) struct Immersed<'a> {
 /// Sizes of what the sand remembers: of all, of the shift and of the turn, and of the shift in the
 /// wheel's plane and the turn out of it.
 #[derive(Clone, Copy)]
-pub(super) struct Motion {
+pub(super) struct MemorySize {
     size: f64,
     spin: f64,
     speed: f64,
@@ -98,7 +98,7 @@ pub(super) struct Feed<'a> {
     more: [Option<(Arc, &'a Gauss)>; 3],
 }
 
-impl Motion {
+impl MemorySize {
     /// Sizes of a remembered shift and turn, in the wheel's axes.
     pub fn of(shift: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
         Self {
@@ -215,7 +215,7 @@ impl<'a> Feed<'a> {
                     grows: 0.0,
                 };
                 let rule = rules.along(self.ring - 1);
-                if let Law::Bekker(_) = soil.law {
+                if let StressLaw::Bekker(_) = soil.law {
                     self.more = self.divide(&mut arc, rule);
                 }
                 return Some((arc, rule));
@@ -319,8 +319,8 @@ impl Arcs {
         let end = quarter(cos, one);
         let whole = [-end, end];
         let [from, to] = match &wheel.soil.law {
-            Law::Resistive(sand) => rings.pushing(wheel, sand, whole),
-            Law::Bekker(_) => pressing(wheel.rolling.front, whole),
+            StressLaw::Resistive(sand) => rings.pushing(wheel, sand, whole),
+            StressLaw::Bekker(_) => pressing(wheel.rolling.front, whole),
         };
         T::select(is_clear, zero, from).store(&mut self.from[lanes.clone()]);
         T::select(is_clear, zero, to).store(&mut self.to[lanes.clone()]);
@@ -343,7 +343,7 @@ impl<T: Lane> LaneRings<T> {
     fn pushing(&self, wheel: &Immersed<'_>, sand: &Resistive, whole: [T; 2]) -> [T; 2] {
         let number = |value: f64| self.radius.like(value);
         let (zero, one) = (number(0.0), number(1.0));
-        let Motion {
+        let MemorySize {
             size,
             spin,
             speed,

@@ -2,7 +2,7 @@
 
 use super::bekker::Bekker;
 use super::checks::{in_range, not_negative};
-use super::piece::{Piece, Setting, Stress};
+use super::piece::{Piece, Stress, WheelConditions};
 use super::resistive_force::{Flow, Interface, traction};
 use super::wheel::Skin;
 use friction_contact::quantity::{QuantityError, positive};
@@ -12,7 +12,7 @@ use friction_contact::scalar::Lane;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Soil {
     /// The law of stress on a piece of a wheel.
-    pub law: Law,
+    pub law: StressLaw,
     /// K, length over which sand forgets the motion of a wheel, m.
     pub memory: f64,
     /// How many times as stiff as at the first pass sand in a rut is, up to the stress that it has
@@ -22,7 +22,7 @@ pub struct Soil {
 
 /// A law of stress.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Law {
+pub enum StressLaw {
     /// Three-dimensional resistive force theory ([`super::resistive_force`]).
     Resistive(Resistive),
     /// Bekker's, Wong's and Reece's, with Janosi's and Hanamoto's shear ([`super::bekker`]).
@@ -65,11 +65,11 @@ impl Soil {
     pub fn stress<T: Lane>(
         &self,
         piece: &Piece<T>,
-        setting: &Setting,
+        setting: &WheelConditions,
         wants_slopes: bool,
     ) -> Stress<T> {
         match &self.law {
-            Law::Resistive(sand) => {
+            StressLaw::Resistive(sand) => {
                 let surface = match piece.skin {
                     Skin::Rim => sand.tread.mixed(&sand.grousers, setting.held),
                     Skin::Wall => sand.wall,
@@ -86,20 +86,20 @@ impl Soil {
                     ..Stress::none(n.x.token())
                 }
             }
-            Law::Bekker(soil) => soil.stress(piece, setting, wants_slopes),
+            StressLaw::Bekker(soil) => soil.stress(piece, setting, wants_slopes),
         }
     }
 
     /// Whether side walls bear nothing.
     pub(super) fn spares_walls(&self) -> bool {
-        matches!(self.law, Law::Bekker(_))
+        matches!(self.law, StressLaw::Bekker(_))
     }
 
     /// Numbers of the soil with their names, to be read or changed.
     #[must_use]
     pub fn numbers_mut(&mut self) -> Vec<(&'static str, &mut f64)> {
         let mut all: Vec<(&'static str, &mut f64)> = match &mut self.law {
-            Law::Resistive(sand) => vec![
+            StressLaw::Resistive(sand) => vec![
                 ("density", &mut sand.density),
                 ("internal_friction", &mut sand.internal_friction),
                 ("stiffness_factor", &mut sand.stiffness_factor),
@@ -115,7 +115,7 @@ impl Soil {
                 ("fluidity", &mut sand.flow.fluidity),
                 ("mobilisation", &mut sand.flow.mobilisation),
             ],
-            Law::Bekker(soil) => vec![
+            StressLaw::Bekker(soil) => vec![
                 ("cohesive_modulus", &mut soil.cohesive_modulus),
                 ("frictional_modulus", &mut soil.frictional_modulus),
                 ("exponent", &mut soil.exponent),
@@ -140,8 +140,8 @@ impl Soil {
         in_range("memory", self.memory, [1e-4, 1.0], "from 0.0001 to 1 m")?;
         in_range("reload", self.reload, [1.0, 1e3], "from 1 to 1000")?;
         match &self.law {
-            Law::Resistive(sand) => sand.check(),
-            Law::Bekker(soil) => soil.check(),
+            StressLaw::Resistive(sand) => sand.check(),
+            StressLaw::Bekker(soil) => soil.check(),
         }
     }
 }

@@ -6,15 +6,15 @@
 
 use nalgebra::{Vector3, Vector6};
 
-use super::memory::{Memory, Twist};
+use super::memory::{Memory, WheelTwist};
 use super::patch::{Bed, Derivatives, Reaction, WheelPose, react};
 use super::soil::Soil;
-use super::wheel::{Points, Rules, SandWheel};
+use super::wheel::{GaussRules, Points, SandWheel};
 use friction_contact::scalar::elementary::sin_cos;
 
 /// What a test bed prescribes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
+pub struct OperatingPoint {
     /// Speed of travel, m/s.
     pub speed: f64,
     /// Angular rate of the wheel, positive forward, rad/s.
@@ -29,7 +29,7 @@ pub struct Drive {
 
 /// What a test bed measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measured {
+pub struct WheelPerformance {
     /// Depth of the lowest point of the drum under the undisturbed surface, m.
     pub sinkage: f64,
     /// Force of the sand on the wheel in its plane, positive forward, N.
@@ -50,7 +50,7 @@ pub struct TestBed {
     /// The soil.
     pub soil: Soil,
     /// Gauss rules.
-    pub rules: Rules,
+    pub rules: GaussRules,
 }
 
 /// State of a wheel on a test bed.
@@ -82,18 +82,18 @@ const TRIALS: [[usize; 5]; 9] = [
 const FINEST: [usize; 5] = [24, 12, 24, 24, 24];
 
 /// Rules of a trial.
-fn rules_of([along, across, edge, wall, radial]: [usize; 5]) -> Rules {
-    Rules::new(Points {
+fn rules_of([along, across, edge, wall, radial]: [usize; 5]) -> GaussRules {
+    GaussRules::new(Points {
         drum: [along, across],
         edge,
         wall: [wall, radial],
     })
 }
 
-impl Drive {
-    fn twist(&self) -> Twist {
+impl OperatingPoint {
+    fn twist(&self) -> WheelTwist {
         let (sin, cos) = sin_cos(self.slip_angle);
-        Twist {
+        WheelTwist {
             linear: Vector3::new(self.speed * cos, 0.0, self.speed * sin),
             angular: Vector3::new(0.0, 0.0, -self.rate),
         }
@@ -104,7 +104,7 @@ impl Drive {
 /// largest force, over sinkages from a twentieth to a half of the radius, slips and slip angles;
 /// the finest trial if none is.
 #[must_use]
-pub fn rules_within(wheel: &SandWheel, soil: &Soil, tolerance: f64) -> Rules {
+pub fn rules_within(wheel: &SandWheel, soil: &Soil, tolerance: f64) -> GaussRules {
     let forces = |points: [usize; 5]| -> Vec<Vector3<f64>> {
         let bed = TestBed {
             wheel: *wheel,
@@ -114,7 +114,7 @@ pub fn rules_within(wheel: &SandWheel, soil: &Soil, tolerance: f64) -> Rules {
         let mut found = Vec::new();
         for share in [0.05, 0.15, 0.5] {
             for [rate, slip_angle] in [[0.0, 0.3], [0.8, 0.0], [1.2, 0.5], [3.0, 0.1], [1.0, 1.3]] {
-                let drive = Drive {
+                let drive = OperatingPoint {
                     speed: 1.0,
                     rate: rate / wheel.radius,
                     slip_angle,
@@ -151,7 +151,7 @@ impl TestBed {
         &self,
         sinkage: f64,
         memory: &Memory,
-        drive: &Drive,
+        drive: &OperatingPoint,
         want: Derivatives,
     ) -> Reaction {
         let bed = Bed {
@@ -175,8 +175,8 @@ impl TestBed {
         )
     }
 
-    fn measured(sinkage: f64, wrench: &Vector6<f64>) -> Measured {
-        Measured {
+    fn measured(sinkage: f64, wrench: &Vector6<f64>) -> WheelPerformance {
+        WheelPerformance {
             sinkage,
             drawbar: wrench[0],
             lateral: wrench[2],
@@ -187,7 +187,7 @@ impl TestBed {
 
     /// The forces of steady motion at a sinkage, m.
     #[must_use]
-    pub fn at(&self, sinkage: f64, drive: &Drive) -> Measured {
+    pub fn at(&self, sinkage: f64, drive: &OperatingPoint) -> WheelPerformance {
         let memory = Memory::steady(&drive.twist(), self.wheel.drum());
         let force = self.force(sinkage, &memory, drive, Derivatives::Wrench);
         Self::measured(sinkage, &force.wrench)
@@ -196,7 +196,7 @@ impl TestBed {
     /// Steady motion: the sinkage at which the sand bears the load, and the forces there. None if
     /// the sand does not bear it within one and a half diameters.
     #[must_use]
-    pub fn steady(&self, drive: &Drive) -> Option<Measured> {
+    pub fn steady(&self, drive: &OperatingPoint) -> Option<WheelPerformance> {
         let radius = self.wheel.drum();
         let memory = Memory::steady(&drive.twist(), radius);
         let lift = |sinkage: f64| {
@@ -227,7 +227,13 @@ impl TestBed {
     }
 
     /// A step of h (s) of a wheel that sinks with a mass, kg. Returns what is measured at its end.
-    pub fn advance(&self, state: &mut Sunk, drive: &Drive, mass: f64, h: f64) -> Measured {
+    pub fn advance(
+        &self,
+        state: &mut Sunk,
+        drive: &OperatingPoint,
+        mass: f64,
+        h: f64,
+    ) -> WheelPerformance {
         let radius = self.wheel.drum();
         let mut twist = drive.twist();
         let times = (h, self.soil.memory);

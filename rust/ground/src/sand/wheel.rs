@@ -118,14 +118,14 @@ pub struct Points {
 
 /// Gauss rules of a wheel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rules {
+pub struct GaussRules {
     drum: [Gauss; 2],
     edge: Gauss,
     wall: [Gauss; 2],
     point: Gauss,
 }
 
-impl Rules {
+impl GaussRules {
     /// With these numbers of points.
     #[must_use]
     pub fn new(points: Points) -> Self {
@@ -267,7 +267,7 @@ mod tests {
             grousers: 0,
         };
         let mut area = [0.0; 2];
-        let rules = Rules::new(Points {
+        let rules = GaussRules::new(Points {
             drum: [4, 2],
             edge: 2,
             wall: [2, 3],

@@ -113,7 +113,7 @@ pub struct Yielding<T = f64> {
 
 /// What the springs of contacts hold over a step, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Held<T = f64> {
+pub struct SpringEnergy<T = f64> {
     /// At its start, if nothing else says it.
     pub before: T,
     /// The most that they may hold at its end.
@@ -122,7 +122,7 @@ pub struct Held<T = f64> {
     pub given: T,
 }
 
-impl<T: Lane> Held<T> {
+impl<T: Lane> SpringEnergy<T> {
     /// At the end, if they held `before` at the start: what they did not give, no less than nothing
     /// and no more than the deflection says.
     #[inline(always)]
@@ -329,7 +329,7 @@ impl<T: Lane> Yielding<T> {
     /// step is not known, the force along the surface was the same part of the load.
     #[inline(always)]
     #[must_use]
-    pub fn held(&self, (h, theta): (T, T), u: [[T; 3]; 2], p: [T; 3]) -> Held<T> {
+    pub fn held(&self, (h, theta): (T, T), u: [[T; 3]; 2], p: [T; 3]) -> SpringEnergy<T> {
         let (zero, half) = (h.like(0.0), h.like(0.5));
         let is_known = zero.lt(self.tangential);
         let moved = h * u[1][0];
@@ -347,7 +347,7 @@ impl<T: Lane> Yielding<T> {
         }
         let work = |k: usize| p[k] * (u[0][k] + u[1][k]);
         let work = half * ((work(0) + work(1)) + work(2));
-        Held {
+        SpringEnergy {
             before: half * before,
             most: T::select(zero.lt(p[0]), half * most, zero),
             given: work - self.slip_work(u[1], p),

@@ -9,7 +9,7 @@ pub(super) const ON_THE_CONE: f64 = 1e-13;
 
 /// What a contact may bear.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Kind {
+pub(super) enum AdmissibleImpulse {
     /// An impulse in its cone.
     Rests,
     /// A multiple of this unit vector.
@@ -22,7 +22,7 @@ pub(super) enum Kind {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touching {
     pub(super) contact: usize,
-    pub(super) kind: Kind,
+    pub(super) kind: AdmissibleImpulse,
     pub(super) first: usize,
     pub(super) mu: f64,
     pub(super) is_joint: bool,
@@ -202,7 +202,11 @@ impl Cones {
         self.sloped.clear();
         self.sloped.resize(open * n, 0.0);
         for (own, slope) in touching.iter().zip(&self.slopes) {
-            let count = if own.kind == Kind::Rests { d } else { 1 };
+            let count = if own.kind == AdmissibleImpulse::Rests {
+                d
+            } else {
+                1
+            };
             for r in 0..count {
                 for c in 0..count {
                     self.matrix[(own.first + r) * n + own.first + c] = slope[3 * r + c];
@@ -267,14 +271,14 @@ fn project(
         let mut slope = [0.0; 9];
         let at = own.first;
         match own.kind {
-            Kind::Rests => {
+            AdmissibleImpulse::Rests => {
                 slope = project_on_cone(own.mu, &w[at..][..d], &mut out[at..][..d]);
             }
-            Kind::Slides(_) => {
+            AdmissibleImpulse::Slides(_) => {
                 out[at] = w[at].max(0.0);
                 slope[0] = f64::from(u8::from(w[at] > 0.0));
             }
-            Kind::Rubs(most) => {
+            AdmissibleImpulse::Rubs(most) => {
                 let most = most * roots[at];
                 out[at] = w[at].max(-most).min(most);
                 slope[0] = f64::from(u8::from(w[at].abs() < most));

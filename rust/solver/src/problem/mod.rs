@@ -59,7 +59,7 @@ pub(crate) use passivity::passive_share;
 pub(crate) use prepared::{Prepared, Proximal};
 pub(crate) use redundancy::{Answered, Settled};
 pub use redundancy::{Redundancy, undetermined_loads};
-pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
+pub(crate) use residual::{Magnitudes, ViolationSums, evaluate_contact};
 pub use residual::{Residual, evaluate, evaluate_into};
 pub use rolling::RollingContact;
 pub(crate) use scales::{ContactScales, Scales, power_of_two};

@@ -1,7 +1,7 @@
 //! A problem prepared for iterative methods: its slices, its scales, and two measures of an
 //! impulse, residual and merit.
 
-use super::residual::{Magnitudes, Violations, evaluate_contact};
+use super::residual::{Magnitudes, ViolationSums, evaluate_contact};
 use super::scales::{ContactScales, Scales};
 use super::{FrictionContactProblem, Operator, Residual};
 use crate::law::coulomb::{Coulomb, natural_map, violation};
@@ -120,7 +120,7 @@ impl<'a> Prepared<'a> {
         p: &[f64],
         u: &[f64],
     ) -> Residual {
-        let mut violations = Violations::default();
+        let mut violations = ViolationSums::default();
         for (i, (&mass, &modes)) in self.masses.iter().zip(self.modes).enumerate() {
             violations.add(evaluate_contact::<D>(p, u, D * i, &law(i), modes), mass);
         }

@@ -28,7 +28,7 @@
 
 use super::friction_contact::FrictionContactProblem;
 use super::least_in_cones::{
-    Cones, Kind, ON_THE_CONE, Touching, backward, cholesky, forward, norm,
+    AdmissibleImpulse, Cones, ON_THE_CONE, Touching, backward, cholesky, forward, norm,
 };
 use super::operator::Operator;
 use super::residual::{Residual, evaluate_into};
@@ -167,7 +167,12 @@ impl Redundancy {
     ) -> bool {
         let (d, still) = (answered.d, answered.still);
         self.find(answered, contacts, p, true);
-        if self.open.is_empty() || self.touching.iter().any(|own| own.kind != Kind::Rests) {
+        if self.open.is_empty()
+            || self
+                .touching
+                .iter()
+                .any(|own| own.kind != AdmissibleImpulse::Rests)
+        {
             return false;
         }
         self.read(d, p);
@@ -261,16 +266,16 @@ impl Redundancy {
             };
             let slip = (own[1..].iter().map(|u| u * u).sum::<f64>()).sqrt();
             let kind = if mu[i] == 0.0 {
-                Kind::Slides([1.0, 0.0, 0.0])
+                AdmissibleImpulse::Slides([1.0, 0.0, 0.0])
             } else if slip > still && (is_joint || !rests) {
                 if is_joint {
                     continue;
                 }
                 slide(mu[i], &block, pressed, own)
             } else if is_joint {
-                Kind::Rubs(mu[i] * pressed[0])
+                AdmissibleImpulse::Rubs(mu[i] * pressed[0])
             } else {
-                Kind::Rests
+                AdmissibleImpulse::Rests
             };
             self.touching.push(Touching {
                 contact: i,
@@ -279,14 +284,18 @@ impl Redundancy {
                 mu: mu[i],
                 is_joint,
             });
-            let count = if kind == Kind::Rests { d } else { 1 };
+            let count = if kind == AdmissibleImpulse::Rests {
+                d
+            } else {
+                1
+            };
             let largest = block[0].max(block[4]).max(block[8]);
             let inverse = if largest > 0.0 { 1.0 / largest } else { 0.0 };
             self.inverse.resize(self.n + count, inverse);
             self.n += count;
         }
         self.assemble(answered);
-        self.weigh();
+        self.set_weights();
         self.eliminate();
         self.find_null_vectors();
     }
@@ -336,7 +345,7 @@ impl Redundancy {
 
     /// Weights of the unknowns in the norm: 1, and of a joint's the square of an arm, 1/m².
     #[inline(always)]
-    fn weigh(&mut self) {
+    fn set_weights(&mut self) {
         let (n, stride) = (self.n, stride(self.n));
         self.weights.clear();
         self.weights.resize(n, 1.0);
@@ -346,7 +355,11 @@ impl Redundancy {
         for joint in self.touching.iter().filter(|own| own.is_joint) {
             let (mut sum, mut count) = (0.0, 0.0);
             for other in self.touching.iter().filter(|own| !own.is_joint) {
-                let n_own = if other.kind == Kind::Rests { 2 } else { 1 };
+                let n_own = if other.kind == AdmissibleImpulse::Rests {
+                    2
+                } else {
+                    1
+                };
                 for k in other.first..other.first + n_own {
                     if self.A[joint.first * stride + k] != 0.0 {
                         sum += self.A[k * (stride + 1)];
@@ -446,9 +459,11 @@ impl Redundancy {
         for own in &self.touching {
             let p = &p[d * own.contact..][..d];
             match own.kind {
-                Kind::Rests => self.start.extend_from_slice(p),
-                Kind::Slides(c) => self.start.push(p.iter().zip(c).map(|(p, c)| p * c).sum()),
-                Kind::Rubs(_) => self.start.push(p[1]),
+                AdmissibleImpulse::Rests => self.start.extend_from_slice(p),
+                AdmissibleImpulse::Slides(c) => {
+                    self.start.push(p.iter().zip(c).map(|(p, c)| p * c).sum());
+                }
+                AdmissibleImpulse::Rubs(_) => self.start.push(p[1]),
             }
         }
     }
@@ -460,9 +475,11 @@ impl Redundancy {
             let p = &mut p[d * own.contact..][..d];
             let y = &self.y[own.first..];
             match own.kind {
-                Kind::Rests => p.copy_from_slice(&y[..d]),
-                Kind::Slides(c) => p.iter_mut().zip(c).for_each(|(p, c)| *p = c * y[0]),
-                Kind::Rubs(_) => p[1] = y[0],
+                AdmissibleImpulse::Rests => p.copy_from_slice(&y[..d]),
+                AdmissibleImpulse::Slides(c) => {
+                    p.iter_mut().zip(c).for_each(|(p, c)| *p = c * y[0]);
+                }
+                AdmissibleImpulse::Rubs(_) => p[1] = y[0],
             }
         }
     }
@@ -568,7 +585,7 @@ impl Redundancy {
     }
 }
 
-impl Kind {
+impl AdmissibleImpulse {
     /// The direction of the impulse if there is one unknown.
     #[inline(always)]
     fn direction(self) -> Option<[f64; 3]> {
@@ -585,12 +602,12 @@ impl Touching {
     #[inline(always)]
     fn excess(&self, d: usize, y: &[f64]) -> f64 {
         match self.kind {
-            Kind::Rests => {
+            AdmissibleImpulse::Rests => {
                 let square: f64 = y[1..d].iter().map(|y| y * y).sum();
                 (square.sqrt() - self.mu * y[0]).max(-y[0])
             }
-            Kind::Slides(_) => -y[0],
-            Kind::Rubs(most) => y[0].abs() - most,
+            AdmissibleImpulse::Slides(_) => -y[0],
+            AdmissibleImpulse::Rubs(most) => y[0].abs() - most,
         }
     }
 }
@@ -617,7 +634,7 @@ fn creep<B: Fn(usize, usize) -> [f64; 9]>(
 
 /// A slide that the impulse and the slip name: both point the same way.
 #[inline(always)]
-fn slide(mu: f64, block: &[f64; 9], p: &[f64], u: &[f64]) -> Kind {
+fn slide(mu: f64, block: &[f64; 9], p: &[f64], u: &[f64]) -> AdmissibleImpulse {
     let rho = 2.0 / (block[4] + block[8]);
     let mut c = [0.0; 3];
     for k in 1..p.len() {
@@ -630,10 +647,10 @@ fn slide(mu: f64, block: &[f64; 9], p: &[f64], u: &[f64]) -> Kind {
     let norm = (c[1] * c[1] + c[2] * c[2]).sqrt();
     let length = (1.0 + mu * mu).sqrt();
     if norm == 0.0 {
-        return Kind::Slides([1.0, 0.0, 0.0]);
+        return AdmissibleImpulse::Slides([1.0, 0.0, 0.0]);
     }
     let along = mu / (norm * length);
-    Kind::Slides([1.0 / length, c[1] * along, c[2] * along])
+    AdmissibleImpulse::Slides([1.0 / length, c[1] * along, c[2] * along])
 }
 
 /// Whether the block of a contact may be that of a joint's stop or dry friction, whose entries on

@@ -80,7 +80,7 @@ pub(crate) fn evaluate_contact<const D: usize>(
 
 /// Sums over the contacts from which the two numbers follow.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Violations {
+pub(crate) struct ViolationSums {
     /// `Σ |v_i|²`, (m/s)².
     pub squares: f64,
     /// `Σ |ρ_i v_i|²`, (N s)².
@@ -89,7 +89,7 @@ pub(crate) struct Violations {
     pub largest: f64,
 }
 
-impl Violations {
+impl ViolationSums {
     /// Adds a contact of mass `mass` (kg) with a violation of `square` (m²/s²).
     #[inline]
     pub fn add(&mut self, square: f64, mass: f64) {
@@ -123,7 +123,7 @@ impl Violations {
     }
 }
 
-/// Sums of the data that [`Violations`] are measured against.
+/// Sums of the data that [`ViolationSums`] are measured against.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Magnitudes {
     squares: f64,
@@ -161,7 +161,7 @@ fn evaluate_in<const D: usize>(
     let speed = power_of_two(q.iter().fold(0.0, |m, x| m.max(x.abs())));
     let masses = (0..problem.n_contacts()).map(|i| contact_scales(problem, i).mass);
     let mass = power_of_two(masses.fold(0.0, f64::max));
-    let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
+    let (mut violations, mut data) = (ViolationSums::default(), Magnitudes::default());
     for (contact, &mu) in problem.friction_coefficients().iter().enumerate() {
         let scales = contact_scales(problem, contact);
         let at = |k: usize| D * contact + k;

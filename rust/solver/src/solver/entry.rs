@@ -2,14 +2,14 @@
 
 use super::options::{ContactLaw, Method, SolverOptions};
 use super::reference::relaxed;
-use super::report::{Outcome, Rung, Rungs, SolveReport, SolveStatus, Stage};
-use super::scratch::Scratch;
-use super::stage::body_sweeps::{Answer, Swept};
+use super::report::{Rung, Rungs, SolveReport, SolveStatus, Stage, StageResult};
+use super::scratch::SolveScratch;
+use super::stage::body_sweeps::{ContactSolution, Swept};
 use super::stage::{admm, gauss_seidel, newton, proximal};
 use super::strategy::auto;
 use super::strategy::islands::IslandSolver;
 use super::strategy::many_bodies::{self, ManyBodies};
-use super::work::{SweepBudget, Work};
+use super::work::{SweepBudget, WorkBudget};
 use super::workspace::SolverWorkspace;
 use crate::law::coulomb::Coulomb;
 use crate::law::friction_law::FrictionLaw;
@@ -70,7 +70,7 @@ pub fn solve(
 pub fn solve_many_bodies<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
-    answer: Answer<'_>,
+    answer: ContactSolution<'_>,
     workspace: &mut SolverWorkspace,
 ) -> SolveReport
 where
@@ -125,7 +125,7 @@ pub fn solve_with_laws<const D: usize, L: FrictionLaw<D> + Copy>(
     scales.resize(n_contacts);
     scratch.fit(n_contacts, n, W);
     scratch.history.begin(options.keeps_history);
-    scratch.work = Work::new(options.budget_of(n_contacts));
+    scratch.work = WorkBudget::new(options.budget_of(n_contacts));
     scratch.rungs = Rungs::default();
     scratch.start.copy_from_slice(p);
     let data = Prepared::new::<D>(problem, W, scales);
@@ -346,10 +346,10 @@ fn run<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     islands: IslandSolver<'_>,
     iterations: &mut usize,
-) -> Outcome {
+) -> StageResult {
     let (stage, (status, residual)) = match options.method {
         Method::Auto => {
             return auto::escalate::<D>(data, options, p, u, scratch, islands, iterations);
@@ -382,7 +382,7 @@ fn run<const D: usize>(
             (Stage::Relaxed, found)
         }
     };
-    Outcome {
+    StageResult {
         method: stage.method(),
         stage,
         status: scratch.list_stage(stage, status, *iterations),
@@ -396,14 +396,14 @@ fn judge<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     islands: IslandSolver<'_>,
 ) -> SolveReport {
     let mut iterations = 0;
-    scratch.work = Work::new(options.budget_of(data.mu.len()));
+    scratch.work = WorkBudget::new(options.budget_of(data.mu.len()));
     scratch.rungs = Rungs::default();
     let outcome = run::<D>(data, options, p, u, scratch, islands, &mut iterations);
-    let Outcome {
+    let StageResult {
         method,
         stage,
         status,

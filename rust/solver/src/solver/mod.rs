@@ -68,6 +68,6 @@ pub use entry::{solve, solve_many_bodies, solve_poisson_impact, solve_with_laws}
 pub use history::Iterate;
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
-pub use stage::body_sweeps::{Answer, BodySweeps, Swept, solve_body_pairs};
+pub use stage::body_sweeps::{BodySweeps, ContactSolution, Swept, solve_body_pairs};
 pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;

@@ -107,7 +107,7 @@ impl Stage {
 
 /// The result that the stages hand over for judgement.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Outcome {
+pub(super) struct StageResult {
     /// The method that gave the answer.
     pub method: Method,
     /// The stage that gave the answer.

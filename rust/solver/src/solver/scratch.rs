@@ -4,13 +4,13 @@ use super::history::History;
 use super::linear::reduced_system::ReducedSystem;
 use super::pivoting::{Many, Pivoting};
 use super::report::{Rung, Rungs, SolveStatus, Stage};
-use super::work::{Work, sweep};
+use super::work::{WorkBudget, sweep};
 use crate::problem::Operator;
 
 /// Impulses and velocities of the iterations (n each), the Newton system,
 /// and the record of the stages.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Scratch {
+pub(super) struct SolveScratch {
     /// The linear system of a Newton step with its linearisation.
     pub system: ReducedSystem,
     /// Pivoting's impulses, velocities and modes.
@@ -29,14 +29,14 @@ pub(super) struct Scratch {
     pub direction: Vec<f64>,
     pub image: Vec<f64>,
     /// Work done and allowed.
-    pub work: Work,
+    pub work: WorkBudget,
     /// Stages tried.
     pub rungs: Rungs,
     /// Residuals measured.
     pub history: History,
 }
 
-impl Scratch {
+impl SolveScratch {
     /// Makes every buffer fit; the contents are unspecified.
     pub fn fit(&mut self, n_contacts: usize, n: usize, W: Operator<'_>) {
         if self.start.len() != n || self.weights.len() != n_contacts {

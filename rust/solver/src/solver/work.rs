@@ -12,7 +12,7 @@ const DENSE: u64 = 4;
 
 /// Budget of a solve and the part of it that is spent.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::solver) struct Work {
+pub(in crate::solver) struct WorkBudget {
     /// Units spent.
     pub spent: u64,
     /// Units allowed.
@@ -23,7 +23,7 @@ pub(in crate::solver) struct Work {
     pub factorisations: u32,
 }
 
-impl Work {
+impl WorkBudget {
     /// Nothing spent yet.
     pub const fn new(budget: u64) -> Self {
         Self {

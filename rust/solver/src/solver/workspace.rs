@@ -1,7 +1,7 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
 use super::history::Iterate;
-use super::scratch::Scratch;
+use super::scratch::SolveScratch;
 use super::stage::body_sweeps::BodySweeps;
 use super::strategy::islands::Islands;
 use crate::problem::{Scales, Storage};
@@ -19,7 +19,7 @@ pub struct SolverWorkspace {
     /// `W` in the storage that suits its size.
     pub(super) storage: Storage,
     /// Scratch of the stages.
-    pub(super) scratch: Scratch,
+    pub(super) scratch: SolveScratch,
     /// Scratch of the sweeps over pairs of bodies.
     pub(super) body_sweeps: BodySweeps,
     /// Problems of the islands, and the workspace that solves them. Created when first needed,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::pcg64::Pcg64;
-use super::start::Range;
+use super::start::Interval;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, ModelError};
 
@@ -12,13 +12,13 @@ use rover_core::multibody::{Model, ModelError};
 #[derive(Clone, Debug, PartialEq)]
 pub struct DomainDistribution {
     /// Factor of the model's masses and inertias.
-    pub mass_scale: Range,
+    pub mass_scale: Interval,
     /// Coulomb's μ.
-    pub friction: Range,
+    pub friction: Interval,
     /// Torque that a motor gives over the one that was asked.
-    pub actuator_gain: Range,
+    pub actuator_gain: Interval,
     /// Factor of gravity.
-    pub gravity_scale: Range,
+    pub gravity_scale: Interval,
 }
 
 /// The properties of one episode.
@@ -59,7 +59,7 @@ impl DomainDistribution {
     /// Draws the properties of an episode.
     pub fn draw(&self, random: &mut Pcg64) -> Domain {
         #[allow(clippy::float_cmp)] // a fixed property has both ends from one number
-        let mut draw = |range: Range| {
+        let mut draw = |range: Interval| {
             if range[0] == range[1] {
                 range[0]
             } else {

@@ -12,8 +12,8 @@
 use std::sync::OnceLock;
 
 use super::pcg64::Pcg64;
-use super::start::{Range, Start};
-use rover_core::geometry::terrain::rocks::Random;
+use super::start::{Interval, Start};
+use rover_core::geometry::terrain::rocks::SplitMix64;
 use rover_core::geometry::{HeightField, TerrainError};
 use rover_core::scalar::elementary::sin_cos;
 
@@ -74,7 +74,7 @@ impl HillDraw {
     // Indices of a grid, small numbers.
     pub fn lay_out(&self, start: &Start) -> Result<HeightField, TerrainError> {
         let map = map();
-        let ends = |[low, high]: Range| {
+        let ends = |[low, high]: Interval| {
             let first = ((low - MARGIN) / SPACING).floor();
             let last = ((high + MARGIN) / SPACING).ceil();
             (first, (last - first) as usize + 1)
@@ -131,7 +131,7 @@ fn add_noise(octave: u64, wavelength: f64, heights: &mut [f64]) {
     let step = N / points;
     // The wavelengths halve: their amplitudes are powers of a constant.
     let amplitude = (0..octave).fold(1.0, |product: f64, _| product * HALF_TO_THE_HURST);
-    let mut random = Random::new(octave);
+    let mut random = SplitMix64::new(octave);
     let gradients: Vec<[f64; 2]> = (0..points * points)
         .map(|_| {
             let (sine, cosine) = sin_cos(std::f64::consts::TAU * random.uniform());

@@ -10,8 +10,8 @@ use rayon::ThreadPool;
 
 use super::error::DrawError;
 use super::pcg64::Pcg64;
-use super::scene::{DrawnScene, Fixed, SceneDistribution};
-use super::start::Range;
+use super::scene::{DrawnScene, FixedDraws, SceneDistribution};
+use super::start::Interval;
 use rover_core::simulation::RoverSimulation;
 
 /// The request of one rover's next scene.
@@ -20,9 +20,9 @@ pub struct Order<'a> {
     /// The rover's generator, of which a copy draws.
     pub random: Pcg64,
     /// Range that replaces that of the rocks' difficulty.
-    pub difficulty: Option<Range>,
+    pub difficulty: Option<Interval>,
     /// What replaces draws.
-    pub fixed: &'a Fixed,
+    pub fixed: &'a FixedDraws,
 }
 
 /// A drawn scene.

@@ -52,5 +52,5 @@ pub use many::{Drawn, Order, draw_many};
 pub use pcg64::{Pcg64, Pcg64State};
 pub use rocks::{RockDistribution, RockDraw};
 pub use sand::{SandDistribution, SandDraw};
-pub use scene::{DrawnScene, Fixed, SceneDistribution};
-pub use start::{FixedStart, Range, Start, StartDistribution};
+pub use scene::{DrawnScene, FixedDraws, SceneDistribution};
+pub use start::{FixedStart, Interval, Start, StartDistribution};

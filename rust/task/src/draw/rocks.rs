@@ -13,7 +13,7 @@
 //! d it reached 45, 30 and 16%.
 
 use super::pcg64::Pcg64;
-use super::start::{Range, Start};
+use super::start::{Interval, Start};
 use rover_core::contact::detection::wheel_contacts;
 use rover_core::geometry::{Clearing, Plane, Rocks, SphereField, Terrain, TerrainError};
 use rover_core::multibody::{Configuration, Kinematics, Model};
@@ -34,7 +34,7 @@ const CLEARANCE: f64 = 0.1;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RockDistribution {
     /// Range of the difficulty.
-    pub difficulty: Range,
+    pub difficulty: Interval,
     /// Abundance of rocks in place of the difficulty's.
     pub abundance: Option<f64>,
     /// Largest radius of a rock in place of the difficulty's, in wheel radii.
@@ -79,7 +79,7 @@ impl RockDistribution {
     pub fn draw(
         &self,
         random: &mut Pcg64,
-        range: Option<Range>,
+        range: Option<Interval>,
         fixed: (Option<f64>, Option<u64>),
     ) -> RockDraw {
         let drawn = random.uniform(range.unwrap_or(self.difficulty));
@@ -97,7 +97,7 @@ impl RockDistribution {
 impl RockDraw {
     /// Range of the ground's slope, rad.
     #[must_use]
-    pub fn slope(&self) -> Range {
+    pub fn slope(&self) -> Interval {
         [
             0.0,
             SLOPE_DEG * (std::f64::consts::PI / 180.0) * self.difficulty,

@@ -12,8 +12,8 @@
 use std::sync::Arc;
 
 use super::pcg64::Pcg64;
-use super::start::{Range, Start};
-use rover_core::geometry::terrain::rocks::Random;
+use super::start::{Interval, Start};
+use rover_core::geometry::terrain::rocks::SplitMix64;
 use rover_core::geometry::{HeightField, Plane, SoftGround, Terrain, TerrainError};
 use rover_core::scalar::elementary::sin_cos;
 
@@ -79,7 +79,7 @@ impl SandDraw {
         if self.amplitude <= 0.0 {
             return Ok(None);
         }
-        let mut random = Random::new(self.seed);
+        let mut random = SplitMix64::new(self.seed);
         let turn = std::f64::consts::TAU;
         let wind = turn * random.uniform();
         let waves = WAVES.map(|[length, share]| {
@@ -93,7 +93,7 @@ impl SandDraw {
                 share * self.amplitude,
             ]
         });
-        let ends = |[low, high]: Range| {
+        let ends = |[low, high]: Interval| {
             let first = ((low - MARGIN) / SPACING).floor();
             let last = ((high + MARGIN) / SPACING).ceil();
             (SPACING * first, (last - first) as usize + 1)

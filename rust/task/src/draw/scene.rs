@@ -7,14 +7,14 @@ use super::error::{DrawError, Unsuitable};
 use super::ground::{DrawnGround, GroundDistribution};
 use super::pcg64::Pcg64;
 use super::rocks::{RockDistribution, RockDraw, clear_radius};
-use super::start::{FixedStart, Range, Start, StartDistribution};
+use super::start::{FixedStart, Interval, Start, StartDistribution};
 use super::way;
 use rover_core::contact::detection::deepest_overlap;
 use rover_core::contact::placement::{PlacementError, resting_on, resting_pose};
 use rover_core::geometry::{Plane, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Kinematics, coordinates};
-use rover_core::simulation::{Placement, RoverScene};
+use rover_core::simulation::{PlacedRover, RoverScene};
 
 /// Deepest overlap of rover and ground at a start, m; a deeper one is drawn again.
 pub const START_OVERLAP: f64 = 0.01;
@@ -42,7 +42,7 @@ pub struct SceneDistribution {
 
 /// What replaces the draws of one episode.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Fixed {
+pub struct FixedDraws {
     /// Start and goal.
     pub start: FixedStart,
     /// Difficulty of the rocks.
@@ -65,7 +65,7 @@ pub struct DrawnScene {
     /// The ground.
     pub ground: DrawnGround,
     /// The rover with its masses scaled, on the ground, with friction and gravity of the episode.
-    pub placement: Placement,
+    pub placement: PlacedRover,
 }
 
 impl SceneDistribution {
@@ -78,8 +78,8 @@ impl SceneDistribution {
     pub fn draw(
         &self,
         random: &mut Pcg64,
-        difficulty: Option<Range>,
-        fixed: &Fixed,
+        difficulty: Option<Interval>,
+        fixed: &FixedDraws,
         attempts: usize,
     ) -> Result<DrawnScene, DrawError> {
         let mut last = None;
@@ -106,8 +106,8 @@ impl SceneDistribution {
     fn draw_once(
         &self,
         random: &mut Pcg64,
-        difficulty: Option<Range>,
-        fixed: &Fixed,
+        difficulty: Option<Interval>,
+        fixed: &FixedDraws,
     ) -> Result<Result<DrawnScene, Unsuitable>, DrawError> {
         let rocks = self.rocks.as_ref();
         let given = (fixed.difficulty, fixed.field_seed);
@@ -163,7 +163,7 @@ impl SceneDistribution {
             start,
             rocks,
             domain,
-            placement: Placement {
+            placement: PlacedRover {
                 scene,
                 options,
                 configuration,

@@ -7,25 +7,25 @@ use super::pcg64::Pcg64;
 use rover_core::scalar::elementary::{atan2, sin_cos};
 
 /// Bounds of a uniform draw, low and high.
-pub type Range = [f64; 2];
+pub type Interval = [f64; 2];
 
 /// What a start is drawn from, uniformly; rad and m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartDistribution {
     /// Slope of the ground.
-    pub slope: Range,
+    pub slope: Interval,
     /// Direction of steepest ascent.
-    pub uphill: Range,
+    pub uphill: Interval,
     /// Heading of the rover.
-    pub heading: Range,
+    pub heading: Interval,
     /// Distance of the goal.
-    pub goal_distance: Range,
+    pub goal_distance: Interval,
     /// Direction of the goal relative to the heading.
-    pub goal_bearing: Range,
+    pub goal_bearing: Interval,
     /// Goals after the first; each lies at a distance from `goal_distance` from the one before it.
     pub further: usize,
     /// Direction of each further goal relative to the leg before it.
-    pub turn: Range,
+    pub turn: Interval,
 }
 
 /// Values that replace draws.
@@ -96,7 +96,7 @@ impl Start {
 
     /// Bounds of start and goals along x and z, low and high, m.
     #[must_use]
-    pub fn bounds(&self) -> [Range; 2] {
+    pub fn bounds(&self) -> [Interval; 2] {
         [0, 1].map(|k| {
             let place = self.position[k];
             let low = self.goals().fold(place, |low, goal| low.min(goal[k]));

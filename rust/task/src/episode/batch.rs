@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use super::action;
 use super::beginning::{Beginning, EpisodeDistribution};
-use super::control_period::{ControlPeriod, Origin, PeriodSlot, Slot};
+use super::control_period::{BatchedEpisode, ControlPeriod, EpisodeOrigin, PeriodSlot};
 use super::error::{EpisodeError, check_lengths};
 use super::rules::Rules;
 use super::running::Episode;
@@ -26,7 +26,7 @@ pub struct EpisodeBatch {
     errors: Vec<Option<StepError>>,
     workers: Workers,
     scratch: ReadingScratch,
-    slots: Vec<Option<Slot>>,
+    slots: Vec<Option<BatchedEpisode>>,
     max_steps: Option<u64>,
 }
 
@@ -53,7 +53,7 @@ fn open_all(rovers: &[SharedRover]) -> Result<Vec<MutexGuard<'_, RoverSimulation
 
 /// How the rovers' control periods went: an entry for each rover, and lists of indices.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Stepped {
+pub struct BatchOutcome {
     /// Rewards.
     pub rewards: Vec<f64>,
     /// Which episodes have ended.
@@ -143,7 +143,7 @@ impl EpisodeBatch {
     /// Rovers whose episode has ended or reached the time limit, and whose next has not begun.
     #[must_use]
     pub fn over(&self) -> Vec<usize> {
-        let is_over = |slot: &Option<Slot>| {
+        let is_over = |slot: &Option<BatchedEpisode>| {
             let slot = slot.as_ref();
             slot.is_some_and(|slot| slot.is_over(self.max_steps))
         };
@@ -158,7 +158,7 @@ impl EpisodeBatch {
     ///
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
-    pub fn origin(&self, index: usize) -> Result<&Origin, EpisodeError> {
+    pub fn origin(&self, index: usize) -> Result<&EpisodeOrigin, EpisodeError> {
         Ok(&self.slot(index)?.origin)
     }
 
@@ -182,7 +182,7 @@ impl EpisodeBatch {
         Ok(())
     }
 
-    fn slot(&self, index: usize) -> Result<&Slot, EpisodeError> {
+    fn slot(&self, index: usize) -> Result<&BatchedEpisode, EpisodeError> {
         self.check_index(index)?;
         (self.slots[index].as_ref()).ok_or(EpisodeError::NotBegun { index })
     }
@@ -258,12 +258,12 @@ impl EpisodeBatch {
         };
         begun.map_err(|error| BatchError::Options { index, error })?;
         self.errors[index] = None;
-        let origin = Origin {
+        let origin = EpisodeOrigin {
             start: scene.start,
             rocks: scene.rocks,
             ground: scene.ground,
         };
-        self.slots[index] = Some(Slot::new(episode, origin, random));
+        self.slots[index] = Some(BatchedEpisode::new(episode, origin, random));
         Ok(())
     }
 
@@ -279,7 +279,7 @@ impl EpisodeBatch {
         index: usize,
         rover: RoverSimulation,
         (episode, steps): (Episode, u64),
-        origin: Origin,
+        origin: EpisodeOrigin,
         random: Pcg64,
         message: Option<String>,
     ) -> Result<(), EpisodeError> {
@@ -290,7 +290,7 @@ impl EpisodeBatch {
         self.check_index(index)?;
         self.rovers[index] = shared(rover);
         self.errors[index] = None;
-        let mut slot = Slot::new(episode, origin, random);
+        let mut slot = BatchedEpisode::new(episode, origin, random);
         (slot.steps, slot.message) = (steps, message);
         self.slots[index] = Some(slot);
         Ok(())
@@ -324,7 +324,7 @@ impl EpisodeBatch {
         has_scan: bool,
         observations: &mut [f32],
         go_on: &mut dyn FnMut() -> bool,
-    ) -> Result<Stepped, EpisodeError> {
+    ) -> Result<BatchOutcome, EpisodeError> {
         self.take_period(actions, active, has_scan, observations, None, go_on)
     }
 
@@ -344,7 +344,7 @@ impl EpisodeBatch {
         has_scan: bool,
         observations: &mut [f32],
         step: &mut StepAmong<'_>,
-    ) -> Result<Stepped, EpisodeError> {
+    ) -> Result<BatchOutcome, EpisodeError> {
         self.take_period(
             actions,
             active,
@@ -363,7 +363,7 @@ impl EpisodeBatch {
         observations: &mut [f32],
         among: Option<&mut StepAmong<'_>>,
         go_on: &mut dyn FnMut() -> bool,
-    ) -> Result<Stepped, EpisodeError> {
+    ) -> Result<BatchOutcome, EpisodeError> {
         self.check_step(actions, active)?;
         let (n, size) = (self.slots.len(), self.rules.size());
         assert_eq!(observations.len(), n * size, "one row a rover");
@@ -422,8 +422,8 @@ impl EpisodeBatch {
     }
 
     /// How the last control periods went.
-    fn results(&self) -> Stepped {
-        let mut results = Stepped::default();
+    fn results(&self) -> BatchOutcome {
+        let mut results = BatchOutcome::default();
         for (i, slot) in self.slots.iter().flatten().enumerate() {
             let outcome = slot.episode.outcome();
             let (ended, truncated) = (outcome.ending.is_end(), slot.is_truncated(self.max_steps));

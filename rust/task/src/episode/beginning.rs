@@ -8,7 +8,7 @@ use super::error::EpisodeError;
 use super::noise;
 use super::rules::Rules;
 use super::running::Episode;
-use super::setting::Setting;
+use super::setting::EpisodeSetting;
 use crate::draw::{Drawn, DrawnScene, Order, Pcg64, SceneDistribution, draw_many};
 
 /// What the episodes of a task are drawn from.
@@ -57,7 +57,7 @@ impl EpisodeDistribution {
             mut random,
         } = drawn;
         let domain = scene.domain;
-        let setting = Setting {
+        let setting = EpisodeSetting {
             goal: scene.start.goal,
             further: scene.start.further.clone(),
             domain,

@@ -7,10 +7,10 @@ use crate::draw::{DrawnGround, Pcg64, RockDraw, Start};
 use rover_core::simulation::{Done, ReadingScratch, RoverSimulation, Turn};
 
 /// A rover's episode, and what a batch keeps beside it.
-pub(super) struct Slot {
+pub(super) struct BatchedEpisode {
     pub(super) episode: Episode,
     /// Where and on what it began.
-    pub(super) origin: Origin,
+    pub(super) origin: EpisodeOrigin,
     /// Control periods since the episode began.
     pub(super) steps: u64,
     /// Generator of the observation noise.
@@ -23,7 +23,7 @@ pub(super) struct Slot {
 
 /// Where and on what an episode has begun.
 #[derive(Clone, Debug)]
-pub struct Origin {
+pub struct EpisodeOrigin {
     /// Slope, pose and goal.
     pub start: Start,
     /// Difficulty and rocks, where there are any.
@@ -32,8 +32,8 @@ pub struct Origin {
     pub ground: DrawnGround,
 }
 
-impl Slot {
-    pub(super) fn new(episode: Episode, origin: Origin, generator: Pcg64) -> Self {
+impl BatchedEpisode {
+    pub(super) fn new(episode: Episode, origin: EpisodeOrigin, generator: Pcg64) -> Self {
         Self {
             commands: vec![0.0; episode.rules().n_commands()],
             episode,
@@ -58,7 +58,7 @@ impl Slot {
 /// A rover's part of a control period.
 pub(super) struct PeriodSlot<'a> {
     pub(super) is_active: bool,
-    pub(super) slot: &'a mut Slot,
+    pub(super) slot: &'a mut BatchedEpisode,
     pub(super) action: &'a [f64],
     pub(super) row: &'a mut [f32],
 }

@@ -55,9 +55,9 @@ pub mod rules;
 pub mod running;
 pub mod setting;
 
-pub use batch::{EpisodeBatch, SharedRover, StepAmong, Stepped};
+pub use batch::{BatchOutcome, EpisodeBatch, SharedRover, StepAmong};
 pub use beginning::{Beginning, EpisodeDistribution};
-pub use control_period::Origin;
+pub use control_period::EpisodeOrigin;
 pub use ending::Ending;
 pub use error::EpisodeError;
 pub use outcome::Outcome;
@@ -66,4 +66,4 @@ pub use quantities::{N_QUANTITIES, Quantities};
 pub use reward::{N_TERMS, TERMS, Weights};
 pub use rules::{Rules, Settings};
 pub use running::{Episode, EpisodeState};
-pub use setting::Setting;
+pub use setting::EpisodeSetting;

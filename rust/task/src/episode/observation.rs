@@ -9,7 +9,7 @@
 
 use super::progress::Progress;
 use super::rules::Rules;
-use super::setting::Setting;
+use super::setting::EpisodeSetting;
 use rover_core::simulation::seen_from;
 
 /// Most entries between the previous action and the heights.
@@ -25,7 +25,7 @@ const MOST_MARKS: usize = 5;
 pub fn write_state(
     rules: &Rules,
     reading: &[f64],
-    (setting, progress): (&Setting, &Progress),
+    (setting, progress): (&EpisodeSetting, &Progress),
     normals: Option<&[f64]>,
     out: &mut [f32],
 ) -> bool {

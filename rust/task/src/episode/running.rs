@@ -12,7 +12,7 @@ use super::progress::Progress;
 use super::quantities::Quantities;
 use super::reward::{PeriodReward, squared_changes, terms};
 use super::rules::Rules;
-use super::setting::Setting;
+use super::setting::EpisodeSetting;
 use rover_core::scalar::elementary::hypot;
 use rover_core::simulation::{CommandError, ReadingScratch, RoverSimulation, seen_from};
 
@@ -33,7 +33,7 @@ pub struct Period<'a> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeState {
     /// What was drawn for it.
-    pub setting: Setting,
+    pub setting: EpisodeSetting,
     /// Progress of the episode.
     pub progress: Progress,
     /// The last observation (size).
@@ -41,20 +41,20 @@ pub struct EpisodeState {
     /// The outcome of the last period.
     pub outcome: Outcome,
     /// Normal numbers of an observation that lacks its heights, empty without noise.
-    pub owed: Option<Vec<f64>>,
+    pub pending_normals: Option<Vec<f64>>,
 }
 
 /// An episode outside its simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Episode {
     rules: Arc<Rules>,
-    setting: Setting,
+    setting: EpisodeSetting,
     progress: Progress,
     observation: Vec<f32>,
     outcome: Outcome,
     lacks_heights: bool,
     /// Normal numbers of the last observation, if it lacks heights.
-    owed: Vec<f64>,
+    pending_normals: Vec<f64>,
 }
 
 impl Episode {
@@ -67,7 +67,7 @@ impl Episode {
     /// does not fit the rules.
     pub fn begin(
         rules: Arc<Rules>,
-        setting: Setting,
+        setting: EpisodeSetting,
         rover: &RoverSimulation,
         normals: Option<&[f64]>,
     ) -> Result<Option<Self>, EpisodeError> {
@@ -94,7 +94,7 @@ impl Episode {
                 now,
                 ..Outcome::default()
             },
-            owed: Vec::new(),
+            pending_normals: Vec::new(),
             lacks_heights: false,
         }))
     }
@@ -107,7 +107,7 @@ impl Episode {
             progress: self.progress.clone(),
             observation: self.observation.clone(),
             outcome: self.outcome,
-            owed: self.lacks_heights.then(|| self.owed.clone()),
+            pending_normals: self.lacks_heights.then(|| self.pending_normals.clone()),
         }
     }
 
@@ -121,10 +121,10 @@ impl Episode {
             progress,
             observation,
             outcome,
-            owed,
+            pending_normals,
         } = state;
         setting.check(&rules)?;
-        check_normals(&rules, owed.as_deref().or(Some(rules.noise())))?;
+        check_normals(&rules, pending_normals.as_deref().or(Some(rules.noise())))?;
         let (previous, size) = (progress.previous_action.len(), observation.len());
         check_lengths([
             ("previous_action", previous, rules.n_actions()),
@@ -142,10 +142,15 @@ impl Episode {
         ];
         let entries = (progress.previous_action.iter()).map(|&a| ("previous_action", a));
         let seen = observation.iter().map(|&x| ("observation", f64::from(x)));
-        let told = outcome.now.row().into_iter().chain(outcome.terms);
+        let results = outcome.now.row().into_iter().chain(outcome.terms);
         // A step that failed has an infinite residual.
-        let told = told.filter(|x| x.is_nan()).map(|x| ("outcome", x));
-        for (field, value) in numbers.into_iter().chain(entries).chain(seen).chain(told) {
+        let results = results.filter(|x| x.is_nan()).map(|x| ("outcome", x));
+        for (field, value) in numbers
+            .into_iter()
+            .chain(entries)
+            .chain(seen)
+            .chain(results)
+        {
             if !value.is_finite() {
                 return Err(EpisodeError::OutOfRange {
                     field,
@@ -160,8 +165,8 @@ impl Episode {
             progress,
             observation,
             outcome,
-            lacks_heights: owed.is_some(),
-            owed: owed.unwrap_or_default(),
+            lacks_heights: pending_normals.is_some(),
+            pending_normals: pending_normals.unwrap_or_default(),
         })
     }
 
@@ -173,7 +178,7 @@ impl Episode {
 
     /// What was drawn for it.
     #[must_use]
-    pub fn setting(&self) -> &Setting {
+    pub fn setting(&self) -> &EpisodeSetting {
         &self.setting
     }
 
@@ -284,8 +289,8 @@ impl Episode {
             self.observation.copy_from_slice(observation);
             self.lacks_heights = period.heights.is_none();
             if let (true, Some(normals)) = (self.lacks_heights, normals) {
-                self.owed.clear();
-                self.owed.extend_from_slice(normals);
+                self.pending_normals.clear();
+                self.pending_normals.extend_from_slice(normals);
             }
         }
 
@@ -325,7 +330,7 @@ impl Episode {
         let rules = &*self.rules;
         let mut heights = vec![0.0; rules.settings().scan.len()];
         rover.read_heights(&rules.settings().scan, &mut heights);
-        let normals = rules.is_noisy().then_some(&self.owed[..]);
+        let normals = rules.is_noisy().then_some(&self.pending_normals[..]);
         let mut observation = self.observation.clone();
         if write_heights(rules, &heights, normals, &mut observation) {
             self.observation = observation;
@@ -335,7 +340,12 @@ impl Episode {
 
 /// Counts the goals that a rover has reached, aims the reading at the next, and returns its
 /// distance, m.
-fn reach(rules: &Rules, setting: &Setting, progress: &mut Progress, reading: &mut [f64]) -> f64 {
+fn reach(
+    rules: &Rules,
+    setting: &EpisodeSetting,
+    progress: &mut Progress,
+    reading: &mut [f64],
+) -> f64 {
     let settings = rules.settings();
     while progress.reached < settings.goals && progress.distance <= settings.goal_tolerance {
         progress.reached += 1;

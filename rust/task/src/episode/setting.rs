@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// What was drawn for an episode. Only goals, gain and load limit act; the rest is reported.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Setting {
+pub struct EpisodeSetting {
     /// The goal (x, z), m; the first of several.
     pub goal: [f64; 2],
     /// Goals that follow it, in order, (x, z), m.
@@ -21,7 +21,7 @@ pub struct Setting {
     pub difficulty: f64,
 }
 
-impl Setting {
+impl EpisodeSetting {
     /// The goal of a number, from zero; the last one from there on.
     #[must_use]
     pub fn goal_at(&self, number: usize) -> [f64; 2] {

@@ -8,7 +8,7 @@
 
 use std::f64::consts::TAU;
 
-use super::Pose;
+use super::PlanarPose;
 use rover_core::scalar::elementary::sin_cos;
 
 /// Cells of the grid per spacing of the scan.
@@ -152,7 +152,7 @@ impl GroundGrid {
     }
 
     /// The heights of a grid under the points of the rover in a pose, or under the first of them.
-    pub fn under(&self, grid: &[f32], pose: Pose, heights: &mut [f32]) {
+    pub fn under(&self, grid: &[f32], pose: PlanarPose, heights: &mut [f32]) {
         let middle = self.place(pose);
         let turn = (pose.heading * (f64::from(HEADINGS) / TAU)).round_ties_even() as i64;
         let heading = turn.rem_euclid(i64::from(HEADINGS)) as usize;
@@ -166,7 +166,7 @@ impl GroundGrid {
     /// linear interpolation of the ways from the scan's points, m; beyond the scan, by the straight
     /// way to its border.
     #[must_use]
-    pub fn way(&self, ways: &[f64], pose: Pose) -> (f64, f64, f64) {
+    pub fn way(&self, ways: &[f64], pose: PlanarPose) -> (f64, f64, f64) {
         let along = |at: f64, n: usize| {
             let within = at.clamp(0.0, (n - 1) as f64);
             let first = (within as usize).min(n - 2);
@@ -192,7 +192,7 @@ impl GroundGrid {
     }
 
     /// Where the point that follows the path lies in the grid; just outside the scan if beyond it.
-    fn place(&self, pose: Pose) -> i32 {
+    fn place(&self, pose: PlanarPose) -> i32 {
         let within = |at: f64, n: usize| at.round_ties_even().clamp(-1.0, n as f64) as i32;
         let row = within(self.origin[0] - pose.ahead / self.cell, self.rows);
         let column = within(self.origin[1] + pose.right / self.cell, self.columns);

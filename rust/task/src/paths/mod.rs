@@ -35,7 +35,7 @@ pub mod ways;
 
 pub use cost::PathCosts;
 pub use grid::{GroundGrid, ScanShape};
-pub use pose::Pose;
+pub use pose::PlanarPose;
 pub use risk::{GroundFit, Outline, PathRisk};
-pub use search::{Arcs, PathSearch, Search, SearchTask, Trap};
+pub use search::{Arcs, PathProblem, PathSearch, SearchTask, Trap};
 pub use ways::{MapTask, WayMap};

@@ -2,7 +2,7 @@
 
 /// Place and heading from a present pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pose {
+pub struct PlanarPose {
     /// Way ahead, m.
     pub ahead: f64,
     /// Way to the right, m.
@@ -11,7 +11,7 @@ pub struct Pose {
     pub heading: f64,
 }
 
-impl Pose {
+impl PlanarPose {
     /// The pose that is `next` as seen from this one, whose heading has this sine and cosine.
     #[must_use]
     pub fn then(self, sine: f64, cosine: f64, next: Self) -> Self {

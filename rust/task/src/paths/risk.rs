@@ -4,7 +4,7 @@
     reason = "heights and costs are compared in single precision"
 )]
 
-use super::{GroundGrid, PathCosts, Pose};
+use super::{GroundGrid, PathCosts, PlanarPose};
 
 /// A rover from above, in the trunk's frame.
 #[derive(Clone, Debug)]
@@ -105,7 +105,7 @@ impl PathRisk {
     }
 
     /// The heights under the rover's points in a pose, and how the rover would stand there.
-    pub fn stand(&self, heights: &[f32], pose: Pose, seen: &mut [f32]) -> GroundFit {
+    pub fn stand(&self, heights: &[f32], pose: PlanarPose, seen: &mut [f32]) -> GroundFit {
         self.grid.under(heights, pose, seen);
         self.stand_on(seen)
     }
@@ -129,7 +129,7 @@ impl PathRisk {
 
     /// Cost of a pose, and writes the heights under the rover's points to `seen`; `before` are
     /// those under its wheels at the pose before.
-    pub fn of(&self, heights: &[f32], pose: Pose, before: &[f32], seen: &mut [f32]) -> f32 {
+    pub fn of(&self, heights: &[f32], pose: PlanarPose, before: &[f32], seen: &mut [f32]) -> f32 {
         let stand = self.stand(heights, pose, seen);
         self.of_fit(&stand) + self.of_rise(&seen[..self.n_wheels], before)
     }

@@ -8,7 +8,7 @@
     reason = "what is not inlined is not compiled for the machine's instructions"
 )]
 
-use super::{GroundGrid, Outline, PathCosts, PathRisk, Pose, ScanShape, WayMap};
+use super::{GroundGrid, Outline, PathCosts, PathRisk, PlanarPose, ScanShape, WayMap};
 use rover_core::scalar::elementary::{atan2, exp, sin_cos};
 use rover_core::scalar::instructions::Single;
 
@@ -39,14 +39,14 @@ const MAX_BEARING: f64 = 2.0;
 #[derive(Clone, Debug)]
 pub struct Arcs {
     /// Poses after equal parts of each arc, from its beginning.
-    pub poses: Vec<[Pose; STEPS]>,
+    pub poses: Vec<[PlanarPose; STEPS]>,
     /// 1 forward, -1 backward.
     pub direction: Vec<f64>,
 }
 
 /// What a search searches.
 #[derive(Clone, Debug)]
-pub struct Search {
+pub struct PathProblem {
     /// The height scan.
     pub scan: ScanShape,
     /// The rover.
@@ -66,7 +66,7 @@ pub struct Search {
 }
 
 /// A place ahead and to the right, m, and the heading, rad, where the rover got stuck.
-pub type Trap = Pose;
+pub type Trap = PlanarPose;
 
 /// What a search starts from.
 #[derive(Clone, Debug)]
@@ -92,7 +92,7 @@ pub struct SearchTask {
 struct Path {
     /// Index of the path's first arc.
     root: usize,
-    end: Pose,
+    end: PlanarPose,
     /// Direction of its last arc.
     direction: f64,
     cost: f64,
@@ -105,7 +105,7 @@ struct Path {
 /// Finds paths for a rover.
 #[derive(Clone, Debug)]
 pub struct PathSearch {
-    inner: Search,
+    inner: PathProblem,
     risk: PathRisk,
     /// `later` to the power of each arc's number.
     discount: Vec<f64>,
@@ -118,7 +118,7 @@ pub struct PathSearch {
 impl PathSearch {
     /// A search.
     #[must_use]
-    pub fn new(inner: Search) -> Self {
+    pub fn new(inner: PathProblem) -> Self {
         let step = inner.costs.length * inner.reach / STEPS as f64;
         let grid = GroundGrid::new(inner.scan, &inner.outline.points(), inner.outline.x_c);
         let risk = PathRisk::new(grid, &inner.outline, &inner.costs, step);
@@ -165,7 +165,7 @@ impl PathSearch {
     /// # Panics
     ///
     /// The heights are not as many as the scan has points.
-    pub fn under(&mut self, heights: &[f64], poses: &[Pose]) -> Vec<f32> {
+    pub fn under(&mut self, heights: &[f64], poses: &[PlanarPose]) -> Vec<f32> {
         let Self {
             risk,
             heights: grid,
@@ -174,7 +174,7 @@ impl PathSearch {
         } = self;
         risk.grid().spread(heights, grid);
         let (n, radius) = (risk.n_wheels(), risk.radius());
-        risk.grid().under(grid, Pose::default(), seen);
+        risk.grid().under(grid, PlanarPose::default(), seen);
         let level = seen[..n].iter().sum::<f32>() / n as f32;
         let mut found = Vec::with_capacity(poses.len() * (n + 3));
         for pose in poses {
@@ -228,7 +228,7 @@ impl PathSearch {
             ..
         } = self;
         let (costs, n) = (&inner.costs, risk.n_wheels());
-        risk.grid().under(heights, Pose::default(), seen);
+        risk.grid().under(heights, PlanarPose::default(), seen);
         let now = seen[..n].to_vec();
         let moves = f64::from(u8::from(task.command[0] != 0.0));
         let backs_off = f64::from(u8::from(task.retreat.is_some()));
@@ -372,7 +372,7 @@ impl PathSearch {
 }
 
 /// How close poses come to the traps, 1 at one, summed over the traps.
-fn nearness(poses: &[Pose], task: &SearchTask, reach: f64) -> f64 {
+fn nearness(poses: &[PlanarPose], task: &SearchTask, reach: f64) -> f64 {
     let size = TRAP_SIZE * reach;
     let by_trap = task.traps.iter().map(|trap| {
         let at = poses.iter().map(|pose| {

@@ -13,7 +13,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::{GroundGrid, Outline, PathCosts, PathRisk, Pose};
+use super::{GroundGrid, Outline, PathCosts, PathRisk, PlanarPose};
 use rover_core::scalar::elementary::atan2;
 
 /// Rows and columns from a cell to its neighbours.
@@ -158,7 +158,7 @@ impl WayMap {
         seen: &mut [f32],
     ) -> f64 {
         let (grid, n) = (self.risk.grid(), self.risk.n_wheels());
-        let pose = |[row, column]: [i32; 2]| Pose {
+        let pose = |[row, column]: [i32; 2]| PlanarPose {
             ahead: -f64::from(row) * self.spacing,
             right: f64::from(column) * self.spacing,
             heading,

@@ -1,6 +1,6 @@
 //! The contacts of a block that are found lane by lane (`lane_detection`).
 
-use super::machine::Machine;
+use super::machine::SharedMachine;
 use crate::contact::{Contact, PairSearch, Part};
 use crate::scalar::MAX_LANES;
 
@@ -17,14 +17,14 @@ pub(crate) struct Found {
     pub lane: usize,
     pub contact: Contact,
     /// Whether the path of its slot is not its body's.
-    pub is_guest: bool,
+    pub is_off_path: bool,
 }
 
 /// The contacts of a block that are found lane by lane.
 #[derive(Clone, Debug)]
 pub(crate) struct ByLane {
     /// Slots that contacts of each body fit, and those of contacts between bodies.
-    pub hosts: Vec<Vec<usize>>,
+    pub slots_of_body: Vec<Vec<usize>>,
     pub of_pairs: Vec<usize>,
     pub asked: Vec<Asked>,
     pub found: Vec<Found>,
@@ -39,21 +39,22 @@ pub(crate) struct ByLane {
 
 impl ByLane {
     /// Room for a machine whose wheels' slots end at `first_spare`.
-    pub(crate) fn new(machine: &Machine, first_spare: usize) -> Self {
+    pub(crate) fn new(machine: &SharedMachine, first_spare: usize) -> Self {
         let bodies = machine.slot_bodies();
         let n_slots = bodies.len();
         let last_spare = first_spare + machine.spares.len();
         let in_order = (first_spare..last_spare).chain((0..first_spare).rev());
-        let hosts = (0..machine.n_bodies())
+        let slots_of_body = (0..machine.n_bodies())
             .map(|body| {
-                let fits =
-                    |slot: &usize| bodies[*slot].is_some_and(|host| machine.carries(body, host));
+                let fits = |slot: &usize| {
+                    bodies[*slot].is_some_and(|body_of_slot| machine.carries(body, body_of_slot))
+                };
                 in_order.clone().filter(fits).collect()
             })
             .collect();
         let of_pairs = in_order.filter(|slot| bodies[*slot].is_none()).collect();
         Self {
-            hosts,
+            slots_of_body,
             of_pairs,
             asked: Vec::new(),
             found: Vec::new(),
@@ -111,8 +112,9 @@ impl ByLane {
 
     /// Contacts found lane by lane whose path is not that of their slot, with their lanes.
     #[inline(always)]
-    pub(crate) fn guests(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
-        (self.found(slot).filter(|found| found.is_guest)).map(|found| (found.lane, &found.contact))
+    pub(crate) fn off_path(&self, slot: usize) -> impl Iterator<Item = (usize, &Contact)> {
+        (self.found(slot).filter(|found| found.is_off_path))
+            .map(|found| (found.lane, &found.contact))
     }
 
     /// Contacts between bodies, with their lanes: the body and the other one.

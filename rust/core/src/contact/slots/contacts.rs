@@ -23,9 +23,9 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::by_lane::ByLane;
-use super::ground::{Ground, GroundSphere, turning};
-use super::machine::{Machine, Stop};
-use super::parts::{Parts, Twist};
+use super::ground::{BlockGround, GroundSphere, turning};
+use super::machine::{SharedMachine, Stop};
+use super::parts::{BodyTwist, Parts};
 use super::pieces::LanePlane;
 use crate::contact::detection::touch_of_wheel;
 use crate::contact::{Activation, Contact, ContactFrame, ContactKey, Opposite, Part, rollers};
@@ -110,7 +110,7 @@ pub struct ContactList {
 
 /// The contacts of a block.
 #[derive(Clone, Debug)]
-pub struct Contacts<T: Lane> {
+pub struct ContactSlots<T: Lane> {
     pub(crate) token: T::Token,
     pub(crate) parts: Parts,
     pub(crate) by_lane: ByLane,
@@ -122,7 +122,7 @@ pub struct Contacts<T: Lane> {
     /// The first spare slot, and the first slot of a joint.
     first_spare: usize,
     pub(crate) first_of_joints: usize,
-    twists: Vec<Twist<T>>,
+    twists: Vec<BodyTwist<T>>,
     pub(crate) slots: Vec<Slot<T>>,
     /// Part of each slot: a wheel, or, counted on from the wheels, a spare slot or a joint.
     pub(crate) part_of: Vec<usize>,
@@ -144,7 +144,7 @@ pub struct Contacts<T: Lane> {
     /// Whether every slot in use is active in all lanes.
     is_full: bool,
     /// Problem of each slot's contact in each lane, and the contact's place in that problem.
-    homes: Vec<[u16; MAX_LANES]>,
+    problem_indices: Vec<[u16; MAX_LANES]>,
     places: Vec<[u8; MAX_LANES]>,
     /// Lanes in which each slot's contact is in a problem with factors.
     near: Vec<u32>,
@@ -173,9 +173,9 @@ struct InCluster {
 }
 
 /// What a detection looks at.
-pub struct Sight<'a, T: Lane> {
+pub struct DetectionInput<'a, T: Lane> {
     /// The machine.
-    pub machine: &'a Machine,
+    pub machine: &'a SharedMachine,
     /// Model of each lane.
     pub models: &'a [Option<Arc<Model>>],
     /// Lanes of the step.
@@ -192,10 +192,10 @@ pub struct Sight<'a, T: Lane> {
     pub activation: &'a Activation<T>,
 }
 
-impl<T: Lane> Contacts<T> {
+impl<T: Lane> ContactSlots<T> {
     /// Room for a machine.
     #[must_use]
-    pub fn new(token: T::Token, machine: &Machine) -> Self {
+    pub fn new(token: T::Token, machine: &SharedMachine) -> Self {
         let parts = Parts::of(machine);
         let n_wheels = parts.wheels.len();
         let mut part_of: Vec<usize> = (parts.wheels.iter().enumerate())
@@ -231,7 +231,7 @@ impl<T: Lane> Contacts<T> {
                 offset: zero,
             },
         };
-        let twist = Twist {
+        let twist = BodyTwist {
             angular: nowhere,
             linear: nowhere,
         };
@@ -268,7 +268,7 @@ impl<T: Lane> Contacts<T> {
             joined: 0,
             lists: vec![ContactList::NONE; machine.n_problems() * T::LANES],
             is_full: false,
-            homes: vec![[0; MAX_LANES]; n_slots],
+            problem_indices: vec![[0; MAX_LANES]; n_slots],
             places: vec![[0; MAX_LANES]; n_slots],
             near: vec![0; n_slots],
         }
@@ -466,7 +466,12 @@ impl<T: Lane> Contacts<T> {
 
     /// A contact of a problem by its place in the list, with its slot.
     #[must_use]
-    pub fn contact(&self, machine: &Machine, problem: usize, place: usize) -> (usize, Contact) {
+    pub fn contact(
+        &self,
+        machine: &SharedMachine,
+        problem: usize,
+        place: usize,
+    ) -> (usize, Contact) {
         let (list, lane) = (&self.lists[problem], problem % T::LANES);
         let slot = usize::from(list.slots[place]);
         if let Some(contact) = self.by_lane.contact(slot, lane) {
@@ -502,7 +507,7 @@ impl<T: Lane> Contacts<T> {
     /// The contacts of a rover with their slots, problem by problem.
     pub(crate) fn all_of<'a>(
         &'a self,
-        machine: &'a Machine,
+        machine: &'a SharedMachine,
         lane: usize,
     ) -> impl Iterator<Item = (usize, Contact)> + 'a {
         self.problems_of(lane).flat_map(move |problem| {
@@ -513,8 +518,8 @@ impl<T: Lane> Contacts<T> {
 
     /// The problem of each lane in which a slot is active.
     #[inline(always)]
-    pub(crate) fn homes(&self, slot: usize) -> &[u16; MAX_LANES] {
-        &self.homes[slot]
+    pub(crate) fn problem_indices(&self, slot: usize) -> &[u16; MAX_LANES] {
+        &self.problem_indices[slot]
     }
 
     /// Place of a slot among the contacts of that problem.
@@ -527,18 +532,22 @@ impl<T: Lane> Contacts<T> {
     ///
     /// # Panics
     /// If an argument is of another machine.
-    pub fn detect(&mut self, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
+    pub fn detect(
+        &mut self,
+        ground: &mut BlockGround<T>,
+        input: &DetectionInput<'_, T>,
+    ) -> T::Mask {
         T::vectorize(
             self.token,
             #[inline(always)]
-            || self.look(ground, sight),
+            || self.look(ground, input),
         )
     }
 
     /// Fills all slots with the contacts at the midpoint and evaluates them at the end.
     #[inline(always)]
-    fn look(&mut self, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
-        let Sight { middle, end, v, .. } = *sight;
+    fn look(&mut self, ground: &mut BlockGround<T>, input: &DetectionInput<'_, T>) -> T::Mask {
+        let DetectionInput { middle, end, v, .. } = *input;
         self.parts.find_twists(middle, v, &mut self.twists);
         self.by_lane.clear();
         for (tree, heights) in self.heights.iter_mut().enumerate() {
@@ -553,7 +562,7 @@ impl<T: Lane> Contacts<T> {
         for w in 0..self.parts.wheels.len() {
             let tree = self.parts.wheels[w].tree;
             let heights = self.heights[tree];
-            let mut rest = self.look_at_wheel(w, heights.for_wheels, ground, sight);
+            let mut rest = self.look_at_wheel(w, heights.for_wheels, ground, input);
             rest = rest | ground.beside_firm;
             let slots = self.parts.wheels[w].slots.clone();
             if self.slots[slots.clone()].iter().any(|own| own.active.any()) {
@@ -580,17 +589,17 @@ impl<T: Lane> Contacts<T> {
                 for slot in &mut self.slots[slots] {
                     slot.active = slot.active & !rest;
                 }
-                self.ask(Part::Wheel(w), rest, sight);
+                self.ask(Part::Wheel(w), rest, input);
             }
         }
         for b in 0..self.parts.boxes.len() {
             let height = self.heights[self.parts.boxes[b].tree].middle;
-            let near = self.look_at_box(b, height, ground, sight);
-            self.ask(self.parts.boxes[b].part, near | ground.beside_firm, sight);
+            let near = self.look_at_box(b, height, ground, input);
+            self.ask(self.parts.boxes[b].part, near | ground.beside_firm, input);
         }
         let mut fallbacks = T::mask(self.token, 0);
-        let meeting = if sight.machine.has_pairs {
-            self.find_meeting(sight)
+        let meeting = if input.machine.has_pairs {
+            self.find_meeting(input)
         } else {
             0
         };
@@ -598,14 +607,14 @@ impl<T: Lane> Contacts<T> {
             for slot in &mut self.slots[self.first_spare..self.first_of_joints] {
                 slot.active = fallbacks;
             }
-            fallbacks = self.find_by_lane(ground, sight, meeting);
+            fallbacks = self.find_by_lane(ground, input, meeting);
             let slots = self.slots[..self.first_of_joints].iter().enumerate();
             let used = slots.filter(|(_, own)| own.active.any());
             self.used.clear();
             self.used.extend(used.map(|(slot, _)| slot));
         }
         self.n_of_shapes = self.used.len();
-        if sight.machine.has_pairs {
+        if input.machine.has_pairs {
             self.find_leaders();
         }
         fallbacks | self.list_contacts(ground)
@@ -653,39 +662,39 @@ impl<T: Lane> Contacts<T> {
     /// Lanes in which bodies may touch each other: trees whose bounding balls about their origins
     /// meet, or a tree that can touch itself.
     #[inline(always)]
-    fn find_meeting(&self, sight: &Sight<'_, T>) -> u32 {
+    fn find_meeting(&self, input: &DetectionInput<'_, T>) -> u32 {
         let n = self.heights.len();
-        if sight.machine.touches_itself || sight.activation.lead.abs() > 0.0 {
-            return sight.going;
+        if input.machine.touches_itself || input.activation.lead.abs() > 0.0 {
+            return input.going;
         }
         let zero = T::splat(self.token, 0.0);
         let size = |tree: usize| {
             let mut size = zero;
             for wheel in self.parts.wheels.iter().filter(|own| own.tree == tree) {
-                let centre = wheel.centre(&sight.middle.bodies[wheel.body]);
+                let centre = wheel.centre(&input.middle.bodies[wheel.body]);
                 size = size.max(centre.norm() + zero.like(wheel.bound));
             }
             for solid in self.parts.boxes.iter().filter(|own| own.tree == tree) {
-                let centre = solid.centre(&sight.middle.bodies[solid.body]);
+                let centre = solid.centre(&input.middle.bodies[solid.body]);
                 size = size.max(centre.norm() + zero.like(solid.bound));
             }
             size
         };
         let mut meeting = 0;
         for a in 1..n {
-            let reach = size(a) + sight.activation.hover;
+            let reach = size(a) + input.activation.hover;
             for b in 0..a {
-                let way = sight.middle.origin_of(a) - sight.middle.origin_of(b);
+                let way = input.middle.origin_of(a) - input.middle.origin_of(b);
                 meeting |= way.norm().le(reach + size(b)).bits();
             }
         }
-        meeting & sight.going
+        meeting & input.going
     }
 
     /// Asks for the contacts of a part in the lanes of a mask.
     #[inline(always)]
-    fn ask(&mut self, part: Part, lanes: T::Mask, sight: &Sight<'_, T>) {
-        let lanes = lanes.bits() & sight.going;
+    fn ask(&mut self, part: Part, lanes: T::Mask, input: &DetectionInput<'_, T>) {
+        let lanes = lanes.bits() & input.going;
         if lanes != 0 {
             self.by_lane.ask(part, lanes);
         }
@@ -697,14 +706,14 @@ impl<T: Lane> Contacts<T> {
         &mut self,
         number: usize,
         height: T,
-        ground: &mut Ground<T>,
-        sight: &Sight<'_, T>,
+        ground: &mut BlockGround<T>,
+        input: &DetectionInput<'_, T>,
     ) -> T::Mask {
         let solid = &self.parts.boxes[number];
-        let pose = &sight.middle.bodies[solid.body];
+        let pose = &input.middle.bodies[solid.body];
         let n = ground.normal;
         let (centre, R) = (solid.centre(pose), solid.axes(pose));
-        let reach = (sight.activation).reach(
+        let reach = (input.activation).reach(
             #[inline(always)]
             || solid.speed(&self.twists[solid.carrier], centre),
         );
@@ -715,10 +724,10 @@ impl<T: Lane> Contacts<T> {
         if !ground.has_spheres() && !ground.has_surfaces() {
             return near_plane;
         }
-        let at_end = &sight.end.bodies[solid.body];
+        let at_end = &input.end.bodies[solid.body];
         let (from, to) = (
-            sight.middle.origin_of(solid.tree),
-            sight.end.origin_of(solid.tree),
+            input.middle.origin_of(solid.tree),
+            input.end.origin_of(solid.tree),
         );
         let shift = to - from + (solid.centre(at_end) - centre);
         let bound = T::splat(self.token, solid.bound);
@@ -735,14 +744,14 @@ impl<T: Lane> Contacts<T> {
         &mut self,
         w: usize,
         height: T,
-        ground: &mut Ground<T>,
-        sight: &Sight<'_, T>,
+        ground: &mut BlockGround<T>,
+        input: &DetectionInput<'_, T>,
     ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
-        let pose = &sight.middle.bodies[wheel.body];
+        let pose = &input.middle.bodies[wheel.body];
         let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
         // The second and third point of the rim, and all that may come near.
-        let reach = (sight.activation).reach(
+        let reach = (input.activation).reach(
             #[inline(always)]
             || wheel.speed(&self.twists[wheel.carrier], (s, centre)),
         );
@@ -751,7 +760,7 @@ impl<T: Lane> Contacts<T> {
         let (first, n_circles) = (wheel.slots.start, wheel.n_circles());
         let mut plane = (ground.normal, height);
         if ground.has_surfaces() {
-            let origin = sight.middle.origin_of(wheel.tree);
+            let origin = input.middle.origin_of(wheel.tree);
             rest = ground.find_plane(w, origin + centre, wheel.bound, reach);
             let own = ground.under_wheel(w);
             plane = (own.normal, own.height(origin));
@@ -759,10 +768,10 @@ impl<T: Lane> Contacts<T> {
                 slot.plane = own;
             }
             // Where a wheel sinks in, a piece counts by how deep each circle is.
-            if sight.needs_pieces || (wheel.n_circles() > 1 && wheel.is_soft) {
+            if input.needs_pieces || (wheel.n_circles() > 1 && wheel.is_soft) {
                 rest = rest | ground.on_surface();
             } else if !wheel.is_wide() {
-                on_pieces = rest & T::mask(self.token, sight.going);
+                on_pieces = rest & T::mask(self.token, input.going);
                 rest = rest & !on_pieces;
             }
         }
@@ -770,15 +779,15 @@ impl<T: Lane> Contacts<T> {
             (slot.active, slot.on_sphere) = (none, none);
         }
         for circle in 0..n_circles {
-            let stand = self.stands((w, circle), plane, sight, (s, centre), reach);
+            let stand = self.stands((w, circle), plane, input, (s, centre), reach);
             self.slots[first + circle].active = stand.admitted;
             rest = rest | stand.lies;
         }
         if on_pieces.any() {
-            rest = rest | self.look_at_pieces((w, on_pieces), ground, sight, (s, centre), reach);
+            rest = rest | self.look_at_pieces((w, on_pieces), ground, input, (s, centre), reach);
         }
         if ground.has_spheres() {
-            rest = rest | self.look_at_spheres(w, ground, sight, s, centre, reach);
+            rest = rest | self.look_at_spheres(w, ground, input, s, centre, reach);
         }
         rest
     }
@@ -790,7 +799,7 @@ impl<T: Lane> Contacts<T> {
         &self,
         (w, circle): (usize, usize),
         (n, base): (Vec3<T>, T),
-        sight: &Sight<'_, T>,
+        input: &DetectionInput<'_, T>,
         (s, centre): (Vec3<T>, Vec3<T>),
         reach: T,
     ) -> Stand<T> {
@@ -806,7 +815,7 @@ impl<T: Lane> Contacts<T> {
         let rounding = radius.like(wheel.section.rounding);
         let gap = height - radius * length - rounding;
         let twist = &self.twists[wheel.carrier];
-        let admitted = sight.activation.admits(
+        let admitted = input.activation.admits(
             gap,
             #[inline(always)]
             || {
@@ -832,31 +841,31 @@ impl<T: Lane> Contacts<T> {
     fn look_at_spheres(
         &mut self,
         w: usize,
-        ground: &mut Ground<T>,
-        sight: &Sight<'_, T>,
+        ground: &mut BlockGround<T>,
+        input: &DetectionInput<'_, T>,
         s: Vec3<T>,
         centre: Vec3<T>,
         reach: T,
     ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
-        let origin = sight.middle.origin_of(wheel.tree);
-        let at_end = wheel.centre(&sight.end.bodies[wheel.body]);
-        let half_way = sight.end.origin_of(wheel.tree) - origin + at_end - centre;
+        let origin = input.middle.origin_of(wheel.tree);
+        let at_end = wheel.centre(&input.end.bodies[wheel.body]);
+        let half_way = input.end.origin_of(wheel.tree) - origin + at_end - centre;
         let motion = half_way.norm();
         let need = reach + motion;
         let mut rest = ground.look_around_wheel(w, origin + centre, wheel.bound, need);
         let twist = self.twists[wheel.carrier];
         let (section, spoke, slots) = (wheel.section, wheel.spoke, wheel.slots.clone());
-        let pose = &sight.middle.bodies[wheel.body];
+        let pose = &input.middle.bodies[wheel.body];
         let spoke = || pose.R.times_shared(spoke);
         for sphere in ground.near_wheel(w) {
             let offset = sphere.centre - origin - centre;
             let gap = section.distance(s, offset) - sphere.radius;
             let is_deep = (gap - motion).lt(-(motion.like(DEEP) * sphere.radius));
             if is_deep.any() {
-                rest = rest | self.passing(w, is_deep, sphere, sight, half_way);
+                rest = rest | self.passing(w, is_deep, sphere, input, half_way);
             }
-            let admitted = sight.activation.admits(
+            let admitted = input.activation.admits(
                 gap,
                 #[inline(always)]
                 || {
@@ -902,11 +911,11 @@ impl<T: Lane> Contacts<T> {
         w: usize,
         asked: T::Mask,
         sphere: &GroundSphere<T>,
-        sight: &Sight<'_, T>,
+        input: &DetectionInput<'_, T>,
         half_way: Vec3<T>,
     ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
-        let pose = &sight.middle.bodies[wheel.body];
+        let pose = &input.middle.bodies[wheel.body];
         let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
         let spoke = pose.R.times_shared(wheel.spoke);
         let mut lanes = asked.bits();
@@ -933,7 +942,7 @@ impl<T: Lane> Contacts<T> {
                 centre: sphere.centre.get(lane).into(),
                 radius: sphere.radius.get(lane),
             };
-            let base = Vector3::from(sight.middle.origin_of(wheel.tree).get(lane));
+            let base = Vector3::from(input.middle.origin_of(wheel.tree).get(lane));
             let touch = touch_of_wheel(&own, &ball, &base, &half_way.get(lane).into());
             if touch.is_some() {
                 passes |= 1 << lane;
@@ -1004,7 +1013,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Lists the contacts of every lane. Returns the lanes with too many.
     #[inline(always)]
-    fn list_contacts(&mut self, ground: &Ground<T>) -> T::Mask {
+    fn list_contacts(&mut self, ground: &BlockGround<T>) -> T::Mask {
         for list in &mut self.lists {
             list.n = 0;
         }
@@ -1057,7 +1066,7 @@ impl<T: Lane> Contacts<T> {
     /// Lists the contacts of a slot, of a joint's without ground, after those of the slots before
     /// it. Returns the lanes that have too many.
     #[inline(always)]
-    pub(crate) fn list_slot(&mut self, slot: usize, ground: Option<&Ground<T>>) -> T::Mask {
+    pub(crate) fn list_slot(&mut self, slot: usize, ground: Option<&BlockGround<T>>) -> T::Mask {
         let joint_row = self.joint_row(slot);
         let shown = match joint_row {
             Some(_) => NO_KEY,
@@ -1079,7 +1088,7 @@ impl<T: Lane> Contacts<T> {
         if on_sphere != 0 {
             own.sphere.number.store(&mut numbers[..T::LANES]);
         }
-        let (homes, places) = (&mut self.homes[slot], &mut self.places[slot]);
+        let (problem_indices, places) = (&mut self.problem_indices[slot], &mut self.places[slot]);
         self.is_full &= own.active.all();
         let mut too_many = 0;
         let mut lanes = own.active.bits();
@@ -1091,13 +1100,13 @@ impl<T: Lane> Contacts<T> {
                 None => (by_lane.contact(slot, lane))
                     .map_or(0, |contact| self.cluster_of_body[contact.body]),
             };
-            let home = usize::from(self.clusters[cluster].leader[lane]) * T::LANES + lane;
-            let list = &mut self.lists[home];
+            let problem_index = usize::from(self.clusters[cluster].leader[lane]) * T::LANES + lane;
+            let list = &mut self.lists[problem_index];
             if list.n == MAX_CONTACTS {
                 too_many |= 1 << lane;
                 continue;
             }
-            homes[lane] = narrow(home);
+            problem_indices[lane] = narrow(problem_index);
             places[lane] = small(list.n);
             list.slots[list.n] = narrow(slot);
             let mut key = shown;
@@ -1126,7 +1135,7 @@ impl<T: Lane> Contacts<T> {
 }
 
 impl InCluster {
-    fn new(machine: &Machine, cluster: usize) -> Self {
+    fn new(machine: &SharedMachine, cluster: usize) -> Self {
         Self {
             most_dense: machine.most_dense(cluster),
             n_dry: machine.n_dry(cluster),

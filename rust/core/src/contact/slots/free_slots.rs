@@ -5,7 +5,7 @@
 //! further out on their tree, or one of these. A contact between two bodies moves velocities on two
 //! paths, so its slot has all of them.
 
-use super::machine::Machine;
+use super::machine::SharedMachine;
 use crate::solver::batch::problem::MAX_CONTACTS;
 
 /// Slots for a path with boxes or balls.
@@ -15,7 +15,7 @@ const FOR_BODIES: usize = 4;
 const FOR_PAIRS: usize = 6;
 const MOST_FOR_PAIRS: usize = 24;
 
-impl Machine {
+impl SharedMachine {
     /// Bodies whose path the further slots have, as far as the pattern of their cluster has room if
     /// it is one along paths; `None`: all velocities.
     pub(crate) fn find_free_slots(&self) -> Vec<Option<usize>> {

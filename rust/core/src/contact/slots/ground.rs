@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::contact_plane::ContactPlane;
-use super::pieces::{LanePlane, Pieces, Rim};
+use super::pieces::{LaneDisc, LanePlane, Pieces};
 use crate::contact::box_clearance::over_surfaces;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Coverage, OrientedBox, Sphere, Terrain};
@@ -100,7 +100,7 @@ impl Kept {
 
 /// The ground of a block.
 #[derive(Clone)]
-pub struct Ground<T: Lane> {
+pub struct BlockGround<T: Lane> {
     /// Unit normal of the plane.
     pub(crate) normal: Vec3<T>,
     /// Offset of the plane, m; ∞ without a plane.
@@ -129,7 +129,7 @@ pub struct Ground<T: Lane> {
     boxes: Vec<Around<T>>,
 }
 
-impl<T: Lane> Ground<T> {
+impl<T: Lane> BlockGround<T> {
     /// Flat ground at height 0 under every rover.
     #[must_use]
     pub fn new(token: T::Token, n_wheels: usize, n_boxes: usize) -> Self {
@@ -293,7 +293,7 @@ impl<T: Lane> Ground<T> {
         &mut self,
         wheel: usize,
         lanes: T::Mask,
-        rim: &Rim<T>,
+        rim: &LaneDisc<T>,
     ) -> Option<(&Pieces<T>, T::Mask)> {
         let pieces = &mut self.pieces[wheel];
         let known = pieces.find(&self.under_wheels, lanes & !self.mixed, rim);

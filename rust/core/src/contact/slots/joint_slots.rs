@@ -4,8 +4,8 @@
 
 use std::ops::Range;
 
-use super::contacts::Contacts;
-use super::machine::{Machine, Stop};
+use super::contacts::ContactSlots;
+use super::machine::{SharedMachine, Stop};
 use crate::contact::rows::close_stop;
 use crate::contact::{Activation, ContactKey, Part, Side, joint_friction};
 use crate::multibody::{JointModel, LaneConfiguration, Poses};
@@ -56,7 +56,7 @@ impl<T: Lane> JointRow<T> {
     }
 }
 
-impl<T: Lane> Contacts<T> {
+impl<T: Lane> ContactSlots<T> {
     /// The joint that a slot is for, if it is, and what for.
     #[inline(always)]
     pub(crate) fn joint_row(&self, slot: usize) -> Option<(usize, JointRow<T>)> {
@@ -84,7 +84,7 @@ impl<T: Lane> Contacts<T> {
     /// If an argument is of another machine.
     pub fn detect_joints(
         &mut self,
-        machine: &Machine,
+        machine: &SharedMachine,
         (middle, end): (&LaneConfiguration<T>, &LaneConfiguration<T>),
         poses: &Poses<T>,
         v: &[T],
@@ -136,7 +136,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Lists the joints with dry friction. Returns the lanes that have too many contacts.
     #[inline(always)]
-    fn list_friction(&mut self, machine: &Machine, poses: &Poses<T>) -> T::Mask {
+    fn list_friction(&mut self, machine: &SharedMachine, poses: &Poses<T>) -> T::Mask {
         let mut too_many = T::mask(self.token, 0);
         for (slot, &joint) in self.slots_of_friction().zip(&machine.rubbing) {
             let own = machine.joints[joint];

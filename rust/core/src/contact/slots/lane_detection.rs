@@ -3,46 +3,46 @@
 //! few spheres. They take free slots whose path of velocities begins with their body's.
 
 use super::by_lane::{Asked, Found};
-use super::contacts::{Contacts, Sight};
-use super::ground::Ground;
-use super::machine::Machine;
+use super::contacts::{ContactSlots, DetectionInput};
+use super::ground::BlockGround;
+use super::machine::SharedMachine;
 use crate::contact::body_motion::Still;
-use crate::contact::detection::{Moving, detect_parts};
+use crate::contact::detection::{MovingMachine, detect_parts};
 use crate::contact::pair_detection::detect_pairs_of;
 use crate::contact::relocation::relocate_to;
 use crate::contact::{Contact, PairSearch, Part};
 use crate::scalar::{Lane, LaneMask};
 
-impl<T: Lane> Contacts<T> {
+impl<T: Lane> ContactSlots<T> {
     /// Finds what was asked for, and contacts between bodies in the lanes `meeting`. Returns the
     /// lanes with unknown ground or too few slots.
     #[cold]
     pub(crate) fn find_by_lane(
         &mut self,
-        ground: &Ground<T>,
-        sight: &Sight<'_, T>,
+        ground: &BlockGround<T>,
+        input: &DetectionInput<'_, T>,
         meeting: u32,
     ) -> T::Mask {
         let mut fallbacks = 0;
         for lane in 0..T::LANES {
-            let (Some(model), Some(terrain)) = (&sight.models[lane], ground.terrain(lane)) else {
+            let (Some(model), Some(terrain)) = (&input.models[lane], ground.terrain(lane)) else {
                 continue;
             };
             let at = |poses| Still {
-                mechanism: sight.machine.mechanism(),
+                mechanism: input.machine.mechanism(),
                 poses,
-                v: sight.v,
+                v: input.v,
                 lane,
             };
-            let (middle, end) = (at(sight.middle), at(sight.end));
-            let machine = Moving {
+            let (middle, end) = (at(input.middle), at(input.end));
+            let machine = MovingMachine {
                 model,
                 middle: &middle,
                 end: &end,
             };
             let mut contacts = std::mem::take(&mut self.by_lane.scratch);
             contacts.clear();
-            let activation = sight.activation.of_lane(lane);
+            let activation = input.activation.of_lane(lane);
             let own = |asked: &&Asked| asked.lanes >> lane & 1 == 1;
             for asked in self.by_lane.asked.iter().filter(own) {
                 let parts = std::iter::once(asked.part);
@@ -58,7 +58,7 @@ impl<T: Lane> Contacts<T> {
             }
             for contact in &mut contacts {
                 relocate_to(model, &end, &**terrain, contact);
-                fallbacks |= u32::from(!self.give(sight.machine, lane, contact)) << lane;
+                fallbacks |= u32::from(!self.give(input.machine, lane, contact)) << lane;
             }
             self.by_lane.scratch = contacts;
         }
@@ -66,7 +66,7 @@ impl<T: Lane> Contacts<T> {
     }
 
     /// Enters a contact into a free slot. False if none is.
-    fn give(&mut self, machine: &Machine, lane: usize, contact: &Contact) -> bool {
+    fn give(&mut self, machine: &SharedMachine, lane: usize, contact: &Contact) -> bool {
         let Self {
             parts,
             slots,
@@ -79,12 +79,12 @@ impl<T: Lane> Contacts<T> {
             Part::Wheel(w) if contact.other.is_none() => parts.wheels[w].slots.clone(),
             _ => 0..0,
         };
-        let hosts = match contact.other {
-            None => &by_lane.hosts[contact.body],
+        let slots_of_body = match contact.other {
+            None => &by_lane.slots_of_body[contact.body],
             Some(_) => &by_lane.of_pairs,
         };
-        let mut hosts = own.chain(hosts.iter().copied());
-        let Some(slot) = hosts.find(|&slot| !slots[slot].active.get(lane)) else {
+        let mut slots_of_body = own.chain(slots_of_body.iter().copied());
+        let Some(slot) = slots_of_body.find(|&slot| !slots[slot].active.get(lane)) else {
             return false;
         };
         let Ok(place) = u16::try_from(by_lane.found.len()) else {
@@ -99,7 +99,7 @@ impl<T: Lane> Contacts<T> {
         by_lane.found.push(Found {
             lane,
             contact: *contact,
-            is_guest: contact.other.is_some() || !is_own(part_of[slot]),
+            is_off_path: contact.other.is_some() || !is_own(part_of[slot]),
         });
         by_lane.given[slot] |= 1 << lane;
         by_lane.places[slot][lane] = place;

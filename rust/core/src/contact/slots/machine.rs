@@ -14,7 +14,7 @@ use crate::contact::placed_wheel::PlacedWheel;
 #[cfg(doc)]
 use crate::geometry::Roller;
 use crate::law::compliance::Tread;
-use crate::multibody::description::Limits;
+use crate::multibody::description::JointLimits;
 use crate::multibody::model::Loop;
 use crate::multibody::{Mechanism, Model, Wheel};
 use crate::scalar::elementary::hypot;
@@ -26,7 +26,7 @@ const MOST_FURTHER: usize = 2;
 
 /// What a block of rovers has in common: a mechanism, and its wheels, boxes and stops.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Machine {
+pub struct SharedMachine {
     mechanism: Arc<Mechanism>,
     /// Wheels, in the model's order.
     pub wheels: Vec<WheelDisc>,
@@ -50,7 +50,7 @@ pub struct Machine {
     pub(crate) clusters: Clusters,
 }
 
-impl Deref for Machine {
+impl Deref for SharedMachine {
     type Target = Mechanism;
 
     #[inline(always)]
@@ -65,7 +65,7 @@ pub struct Stop {
     /// Index of the joint.
     pub joint: usize,
     /// Range of the joint, rad or m.
-    pub limits: Limits,
+    pub limits: JointLimits,
 }
 
 /// A wheel: a disc of zero width, or a [`Roller`].
@@ -111,7 +111,7 @@ pub struct BodyBox {
     pub half_size: [f64; 3],
 }
 
-impl Machine {
+impl SharedMachine {
     /// The machine of a model.
     #[must_use]
     pub fn of(model: &Model) -> Self {

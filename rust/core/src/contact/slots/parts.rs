@@ -7,19 +7,19 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::machine::Machine;
+use super::machine::SharedMachine;
 use crate::contact::Part;
 use crate::geometry::query::section::Section;
 use crate::multibody::JointAxis;
 use crate::multibody::joint::{Joint, JointModel, Revolute};
-use crate::multibody::mechanism::{BASE, Link, Mover};
+use crate::multibody::mechanism::{BASE, Link, PathVelocity};
 use crate::multibody::poses::{Pose, Poses};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Wheels and boxes.
 #[derive(Clone, Debug)]
 pub(crate) struct Parts {
-    pub wheels: Vec<Wheel>,
+    pub wheels: Vec<ContactWheel>,
     pub boxes: Vec<Solid>,
     /// First velocities of the trees' free roots, whose twists come first; none of a tree that a
     /// joint connects to the world, whose twist is zero.
@@ -30,7 +30,7 @@ pub(crate) struct Parts {
 
 /// A wheel, as contacts need it.
 #[derive(Clone, Debug)]
-pub(crate) struct Wheel {
+pub(crate) struct ContactWheel {
     pub body: usize,
     pub tree: usize,
     /// Slots for the wheel's contacts.
@@ -83,24 +83,24 @@ struct Carrier {
     /// Twist of what carries it.
     parent: usize,
     /// The velocity that moves it beside.
-    mover: Mover,
+    mover: PathVelocity,
 }
 
 /// Velocity of a body: angular, and of its material point at the origin of its tree.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Twist<T> {
+pub(crate) struct BodyTwist<T> {
     pub angular: Vec3<T>,
     pub linear: Vec3<T>,
 }
 
 impl Parts {
     /// The parts of a machine.
-    pub(crate) fn of(machine: &Machine) -> Self {
+    pub(crate) fn of(machine: &SharedMachine) -> Self {
         let mut carriers: Vec<Carrier> = (machine.trees.iter())
             .map(|tree| Carrier {
                 body: tree.is_free.then_some(tree.bodies.start),
                 parent: 0,
-                mover: Mover {
+                mover: PathVelocity {
                     velocity: 0,
                     motion: 0,
                 }, // not read
@@ -116,7 +116,7 @@ impl Parts {
                 let axle = axle_of(wheel.axle);
                 let spins = link.is_spinner && link.turns_about(axle);
                 let mover = if spins { link.parent } else { wheel.body };
-                Wheel {
+                ContactWheel {
                     body: wheel.body,
                     tree: machine.tree_of_body(wheel.body),
                     slots: first..n_slots,
@@ -169,13 +169,18 @@ impl Parts {
 
     /// Twists of all carriers.
     #[inline(always)]
-    pub(crate) fn find_twists<T: Lane>(&self, poses: &Poses<T>, v: &[T], twists: &mut [Twist<T>]) {
+    pub(crate) fn find_twists<T: Lane>(
+        &self,
+        poses: &Poses<T>,
+        v: &[T],
+        twists: &mut [BodyTwist<T>],
+    ) {
         let n = self.carriers.len();
         let twists = &mut twists[..n];
         for (twist, first) in twists.iter_mut().zip(&self.roots) {
             if let Some(first) = *first {
                 let v = &v[first..][..BASE];
-                *twist = Twist {
+                *twist = BodyTwist {
                     linear: Vec3::new(v[0], v[1], v[2]),
                     angular: Vec3::new(v[3], v[4], v[5]),
                 };
@@ -185,7 +190,7 @@ impl Parts {
             let Carrier { parent, mover, .. } = self.carriers[i];
             let (motion, rate) = (&poses.motions[mover.motion], v[mover.velocity]);
             let before = twists[parent];
-            twists[i] = Twist {
+            twists[i] = BodyTwist {
                 angular: before.angular + motion.axis * rate,
                 linear: before.linear + motion.swing * rate,
             };
@@ -209,7 +214,7 @@ impl Link {
     }
 }
 
-impl<T: Lane> Twist<T> {
+impl<T: Lane> BodyTwist<T> {
     /// Velocity of a material point, m/s.
     #[inline(always)]
     pub(crate) fn velocity(&self, x: Vec3<T>) -> Vec3<T> {
@@ -217,7 +222,7 @@ impl<T: Lane> Twist<T> {
     }
 }
 
-impl Wheel {
+impl ContactWheel {
     /// Whether the wheel has a width.
     #[inline(always)]
     pub(crate) fn is_wide(&self) -> bool {
@@ -265,7 +270,11 @@ impl Wheel {
     /// Upper bound on the speed at which its surface moves along its normal, m/s, with the unit
     /// axle `s` and its centre at `centre`: its spin moves it nowhere.
     #[inline(always)]
-    pub(crate) fn speed<T: Lane>(&self, twist: &Twist<T>, (s, centre): (Vec3<T>, Vec3<T>)) -> T {
+    pub(crate) fn speed<T: Lane>(
+        &self,
+        twist: &BodyTwist<T>,
+        (s, centre): (Vec3<T>, Vec3<T>),
+    ) -> T {
         let turning = twist.angular.cross(s).norm();
         twist.velocity(centre).norm() + turning * turning.like(self.bound)
     }
@@ -289,7 +298,7 @@ impl Solid {
 
     /// Upper bound on the speed of all its points, m/s, with its centre at `centre`.
     #[inline(always)]
-    pub(crate) fn speed<T: Lane>(&self, twist: &Twist<T>, centre: Vec3<T>) -> T {
+    pub(crate) fn speed<T: Lane>(&self, twist: &BodyTwist<T>, centre: Vec3<T>) -> T {
         twist.velocity(centre).norm() + twist.angular.norm() * centre.x.like(self.bound)
     }
 }
@@ -310,7 +319,7 @@ fn axle_of(axle: [f64; 3]) -> Axle {
 }
 
 /// Index of a body among the carriers; adds it with all that carry it.
-fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> usize {
+fn carrier_of(machine: &SharedMachine, body: usize, carriers: &mut Vec<Carrier>) -> usize {
     if let Some(i) = (carriers.iter()).rposition(|carrier| carrier.body == Some(body)) {
         return i;
     }
@@ -321,7 +330,7 @@ fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> us
         carrier_of(machine, link.parent, carriers)
     };
     for k in 0..link.joint.n_motions() {
-        let mover = Mover {
+        let mover = PathVelocity {
             velocity: link.velocity + k,
             motion: link.motion + k,
         };

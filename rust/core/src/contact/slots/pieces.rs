@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::geometry::terrain::surface::{Edge, Face, LEAN, OVERLAP, Wall};
+use crate::geometry::terrain::surface::{Edge, EdgeHalfSpace, Face, LEAN, OVERLAP};
 use crate::geometry::{Disc, Primitive, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
@@ -38,7 +38,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// A wheel in every lane.
 #[derive(Clone, Copy)]
-pub(crate) struct Rim<T> {
+pub(crate) struct LaneDisc<T> {
     /// World, m.
     pub centre: Vec3<T>,
     /// Unit.
@@ -139,7 +139,7 @@ impl<T: Lane> Pieces<T> {
         &mut self,
         surfaces: &[Option<Arc<dyn Terrain>>],
         lanes: T::Mask,
-        rim: &Rim<T>,
+        rim: &LaneDisc<T>,
     ) -> T::Mask {
         let turned = (rim.axle - self.axle).norm() * rim.reach.like(1.5 * rim.radius);
         let moved = (rim.centre - self.from).norm() + turned;
@@ -173,7 +173,7 @@ impl<T: Lane> Pieces<T> {
 
     /// Searches the ground of one lane. False where there are too many pieces, or it is too steep.
     #[cold]
-    fn search(&mut self, lane: usize, terrain: &dyn Terrain, rim: &Rim<T>) -> bool {
+    fn search(&mut self, lane: usize, terrain: &dyn Terrain, rim: &LaneDisc<T>) -> bool {
         let disc = Disc {
             centre: rim.centre.get(lane).into(),
             axle: rim.axle.get(lane).into(),
@@ -246,7 +246,7 @@ impl<T: Lane> Pieces<T> {
 
     /// Where a wheel may touch an edge or a vertex.
     #[inline(always)]
-    pub fn may_touch_others(&self, rim: &Rim<T>) -> T::Mask {
+    pub fn may_touch_others(&self, rim: &LaneDisc<T>) -> T::Mask {
         let like = rim.reach;
         let (radius, rounding) = (like.like(rim.radius), like.like(ROUNDING));
         let (overlap, beyond) = (like.like(OVERLAP), like.like(LEAN));
@@ -284,7 +284,7 @@ impl<T: Lane> Pieces<T> {
     }
 }
 
-impl<T: Lane> Rim<T> {
+impl<T: Lane> LaneDisc<T> {
     /// The lowest point of the rim and one to either side, world, m.
     #[inline(always)]
     fn low_points(&self) -> [Vec3<T>; 3] {
@@ -341,7 +341,7 @@ impl<T: Lane> LaneFace<T> {
         for (own, wall) in self
             .walls
             .iter_mut()
-            .zip(face.walls.each_ref().map(Wall::parts))
+            .zip(face.walls.each_ref().map(EdgeHalfSpace::parts))
         {
             let (normal, offset, is_open) = wall;
             own.0.set(lane, (*normal).into());

@@ -1,28 +1,28 @@
 //! Contacts of thin wheels with the faces of a surface, all lanes at once: [`super::pieces`].
 
-use super::contacts::{Contacts, Sight};
-use super::ground::Ground;
-use super::pieces::{LanePlane, Rim};
+use super::contacts::{ContactSlots, DetectionInput};
+use super::ground::BlockGround;
+use super::pieces::{LaneDisc, LanePlane};
 use crate::contact::ways_out::SHALLOW;
 use crate::geometry::query::disc_plane::{rolling, to_lowest};
 use crate::scalar::{Lane, LaneMask, Vec3};
 
-impl<T: Lane> Contacts<T> {
+impl<T: Lane> ContactSlots<T> {
     /// Adds the contacts of a wheel with faces at the midpoint, in some lanes; it has the axle `s`
     /// and the centre `centre` there. Returns the lanes where they must be found lane by lane.
     #[inline(always)]
     pub(crate) fn look_at_pieces(
         &mut self,
         (w, lanes): (usize, T::Mask),
-        ground: &mut Ground<T>,
-        sight: &Sight<'_, T>,
+        ground: &mut BlockGround<T>,
+        input: &DetectionInput<'_, T>,
         (s, centre): (Vec3<T>, Vec3<T>),
         reach: T,
     ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
-        let origin = sight.middle.origin_of(wheel.tree);
+        let origin = input.middle.origin_of(wheel.tree);
         let (radius, first) = (wheel.section.radius, wheel.slots.start);
-        let rim = Rim {
+        let rim = LaneDisc {
             centre: origin + centre,
             axle: s,
             radius,
@@ -36,7 +36,7 @@ impl<T: Lane> Contacts<T> {
         let shallow = reach.like(-SHALLOW * radius);
         for face in pieces.faces() {
             let plane = (face.plane.normal, face.plane.height(origin));
-            let stand = self.stands((w, 0), plane, sight, (s, centre), reach);
+            let stand = self.stands((w, 0), plane, input, (s, centre), reach);
             let near = lanes & stand.gap.le(reach);
             if !near.any() {
                 continue;

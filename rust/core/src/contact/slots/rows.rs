@@ -8,15 +8,15 @@
 use std::sync::Arc;
 
 use super::clusters::WidePatterns;
-use super::contacts::{Contacts, Slot};
+use super::contacts::{ContactSlots, Slot};
 use super::joint_slots::JointRow;
-use super::machine::Machine;
+use super::machine::SharedMachine;
 use crate::contact::body_motion::Still;
 use crate::contact::jacobian::{add_impulse, for_each_row};
 use crate::contact::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
-use crate::contact::rows::{Path, Place, add, add_scaled, product, square};
+use crate::contact::rows::{Place, VelocityPath, add, add_scaled, product, square};
 use crate::contact::{Contact, rollers};
-use crate::multibody::mechanism::{BASE, Mover};
+use crate::multibody::mechanism::{BASE, PathVelocity};
 use crate::multibody::model::Loop;
 use crate::multibody::{Factor, Poses};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
@@ -25,7 +25,7 @@ use crate::solver::batch::problem::{ContactProblem, Triple, block};
 
 /// What is read of a problem.
 #[derive(Clone, Copy, Debug)]
-pub enum Answer {
+pub enum ContactQuantity {
     /// Impulses, N s.
     Impulses,
     /// Velocities, m/s.
@@ -34,7 +34,7 @@ pub enum Answer {
 
 /// The contacts of a block in matrix form.
 #[derive(Clone, Debug)]
-pub struct Rows<T: Lane> {
+pub struct ContactMatrices<T: Lane> {
     token: T::Token,
     /// Bodies of the parts: wheels, spare slots, and joints; none of a spare slot with all
     /// velocities.
@@ -42,7 +42,7 @@ pub struct Rows<T: Lane> {
     /// First velocity of the free root that carries each part; none where no free root does.
     bases: Vec<Option<usize>>,
     /// Velocities of the joints that move each part, from the root outwards.
-    movers: Vec<Vec<Mover>>,
+    movers: Vec<Vec<PathVelocity>>,
     /// Velocities that two parts share: `common[a * n_parts + b]`.
     common: Vec<usize>,
     /// Whether wheels have rollers or no friction across.
@@ -86,10 +86,10 @@ pub struct Rows<T: Lane> {
     pub u_before: Vec<Triple<T>>,
 }
 
-impl<T: Lane> Rows<T> {
+impl<T: Lane> ContactMatrices<T> {
     /// Room for a machine with `n_slots` slots.
     #[must_use]
-    pub fn new(token: T::Token, machine: &Machine, n_slots: usize) -> Self {
+    pub fn new(token: T::Token, machine: &SharedMachine, n_slots: usize) -> Self {
         let wheels = machine.wheels.iter().map(|wheel| Some(wheel.body));
         let spares = machine.spares.iter().copied();
         let joints = machine.joints_with_slots();
@@ -176,9 +176,9 @@ impl<T: Lane> Rows<T> {
     /// If an argument is of another machine.
     pub fn assemble(
         &mut self,
-        (machine, factor): (&Machine, &Factor<T>),
+        (machine, factor): (&SharedMachine, &Factor<T>),
         end: &Poses<T>,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         v: &[T],
         mut loops: Option<&mut Loops<T>>,
     ) {
@@ -209,15 +209,19 @@ impl<T: Lane> Rows<T> {
 
     /// Path of a slot, and its rows of Z.
     #[inline(always)]
-    pub(crate) fn of(&self, contacts: &Contacts<T>, slot: usize) -> (Path<'_>, &[Triple<T>]) {
+    pub(crate) fn of(
+        &self,
+        contacts: &ContactSlots<T>,
+        slot: usize,
+    ) -> (VelocityPath<'_>, &[Triple<T>]) {
         let path = self.path(contacts.part(slot));
         (path, &self.Z[self.starts[slot]..][..path.len()])
     }
 
     /// Path of a part; of a spare slot with all velocities, they follow each other.
     #[inline(always)]
-    fn path(&self, part: usize) -> Path<'_> {
-        Path {
+    fn path(&self, part: usize) -> VelocityPath<'_> {
+        VelocityPath {
             base: self.bases[part],
             movers: &self.movers[part],
         }
@@ -227,15 +231,15 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn build(
         &mut self,
-        machine: &Machine,
+        machine: &SharedMachine,
         end: &Poses<T>,
         factor: &Factor<T>,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         v: &[T],
         slot: usize,
     ) {
         let part = contacts.part(slot);
-        let path = Path {
+        let path = VelocityPath {
             base: self.bases[part],
             movers: &self.movers[part],
         };
@@ -253,14 +257,14 @@ impl<T: Lane> Rows<T> {
                 rows.fill(zero);
                 *u = zero;
             }
-            for (lane, contact) in contacts.by_lane.guests(slot) {
+            for (lane, contact) in contacts.by_lane.off_path(slot) {
                 let one = Still {
                     mechanism: machine.mechanism(),
                     poses: end,
                     v,
                     lane,
                 };
-                write_guest(&one, contact, path, rows, u);
+                write_off_path(&one, contact, path, rows, u);
             }
         }
         match self.bodies[part] {
@@ -271,7 +275,7 @@ impl<T: Lane> Rows<T> {
 
     /// Products of the loops with the contacts from Z.
     #[inline(always)]
-    fn multiply_loops(&mut self, contacts: &Contacts<T>, loops: &mut Loops<T>) {
+    fn multiply_loops(&mut self, contacts: &ContactSlots<T>, loops: &mut Loops<T>) {
         let none = [T::splat(self.token, 0.0); 3];
         for row in 0..loops.m() {
             for &slot in contacts.used() {
@@ -288,7 +292,7 @@ impl<T: Lane> Rows<T> {
     /// Makes the rows of a slot zero where the loops let nothing move it. [`Self::close_held`]
     /// follows.
     #[inline(always)]
-    fn hold(&mut self, loops: &mut Loops<T>, contacts: &Contacts<T>, slot: usize) {
+    fn hold(&mut self, loops: &mut Loops<T>, contacts: &ContactSlots<T>, slot: usize) {
         let zero = T::splat(self.token, 0.0);
         let mut free = [zero; 3];
         for z in self.of(contacts, slot).1 {
@@ -332,7 +336,7 @@ impl<T: Lane> Rows<T> {
     fn find_held(
         &mut self,
         loops: &Loops<T>,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         slot: usize,
         free: &Triple<T>,
     ) -> [T::Mask; 3] {
@@ -375,7 +379,7 @@ impl<T: Lane> Rows<T> {
 
     /// Makes W regular where its diagonal is zero, since loops let nothing move a contact: the
     /// impulses there are zero. After [`Self::soften`], as what yields has a load.
-    pub fn close_held(&mut self, contacts: &Contacts<T>) {
+    pub fn close_held(&mut self, contacts: &ContactSlots<T>) {
         if self.held.is_empty() {
             return;
         }
@@ -412,7 +416,7 @@ impl<T: Lane> Rows<T> {
     }
 
     /// Number of contacts of a lane that nothing moves along their normals.
-    pub(crate) fn n_immovable(&self, contacts: &Contacts<T>, lane: usize) -> usize {
+    pub(crate) fn n_immovable(&self, contacts: &ContactSlots<T>, lane: usize) -> usize {
         let here =
             |slot: &&usize| (self.immovable[**slot] & contacts.slot(**slot).active).get(lane);
         self.held.iter().filter(here).count()
@@ -420,7 +424,7 @@ impl<T: Lane> Rows<T> {
 
     /// Diagonal blocks of W from Z.
     #[inline(always)]
-    fn multiply_diagonal(&mut self, contacts: &Contacts<T>, loops: Option<&Loops<T>>) {
+    fn multiply_diagonal(&mut self, contacts: &ContactSlots<T>, loops: Option<&Loops<T>>) {
         for slot in contacts.used_nearby() {
             self.diagonal[slot] = self.own_block(contacts, slot, loops);
         }
@@ -428,7 +432,7 @@ impl<T: Lane> Rows<T> {
 
     /// W from Z.
     #[inline(always)]
-    fn multiply(&mut self, contacts: &Contacts<T>, loops: Option<&Loops<T>>) {
+    fn multiply(&mut self, contacts: &ContactSlots<T>, loops: Option<&Loops<T>>) {
         let (n_parts, zero) = (self.movers.len(), T::splat(self.token, 0.0));
         for cluster in 0..contacts.n_clusters() {
             let used = contacts.used_densely(cluster);
@@ -459,7 +463,12 @@ impl<T: Lane> Rows<T> {
 
     /// Block of W of a slot with itself.
     #[inline(always)]
-    fn own_block(&self, contacts: &Contacts<T>, slot: usize, loops: Option<&Loops<T>>) -> [T; 9] {
+    fn own_block(
+        &self,
+        contacts: &ContactSlots<T>,
+        slot: usize,
+        loops: Option<&Loops<T>>,
+    ) -> [T; 9] {
         let zero = T::splat(self.token, 0.0);
         let spread = self.spread_of([slot, slot]);
         let mut own = match spread {
@@ -480,7 +489,7 @@ impl<T: Lane> Rows<T> {
     }
 
     /// Adds numbers by slot, along n, t, b, 1/kg, to W's diagonal.
-    pub fn soften(&mut self, contacts: &Contacts<T>, diagonal: impl Fn(usize) -> Triple<T>) {
+    pub fn soften(&mut self, contacts: &ContactSlots<T>, diagonal: impl Fn(usize) -> Triple<T>) {
         let soften = |own: &mut [T; 9], slot: usize| {
             for (k, more) in diagonal(slot).into_iter().enumerate() {
                 own[4 * k] += more;
@@ -506,7 +515,7 @@ impl<T: Lane> Rows<T> {
     /// # Panics
     /// If an argument is of another machine.
     #[inline(always)]
-    pub fn local(&self, contacts: &Contacts<T>, y: &[T], q: &mut [Triple<T>]) {
+    pub fn local(&self, contacts: &ContactSlots<T>, y: &[T], q: &mut [Triple<T>]) {
         let zero = T::splat(self.token, 0.0);
         for &slot in contacts.used() {
             let (path, rows) = self.of(contacts, slot);
@@ -524,7 +533,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn add_impulses(
         &self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         lanes: T::Mask,
         p: &[Triple<T>],
         y: &mut [T],
@@ -547,8 +556,8 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn generalized_impulse(
         &self,
-        machine: &Machine,
-        contacts: &Contacts<T>,
+        machine: &SharedMachine,
+        contacts: &ContactSlots<T>,
         end: &Poses<T>,
         lanes: T::Mask,
         p: &[Triple<T>],
@@ -559,18 +568,18 @@ impl<T: Lane> Rows<T> {
         // Force and moment on a root; the slots of a tree follow each other, mostly.
         let mut tree = None;
         let mut sums = [zero; BASE];
-        let mut guests = 0;
+        let mut off_path = 0;
         for &slot in contacts.used_by_shapes() {
             let own = contacts.slot(slot);
-            let own_guests = contacts.by_lane.guests(slot);
-            let of_guests = own_guests.fold(0, |all, (lane, _)| all | 1 << lane);
-            guests |= of_guests;
+            let own_off_path = contacts.by_lane.off_path(slot);
+            let in_slot = own_off_path.fold(0, |all, (lane, _)| all | 1 << lane);
+            off_path |= in_slot;
             if self.bodies[contacts.part(slot)].is_none() {
                 continue;
             }
-            let here = own.active & lanes & !T::mask(self.token, of_guests);
+            let here = own.active & lanes & !T::mask(self.token, in_slot);
             let [force, moment] = place_of(own).wrench(p[slot]);
-            let Path { base, movers } = self.path(contacts.part(slot));
+            let VelocityPath { base, movers } = self.path(contacts.part(slot));
             if let Some(first) = base {
                 let both = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
                 if base != tree {
@@ -592,8 +601,8 @@ impl<T: Lane> Rows<T> {
         if let Some(last) = tree {
             out[last..][..BASE].copy_from_slice(&sums);
         }
-        if (lanes & T::mask(self.token, guests)).any() {
-            add_impulses_of_guests(machine, contacts, end, lanes, p, out);
+        if (lanes & T::mask(self.token, off_path)).any() {
+            add_off_path_impulses(machine, contacts, end, lanes, p, out);
         }
         for &slot in contacts.used_by_joints() {
             let here = contacts.slot(slot).active & lanes;
@@ -613,7 +622,7 @@ impl<T: Lane> Rows<T> {
     /// If there are fewer problems than lanes.
     pub fn to_problems(
         &self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         (q, mu): (&[Triple<T>], &[T]),
         problems: &mut [ContactProblem],
         loops: Option<&Loops<T>>,
@@ -639,7 +648,8 @@ impl<T: Lane> Rows<T> {
                     }
                 }
                 for &slot in contacts.used() {
-                    let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+                    let (problem_indices, places) =
+                        (contacts.problem_indices(slot), contacts.places(slot));
                     let [n, t, b] = q[slot];
                     let values = store_all(&[n, t, b, mu[slot]]);
                     each::<T>(
@@ -647,7 +657,7 @@ impl<T: Lane> Rows<T> {
                         #[inline(always)]
                         |lane| {
                             let place = usize::from(places[lane]);
-                            let problem = &mut problems[usize::from(homes[lane])];
+                            let problem = &mut problems[usize::from(problem_indices[lane])];
                             let q = &mut problem.q[3 * place..][..3];
                             for i in 0..3 {
                                 q[i] = values[i][lane];
@@ -677,7 +687,7 @@ impl<T: Lane> Rows<T> {
 
     /// Pattern of a problem with factors.
     #[inline(always)]
-    fn pattern_of(&self, contacts: &Contacts<T>, problem: usize) -> &Arc<Pattern> {
+    fn pattern_of(&self, contacts: &ContactSlots<T>, problem: usize) -> &Arc<Pattern> {
         match contacts.members(problem) {
             None => &self.patterns[problem / T::LANES],
             Some(members) => self.wide.of(members.map(|own| self.sizes[own]).sum()),
@@ -689,7 +699,7 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn write_block(
         &self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         [row, column]: [usize; 2],
         (at, w): (usize, &[T; 9]),
         problems: &mut [ContactProblem],
@@ -725,12 +735,12 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn write_factors(
         &self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         slot: usize,
         problems: &mut [ContactProblem],
         loops: Option<&Loops<T>>,
     ) {
-        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        let (problem_indices, places) = (contacts.problem_indices(slot), contacts.places(slot));
         let near = T::mask(self.token, contacts.near(slot));
         let (path, rows) = self.of(contacts, slot);
         let [n, t, b] = self.softness[slot];
@@ -743,7 +753,7 @@ impl<T: Lane> Rows<T> {
             near,
             #[inline(always)]
             |lane| {
-                let out = &mut problems[usize::from(homes[lane])].factored;
+                let out = &mut problems[usize::from(problem_indices[lane])].factored;
                 let contact = usize::from(places[lane]);
                 out.softness[contact] = [0, 1, 2].map(|k| softness[k][lane]);
                 out.normal[contact] = softness[3][lane];
@@ -775,13 +785,15 @@ impl<T: Lane> Rows<T> {
                 near,
                 #[inline(always)]
                 |lane| {
-                    let home = usize::from(homes[lane]);
+                    let problem_index = usize::from(problem_indices[lane]);
                     let column = if whole >> lane & 1 == 1 {
-                        contacts.first_column(cluster, home).map(|k| k + place)
+                        contacts
+                            .first_column(cluster, problem_index)
+                            .map(|k| k + place)
                     } else {
                         Some(still + k)
                     };
-                    let out = &mut problems[home].factored;
+                    let out = &mut problems[problem_index].factored;
                     if let Some(column) = column {
                         let at = usize::from(places[lane]) * out.shape().0 + column;
                         let out = &mut out.Z[at];
@@ -803,12 +815,12 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn write_along_path(
         &self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         slot: usize,
         (still, rows): (usize, &[Triple<T>]),
         problems: &mut [ContactProblem],
     ) {
-        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        let (problem_indices, places) = (contacts.problem_indices(slot), contacts.places(slot));
         let near = T::mask(self.token, contacts.near(slot));
         let Some(cluster) = contacts.cluster_of(slot) else {
             return;
@@ -821,7 +833,7 @@ impl<T: Lane> Rows<T> {
                 #[inline(always)]
                 |lane| {
                     let at = usize::from(places[lane]) * stride + k;
-                    let out = &mut problems[usize::from(homes[lane])].factored.Z[at];
+                    let out = &mut problems[usize::from(problem_indices[lane])].factored.Z[at];
                     for i in 0..3 {
                         out[i] = values[i][lane];
                     }
@@ -834,13 +846,13 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     fn project_factors(
         &self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         (slot, loops): (usize, &Loops<T>),
         whole: T::Mask,
         problems: &mut [ContactProblem],
     ) {
         let zero = T::splat(self.token, 0.0);
-        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        let (problem_indices, places) = (contacts.problem_indices(slot), contacts.places(slot));
         for (k, &[cluster, place]) in self.velocities.iter().enumerate() {
             let mut taken = [zero; 3];
             for row in 0..loops.m() {
@@ -851,11 +863,11 @@ impl<T: Lane> Rows<T> {
                 whole,
                 #[inline(always)]
                 |lane| {
-                    let home = usize::from(homes[lane]);
-                    let Some(first) = contacts.first_column(cluster, home) else {
+                    let problem_index = usize::from(problem_indices[lane]);
+                    let Some(first) = contacts.first_column(cluster, problem_index) else {
                         return;
                     };
-                    let out = &mut problems[home].factored;
+                    let out = &mut problems[problem_index].factored;
                     let at = usize::from(places[lane]) * out.shape().0 + first + place;
                     let out = &mut out.Z[at];
                     for i in 0..3 {
@@ -874,23 +886,23 @@ impl<T: Lane> Rows<T> {
     #[inline(always)]
     pub fn read(
         &self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         problems: &[ContactProblem],
-        answer: Answer,
+        answer: ContactQuantity,
         out: &mut [Triple<T>],
     ) {
         let problems = &problems[..contacts.n_problems()];
         for &slot in contacts.used() {
             let mut values = store_all(&out[slot]);
-            let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+            let (problem_indices, places) = (contacts.problem_indices(slot), contacts.places(slot));
             each::<T>(
                 contacts.slot(slot).active,
                 #[inline(always)]
                 |lane| {
-                    let problem = &problems[usize::from(homes[lane])];
+                    let problem = &problems[usize::from(problem_indices[lane])];
                     let all = match answer {
-                        Answer::Impulses => &problem.p,
-                        Answer::Velocities => &problem.u,
+                        ContactQuantity::Impulses => &problem.p,
+                        ContactQuantity::Velocities => &problem.u,
                     };
                     let own = &all[3 * usize::from(places[lane])..][..3];
                     for i in 0..3 {
@@ -907,10 +919,10 @@ impl<T: Lane> Rows<T> {
 
 /// First velocity of the base, if the first root is free, and the others of a path with all
 /// velocities.
-fn whole_path(machine: &Machine) -> (Option<usize>, Vec<Mover>) {
+fn whole_path(machine: &SharedMachine) -> (Option<usize>, Vec<PathVelocity>) {
     let is_free = machine.trees.first().is_some_and(|tree| tree.is_free);
     let (first, lead) = if is_free { (Some(0), BASE) } else { (None, 0) };
-    let others = (lead..machine.nv()).map(|velocity| Mover {
+    let others = (lead..machine.nv()).map(|velocity| PathVelocity {
         velocity,
         motion: 0, // not read
     });
@@ -919,7 +931,7 @@ fn whole_path(machine: &Machine) -> (Option<usize>, Vec<Mover>) {
 
 /// Whether a slot is for the dry friction of a joint.
 #[inline(always)]
-fn is_friction<T: Lane>(contacts: &Contacts<T>, slot: usize) -> bool {
+fn is_friction<T: Lane>(contacts: &ContactSlots<T>, slot: usize) -> bool {
     matches!(contacts.joint_row(slot), Some((_, JointRow::Friction)))
 }
 
@@ -933,17 +945,17 @@ fn place_of<T: Lane>(own: &Slot<T>) -> Place<T> {
 /// Adds the generalized impulses, in the lanes of a mask, of contacts whose path is not that of
 /// their slots.
 #[cold]
-fn add_impulses_of_guests<T: Lane>(
-    machine: &Machine,
-    contacts: &Contacts<T>,
+fn add_off_path_impulses<T: Lane>(
+    machine: &SharedMachine,
+    contacts: &ContactSlots<T>,
     end: &Poses<T>,
     lanes: T::Mask,
     p: &[Triple<T>],
     out: &mut [T],
 ) {
     for &slot in contacts.used_by_shapes() {
-        let guests = contacts.by_lane.guests(slot);
-        for (lane, contact) in guests.filter(|(lane, _)| lanes.get(*lane)) {
+        let off_path = contacts.by_lane.off_path(slot);
+        for (lane, contact) in off_path.filter(|(lane, _)| lanes.get(*lane)) {
             let one = Still {
                 mechanism: machine.mechanism(),
                 poses: end,
@@ -960,10 +972,10 @@ fn add_impulses_of_guests<T: Lane>(
 
 /// Writes the rows of Hᵀ and `Hᵀ v` of a lane's contact along the path of a slot that is not its
 /// own.
-fn write_guest<T: Lane>(
+fn write_off_path<T: Lane>(
     one: &Still<'_, T>,
     contact: &Contact,
-    path: Path<'_>,
+    path: VelocityPath<'_>,
     rows: &mut [Triple<T>],
     u: &mut Triple<T>,
 ) {
@@ -972,7 +984,7 @@ fn write_guest<T: Lane>(
         own.set(lane, 0.0);
     }
     for_each_row(one, contact, |velocity, row| {
-        let is_own = |mover: &Mover| mover.velocity == velocity;
+        let is_own = |mover: &PathVelocity| mover.velocity == velocity;
         let own = match path.movers.iter().position(is_own) {
             Some(k) => &mut rows[path.lead() + k],
             None => &mut rows[velocity - path.base.unwrap_or(0)],
@@ -988,7 +1000,7 @@ fn write_guest<T: Lane>(
 /// Impulses of the slots in use, and where they have one among the lanes of a mask.
 #[inline(always)]
 pub(crate) fn in_slots<'a, T: Lane>(
-    contacts: &'a Contacts<T>,
+    contacts: &'a ContactSlots<T>,
     lanes: T::Mask,
     p: &'a [Triple<T>],
 ) -> impl Iterator<Item = (usize, T::Mask, Triple<T>)> + Clone + 'a {

@@ -5,8 +5,8 @@
 //! whose problem has no impulses of an earlier step. A few sweeps find most modes for the price of
 //! one step, for all lanes of the block at once.
 
-use super::contacts::Contacts;
-use super::rows::Rows;
+use super::contacts::ContactSlots;
+use super::rows::ContactMatrices;
 use crate::contact::loops::Loops;
 use crate::contact::rows::{add_scaled, along};
 use crate::scalar::{Lane, LaneMask};
@@ -66,13 +66,13 @@ fn friction<T: Lane>([a, b, c]: [T; 3], f: [T; 2], limit: T) -> [T; 2] {
     ]
 }
 
-impl<T: Lane> Rows<T> {
+impl<T: Lane> ContactMatrices<T> {
     /// Improves impulses by slot, N s, with `n` sweeps; `q`: free velocity by slot, m/s. Only slots
     /// with problems that have factors are swept; those that a lane does not use get zero.
     #[inline(always)]
     pub(crate) fn sweep(
         &mut self,
-        contacts: &Contacts<T>,
+        contacts: &ContactSlots<T>,
         n: usize,
         (q, mu): (&[Triple<T>], &[T]),
         p: &mut [Triple<T>],
@@ -137,7 +137,7 @@ fn push_loops<T: Lane>(loops: Option<&Loops<T>>, slot: usize, p: &Triple<T>, z: 
 /// the sweeps leave.
 #[inline(always)]
 pub(crate) fn write_start<T: Lane>(
-    contacts: &Contacts<T>,
+    contacts: &ContactSlots<T>,
     lanes: T::Mask,
     p: &[Triple<T>],
     problems: &mut [crate::solver::batch::problem::ContactProblem],
@@ -145,9 +145,9 @@ pub(crate) fn write_start<T: Lane>(
     for &slot in contacts.used() {
         let near =
             contacts.slot(slot).active & lanes & T::mask(contacts.token, contacts.near(slot));
-        let (homes, places) = (contacts.homes(slot), contacts.places(slot));
+        let (problem_indices, places) = (contacts.problem_indices(slot), contacts.places(slot));
         for lane in (0..T::LANES).filter(|lane| near.get(*lane)) {
-            let problem = &mut problems[usize::from(homes[lane])];
+            let problem = &mut problems[usize::from(problem_indices[lane])];
             if problem.factored.is_multiplied {
                 continue;
             }

@@ -1,7 +1,7 @@
 //! Wheels that yield where they touch, by slot: [`crate::law::compliance`].
 
-use super::contacts::Contacts;
-use super::machine::Machine;
+use super::contacts::ContactSlots;
+use super::machine::SharedMachine;
 use crate::contact::Part;
 use crate::law::compliance::Compliance;
 use crate::multibody::Poses;
@@ -10,7 +10,7 @@ use crate::scalar::Lane;
 /// Springs and damper of a slot, and the lanes that have them.
 #[inline(always)]
 pub(crate) fn spring<T: Lane>(
-    (machine, contacts): (&Machine, &Contacts<T>),
+    (machine, contacts): (&SharedMachine, &ContactSlots<T>),
     (poses, v): (&Poses<T>, &[T]),
     slot: usize,
 ) -> (Option<Compliance<T>>, T::Mask) {

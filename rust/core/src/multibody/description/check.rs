@@ -9,7 +9,7 @@ use super::check_values::{
     direction, finite, in_range, length, material, moderate, not_negative, place, positive,
 };
 use super::join::check_machines;
-use super::joint::{JointKind, Limits};
+use super::joint::{JointKind, JointLimits};
 use super::masses::mass_left;
 use super::{
     MAX_SHAPES, MAX_SOLIDS, MAX_TRIANGLES, ModelDescription, SolidDescription, WheelDescription,
@@ -212,7 +212,7 @@ fn check_limits(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let Some(limits) = solid.limits else {
         return Ok(());
     };
-    let Limits { lower, upper } = limits;
+    let JointLimits { lower, upper } = limits;
     for (field, value) in [("lower", lower), ("upper", upper)] {
         in_range(&at(field), value, 1e9, "at most 1e9 rad or m either way")?;
     }

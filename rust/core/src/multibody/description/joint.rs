@@ -65,7 +65,7 @@ pub struct Spring {
 /// Stops of a joint: `lower ≤ q ≤ upper`, unilateral like a contact and with the same restitution.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limits {
+pub struct JointLimits {
     /// rad or m.
     pub lower: f64,
     /// rad or m.

@@ -22,7 +22,7 @@ mod yielding;
 use super::error::ModelError;
 use super::motor::Motor;
 pub use closure::{LoopDescription, LoopKind};
-pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
+pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, JointLimits, Spring};
 pub use machines::MachineDescription;
 pub use masses::MassProperties;
 pub use shape::{DrawingDescription, Shape, ShapeDescription};
@@ -187,7 +187,7 @@ pub struct SolidDescription {
     pub armature: Option<f64>,
     /// Stops of the joint, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub limits: Option<Limits>,
+    pub limits: Option<JointLimits>,
     /// Drive of a revolute joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveDescription>,

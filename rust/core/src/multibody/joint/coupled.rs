@@ -14,7 +14,7 @@
 
 use super::axis::JointAxis;
 use super::coupling::Coupling;
-use super::joint_model::{JointCoordinates, JointModel, Placement};
+use super::joint_model::{JointCoordinates, JointModel, JointPlacement};
 use super::prismatic::Prismatic;
 use super::revolute::Revolute;
 use super::screw::{Motion, Screw};
@@ -86,7 +86,7 @@ impl JointModel for Coupled {
         frame: &Mat3<T>,
         q: &impl JointCoordinates<T>,
         turn: impl FnOnce() -> Option<(T, T)>,
-    ) -> Placement<T> {
+    ) -> JointPlacement<T> {
         match &self.moves {
             SingleJoint::Revolute(own) => own.place(frame, q, turn),
             SingleJoint::Prismatic(own) => {

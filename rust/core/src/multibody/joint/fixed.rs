@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::axis::JointAxis;
-use super::joint_model::{JointCoordinates, JointModel, Placement};
+use super::joint_model::{JointCoordinates, JointModel, JointPlacement};
 use super::screw::{Motion, Screw};
 use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Lane, Mat3};
@@ -30,8 +30,8 @@ impl JointModel for Fixed {
         frame: &Mat3<T>,
         _q: &impl JointCoordinates<T>,
         _turn: impl FnOnce() -> Option<(T, T)>,
-    ) -> Placement<T> {
-        Placement {
+    ) -> JointPlacement<T> {
+        JointPlacement {
             R: *frame,
             shift: None,
         }

@@ -9,7 +9,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::joint_model::{JointCoordinates, JointModel, Placement};
+use super::joint_model::{JointCoordinates, JointModel, JointPlacement};
 use super::screw::{Motion, Screw};
 use crate::scalar::{Lane, Mat3, Vec3};
 use crate::spatial::quaternion::{exp_rotation, product, rotation};
@@ -27,14 +27,14 @@ pub struct Free {
 
 /// Position and attitude of a free body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
+pub struct FreePose {
     /// Origin of its frame in the world, m.
     pub position: Vector3<f64>,
     /// Attitude `R_WB`.
     pub attitude: UnitQuaternion<f64>,
 }
 
-impl Default for Pose {
+impl Default for FreePose {
     fn default() -> Self {
         Self {
             position: Vector3::zeros(),
@@ -62,8 +62,8 @@ impl JointModel for Free {
         _frame: &Mat3<T>,
         q: &impl JointCoordinates<T>,
         _turn: impl FnOnce() -> Option<(T, T)>,
-    ) -> Placement<T> {
-        Placement {
+    ) -> JointPlacement<T> {
+        JointPlacement {
             R: rotation(&q.pose_at(self.pose).1),
             shift: None,
         }

@@ -36,7 +36,7 @@ pub trait JointCoordinates<T> {
 
 /// Where a joint puts its body.
 #[derive(Clone, Copy, Debug)]
-pub struct Placement<T> {
+pub struct JointPlacement<T> {
     /// Attitude of the body.
     pub R: Mat3<T>,
     /// From the joint's origin to the body's, m; `None` if they coincide.
@@ -86,7 +86,7 @@ pub trait JointModel {
         frame: &Mat3<T>,
         q: &impl JointCoordinates<T>,
         turn: impl FnOnce() -> Option<(T, T)>,
-    ) -> Placement<T>;
+    ) -> JointPlacement<T>;
 
     /// Calls `set(k, S)` with each of its screws, in world axes.
     fn screws<T: Lane>(&self, frame: &Mat3<T>, set: impl FnMut(usize, Screw<T>));

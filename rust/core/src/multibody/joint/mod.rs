@@ -32,8 +32,8 @@ pub use axis::JointAxis;
 pub use coupled::{Coupled, SingleJoint};
 pub use coupling::Coupling;
 pub use fixed::Fixed;
-pub use free::{Free, Pose};
-pub use joint_model::{JointCoordinates, JointModel, Placement};
+pub use free::{Free, FreePose};
+pub use joint_model::{JointCoordinates, JointModel, JointPlacement};
 pub use prismatic::Prismatic;
 pub use revolute::Revolute;
 pub use screw::{Motion, Screw};
@@ -86,7 +86,7 @@ macro_rules! catalogue {
                 frame: &Mat3<T>,
                 q: &impl JointCoordinates<T>,
                 turn: impl FnOnce() -> Option<(T, T)>,
-            ) -> Placement<T> {
+            ) -> JointPlacement<T> {
                 match self { $(Self::$joint(own) => own.place(frame, q, turn),)* }
             }
 
@@ -245,7 +245,7 @@ mod tests {
             let angle = coupling.map_or(q.number, |coupling| coupling.value(q.number));
             sin_cos(angle)
         });
-        let Placement { R, shift } = joint.place(frame, &q, || angle);
+        let JointPlacement { R, shift } = joint.place(frame, &q, || angle);
         (R.into(), shift.map_or(Vector3::zeros(), Vector3::from))
     }
 

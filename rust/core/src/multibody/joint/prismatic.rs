@@ -4,7 +4,7 @@
 //! as a force along it.
 
 use super::axis::JointAxis;
-use super::joint_model::{JointCoordinates, JointModel, Placement};
+use super::joint_model::{JointCoordinates, JointModel, JointPlacement};
 use super::screw::{Motion, Screw};
 use crate::scalar::{Lane, Mat3};
 
@@ -21,8 +21,8 @@ pub struct Prismatic {
 impl Prismatic {
     /// Displaces its body by a length, m.
     #[inline(always)]
-    pub(super) fn displace<T: Lane>(&self, frame: &Mat3<T>, way: T) -> Placement<T> {
-        Placement {
+    pub(super) fn displace<T: Lane>(&self, frame: &Mat3<T>, way: T) -> JointPlacement<T> {
+        JointPlacement {
             R: *frame,
             shift: Some(self.axis.turned(frame) * way),
         }
@@ -56,7 +56,7 @@ impl JointModel for Prismatic {
         frame: &Mat3<T>,
         q: &impl JointCoordinates<T>,
         _turn: impl FnOnce() -> Option<(T, T)>,
-    ) -> Placement<T> {
+    ) -> JointPlacement<T> {
         self.displace(frame, q.number_at(self.coordinate))
     }
 

@@ -5,7 +5,7 @@
 
 use super::axis::JointAxis;
 use super::coupling::Coupling;
-use super::joint_model::{JointCoordinates, JointModel, Placement};
+use super::joint_model::{JointCoordinates, JointModel, JointPlacement};
 use super::screw::{Motion, Screw};
 use crate::scalar::{Lane, Mat3};
 
@@ -47,12 +47,12 @@ impl JointModel for Revolute {
         frame: &Mat3<T>,
         _q: &impl JointCoordinates<T>,
         turn: impl FnOnce() -> Option<(T, T)>,
-    ) -> Placement<T> {
+    ) -> JointPlacement<T> {
         let R = match turn() {
             Some(sin_cos) => self.axis.rotate(frame, self.axis.turned(frame), sin_cos),
             None => *frame,
         };
-        Placement { R, shift: None }
+        JointPlacement { R, shift: None }
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@
 //! carrier. Its three screws are therefore rotations about axes fixed in the carrier, like the
 //! screw of a revolute joint. It has no limits.
 
-use super::joint_model::{JointCoordinates, JointModel, Placement};
+use super::joint_model::{JointCoordinates, JointModel, JointPlacement};
 use super::screw::{Motion, Screw};
 use crate::scalar::{Lane, Mat3, Vec3};
 use crate::spatial::quaternion::{exp_rotation, product, rotation};
@@ -33,8 +33,8 @@ impl JointModel for Spherical {
         frame: &Mat3<T>,
         q: &impl JointCoordinates<T>,
         _turn: impl FnOnce() -> Option<(T, T)>,
-    ) -> Placement<T> {
-        Placement {
+    ) -> JointPlacement<T> {
+        JointPlacement {
             R: frame.product(&rotation(&q.rotation_at(self.rotation))),
             shift: None,
         }

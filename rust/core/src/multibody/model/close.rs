@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::closed_loop::{BodyPose, Closure, End, JointReading, Loop};
+use super::closed_loop::{BodyPose, Closure, JointReading, Loop, LoopEnd};
 use super::{Body, Frame, Model, fingerprint};
 use crate::multibody::description::check_loops::is_placed;
 use crate::multibody::description::{LoopDescription, LoopKind};
@@ -73,7 +73,7 @@ impl Model {
         described: &mut LoopDescription,
         solids: &HashMap<&str, usize>,
         poses: &[ZeroPose],
-    ) -> Result<[End; 2], ModelError> {
+    ) -> Result<[LoopEnd; 2], ModelError> {
         let frame = |name: &str| solids.get(name).map(|&k| &self.frames[k]);
         let (first, second) = (
             frame(&described.solid),
@@ -214,14 +214,14 @@ fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
 }
 
 /// A point and axes in the frame of a solid as an end.
-fn end(frame: Option<&Frame>, point: &Vector3<f64>, axes: &Matrix3<f64>) -> End {
+fn end(frame: Option<&Frame>, point: &Vector3<f64>, axes: &Matrix3<f64>) -> LoopEnd {
     match frame {
-        None => End {
+        None => LoopEnd {
             body: None,
             point: (*point).into(),
             axes: (*axes).into(),
         },
-        Some(frame) => End {
+        Some(frame) => LoopEnd {
             body: Some(frame.body),
             point: (frame.position + frame.rotation * point).into(),
             axes: (frame.rotation * axes).into(),

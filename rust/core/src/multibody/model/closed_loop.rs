@@ -30,7 +30,7 @@ pub struct Loop {
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::multibody) enum Closure {
     /// The common point, and of a weld the common axes, as each end carries them.
-    Bodies([End; 2]),
+    Bodies([LoopEnd; 2]),
     /// A joint and the one it follows.
     Joints {
         own: JointReading,
@@ -42,7 +42,7 @@ pub(in crate::multibody) enum Closure {
 
 /// One end of a loop between bodies.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::multibody) struct End {
+pub(in crate::multibody) struct LoopEnd {
     /// `None` for the world.
     pub body: Option<usize>,
     /// The common point in the body's frame, m.
@@ -95,7 +95,7 @@ impl JointReading {
     }
 }
 
-impl End {
+impl LoopEnd {
     /// Point (world, m) relative to the origin of its tree, and that origin.
     #[inline(always)]
     pub(in crate::multibody) fn place<T: Lane>(

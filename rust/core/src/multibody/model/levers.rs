@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::Model;
-use crate::multibody::description::Limits;
+use crate::multibody::description::JointLimits;
 use crate::multibody::joint::{Joint, JointModel};
 use crate::multibody::mechanism::Lever;
 
@@ -86,7 +86,7 @@ impl Model {
         let own = self.joints.iter().find(|own| own.body == b);
         let limits = own.and_then(|own| own.limits);
         match limits.filter(|_| self.bodies[b].joint.slides()) {
-            Some(Limits { lower, upper }) => lower.abs().max(upper.abs()),
+            Some(JointLimits { lower, upper }) => lower.abs().max(upper.abs()),
             None => 0.0,
         }
     }

@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Body;
 use super::properties::JointProperties;
-use super::tree::{Path, Paths, Tree};
+use super::tree::{BodyPath, Paths, Tree};
 use crate::multibody::inertias::{Inertia, Inertias};
 use crate::multibody::joint::{Joint, JointModel};
-use crate::multibody::mechanism::{Link, Mechanism, Mover, OwnJoint, Symmetry, TreeSpan};
+use crate::multibody::mechanism::{Link, Mechanism, OwnJoint, PathVelocity, Symmetry, TreeSpan};
 use crate::scalar::{Single, Vec3};
 
 /// The mechanism of bodies with their paths.
@@ -88,7 +88,7 @@ fn add_row(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, tree: &Tre
 fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize) {
     let body = &bodies[b];
     let span = &mechanism.trees[body.tree];
-    let Path {
+    let BodyPath {
         velocities,
         motions,
     } = &paths.of[b];
@@ -102,7 +102,7 @@ fn add_link(mechanism: &mut Mechanism, bodies: &[Body], paths: &Paths, b: usize)
     let (path, movers) = (mechanism.paths.len(), mechanism.movers.len());
     mechanism.paths.extend(velocities);
     let pairs = rest.iter().zip(motions);
-    (mechanism.movers).extend(pairs.map(|(&velocity, &motion)| Mover { velocity, motion }));
+    (mechanism.movers).extend(pairs.map(|(&velocity, &motion)| PathVelocity { velocity, motion }));
     let mut others = bodies[b + 1..].iter();
     let is_leaf = !others.clone().any(|other| other.parent == Some(b));
     note_angles(mechanism, body);

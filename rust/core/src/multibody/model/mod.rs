@@ -33,7 +33,7 @@ use super::error::ModelError;
 use super::inertias::Inertias;
 use super::joint::Joint;
 pub use super::mechanism::BASE;
-use super::mechanism::{Mechanism, Mover};
+use super::mechanism::{Mechanism, PathVelocity};
 use crate::law::materials::OwnFriction;
 
 /// Kinematic trees. Velocities are in the order of the bodies; [`super::joint`] lists those of each
@@ -338,7 +338,7 @@ impl Model {
     /// ([`Kinematics::motions`](super::Kinematics::motions)).
     #[inline]
     #[must_use]
-    pub fn movers(&self, b: usize) -> &[Mover] {
+    pub fn movers(&self, b: usize) -> &[PathVelocity] {
         self.mechanism.movers(b)
     }
 

@@ -1,7 +1,7 @@
 //! Passive and active elements of a joint: spring, damper, rotor, stops, drive, and the gains of
 //! its position control.
 
-use crate::multibody::description::{DriveDescription, Hold, Limits, SolidDescription};
+use crate::multibody::description::{DriveDescription, Hold, JointLimits, SolidDescription};
 use crate::multibody::joint::Coupling;
 
 /// A joint with one coordinate of its own.
@@ -17,7 +17,7 @@ pub struct JointProperties {
     /// follow it.
     pub passive: Passive,
     /// Stops of the joint, if any.
-    pub limits: Option<Limits>,
+    pub limits: Option<JointLimits>,
     /// Drive of the joint, if any; a wheel's joint has none.
     pub drive: Option<DriveDescription>,
     /// Whether the joint has a spring or a damper.

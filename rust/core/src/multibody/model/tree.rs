@@ -36,7 +36,7 @@ impl Tree {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Paths {
     /// Path of each body.
-    pub(super) of: Vec<Path>,
+    pub(super) of: Vec<BodyPath>,
     /// Number of velocities of a free root at the start of each body's path.
     leads: Vec<usize>,
     pub(super) n_motions: usize,
@@ -45,7 +45,7 @@ pub(super) struct Paths {
 
 /// Path of one body.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Path {
+pub(super) struct BodyPath {
     pub(super) velocities: Vec<usize>,
     /// Motions of the path's velocities without those of a free root.
     pub(super) motions: Vec<usize>,
@@ -59,7 +59,7 @@ impl Paths {
         for b in 0..bodies.len() {
             let mut path = bodies[b]
                 .parent
-                .map_or(Path::default(), |p| paths.of[p].clone());
+                .map_or(BodyPath::default(), |p| paths.of[p].clone());
             let lead = match (bodies[b].parent, &bodies[b].joint) {
                 (Some(p), _) => paths.leads[p],
                 (None, Joint::Free(_)) => free::NV,
@@ -85,7 +85,7 @@ impl Paths {
     }
 
     /// Continues the path of a body with a coupled joint.
-    fn follow(&mut self, bodies: &mut [Body], b: usize, path: &mut Path) -> Result<(), usize> {
+    fn follow(&mut self, bodies: &mut [Body], b: usize, path: &mut BodyPath) -> Result<(), usize> {
         let motion = bodies[b].motion;
         let lead = self.leads[b];
         let coordinate = bodies[b].joint.coordinate().ok_or(b)?;

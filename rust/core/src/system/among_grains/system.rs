@@ -5,7 +5,7 @@ use super::parts::CompositeScratch;
 use super::touches;
 use crate::contact::{Activation, Contact, generalized_impulse};
 use crate::integrator::{
-    Dynamics, Forces, MechanicalSystem, Start, StepOptions, UnilateralContact, Work,
+    Dynamics, Forces, MechanicalSystem, StepOptions, StepStart, UnilateralContact, Work,
 };
 use crate::law::compliance::Compliance;
 use crate::multibody::LaneConfiguration;
@@ -60,14 +60,17 @@ impl TreeAmongGrains<'_> {
     /// Where a step begins, of each side.
     fn starts<'q>(
         &self,
-        start: Start<'q, Both>,
-    ) -> (Start<'q, Vec<f64>>, Start<'q, LaneConfiguration<f64>>) {
+        start: StepStart<'q, Both>,
+    ) -> (
+        StepStart<'q, Vec<f64>>,
+        StepStart<'q, LaneConfiguration<f64>>,
+    ) {
         let ((q_a, q_b), (v_a, v_b)) = (start.configuration, self.halves(start.v));
-        let of_grains = Start {
+        let of_grains = StepStart {
             configuration: q_a,
             v: v_a,
         };
-        let of_tree = Start {
+        let of_tree = StepStart {
             configuration: q_b,
             v: v_b,
         };
@@ -244,7 +247,7 @@ impl Dynamics for TreeAmongGrains<'_> {
 }
 
 impl Forces for TreeAmongGrains<'_> {
-    fn begin_load(&mut self, options: &StepOptions, start: Start<'_, Both>, y: &mut [f64]) {
+    fn begin_load(&mut self, options: &StepOptions, start: StepStart<'_, Both>, y: &mut [f64]) {
         let (start_a, start_b) = self.starts(start);
         let (y_a, y_b) = self.halves_mut(y);
         self.bed.begin_load(options, start_a, y_a);
@@ -254,7 +257,7 @@ impl Forces for TreeAmongGrains<'_> {
     fn load(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Both>,
+        start: StepStart<'_, Both>,
         v_mean: &[f64],
         y: &mut [f64],
     ) {
@@ -273,7 +276,7 @@ impl Forces for TreeAmongGrains<'_> {
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Both>,
+        start: StepStart<'_, Both>,
         v_mean: &[f64],
         impulse: &[f64],
         y: &mut [f64],
@@ -315,7 +318,7 @@ impl Forces for TreeAmongGrains<'_> {
     fn work(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Both>,
+        start: StepStart<'_, Both>,
         v_end: &[f64],
         out: &mut [Work],
     ) {
@@ -567,7 +570,7 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
         )
     }
 
-    fn begin_residual(&mut self, start: Start<'_, Both>) {
+    fn begin_residual(&mut self, start: StepStart<'_, Both>) {
         let (_, start) = self.starts(start);
         self.tree.begin_residual(start);
     }
@@ -575,7 +578,7 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     fn residual(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Both>,
+        start: StepStart<'_, Both>,
         v_end: &[f64],
         v_mean: &[f64],
         scratch: &mut [f64],

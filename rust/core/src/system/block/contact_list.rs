@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::Block;
+use super::RoverBlock;
 use super::system::LaneSystem;
-use crate::contact::slots::contacts::Sight;
+use crate::contact::slots::contacts::DetectionInput;
 use crate::contact::slots::joint_slots::JointRow;
 use crate::contact::{Activation, Contact};
 use crate::integrator::StepOptions;
@@ -26,7 +26,7 @@ impl<T: Lane> LaneSystem<T> {
         let (h, theta) = (options.time_step, options.theta);
         let measured = (1.0 - theta) * h;
         let activation = Activation::of_step(self.tree.gravity, h, options.forecast, measured);
-        let sight = Sight {
+        let input = DetectionInput {
             machine: &self.machine,
             models: &self.tree.models,
             going: going.bits(),
@@ -36,7 +36,7 @@ impl<T: Lane> LaneSystem<T> {
             needs_pieces: !options.materials.is_empty(),
             activation: &activation,
         };
-        let mut refused = self.contacts.detect(&mut self.ground, &sight);
+        let mut refused = self.contacts.detect(&mut self.ground, &input);
         if self.machine.joints_with_slots().next().is_some() {
             let (machine, end) = (&*self.machine, &self.tree.poses_end);
             let too_many = (self.contacts).detect_joints(machine, q, end, v, &activation);
@@ -76,7 +76,7 @@ impl<T: Lane> LaneSystem<T> {
     }
 }
 
-impl<T: Lane> Block<T> {
+impl<T: Lane> RoverBlock<T> {
     /// Visits the contacts of a lane's last step, in order: contact, position (world, m), impulse
     /// (N s) and local velocity (m/s).
     pub fn visit_contacts(

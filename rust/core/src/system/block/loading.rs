@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::Block;
+use super::RoverBlock;
 use super::lane_rover::LaneRover;
 use crate::integrator::audit::note_energies;
 use crate::sand::RutMap;
 use crate::scalar::Lane;
 
-impl<T: Lane> Block<T> {
+impl<T: Lane> RoverBlock<T> {
     /// Gives a lane to a rover of this machine, with options alike those of the others.
     /// [`Self::begin`] follows.
     pub fn load_rover(&mut self, lane: usize, rover: &mut LaneRover<'_>) {

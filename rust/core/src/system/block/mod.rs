@@ -9,28 +9,28 @@
 //! A step has three parts, between which its contact problems are solved with those of other blocks
 //! ([`crate::solver::batch::queue`]):
 //!
-//! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
-//! 2. [`Block::conclude`] — the new velocity and configuration, energy audit, and where contacts
-//!    penetrate, the problem of the position projection; where a motor has left the branch of its
-//!    line, the friction-contact problem anew;
-//! 3. [`Block::finish`] — the projected configuration, and what the next step remembers.
+//! 1. [`RoverBlock::prepare`] — poses, contacts, forces, the friction-contact problem;
+//! 2. [`RoverBlock::conclude`] — the new velocity and configuration, energy audit, and where
+//!    contacts penetrate, the problem of the position projection; where a motor has left the branch
+//!    of its line, the friction-contact problem anew;
+//! 3. [`RoverBlock::finish`] — the projected configuration, and what the next step remembers.
 //!
 //! A lane whose step cannot be taken falls back: its state stays as it was.
 //!
 //! ```text
-//! LaneRover ──► Block::load_rover     state, command and memory of one rover into its lane
+//! LaneRover ──► RoverBlock::load_rover   state, command and memory of one rover into its lane
 //!                    │
 //!                    ▼
-//!               Block::prepare        poses, contacts, mass matrix, W, free velocity
+//!               RoverBlock::prepare      poses, contacts, mass matrix, W, free velocity
 //!                    │
 //!                    ▼
-//!               Queue                 the friction-contact problems
+//!               Queue                    the friction-contact problems
 //!                    │
 //!                    ▼
-//!               Block::conclude       new state, motors' branches, energy audit
-//!                    │  Next          again, or the problem of the position projection
+//!               RoverBlock::conclude     new state, motors' branches, energy audit
+//!                    │  Next             again, or the problem of the position projection
 //!                    ▼
-//!               Block::finish ──► Block::store_rover
+//!               RoverBlock::finish ──► RoverBlock::store_rover
 //! ```
 //!
 //! [`lane_rover`]: what a block reads of a rover; `loading`: rovers come and go; `system`: the
@@ -48,7 +48,7 @@ use std::sync::Arc;
 
 use self::system::LaneSystem;
 use crate::contact::ContactKey;
-use crate::contact::slots::machine::Machine;
+use crate::contact::slots::machine::SharedMachine;
 use crate::integrator::data::Data;
 use crate::integrator::projection::set_gaps;
 use crate::integrator::{Obstacle, Probe, StepOptions, StepReport, scheme};
@@ -71,15 +71,15 @@ pub fn are_alike(a: &StepOptions, b: &StepOptions) -> bool {
 }
 
 /// Rovers in the lanes of a register, one fast step at a time.
-pub struct Block<T: Lane> {
+pub struct RoverBlock<T: Lane> {
     system: LaneSystem<T>,
     data: Data<T, LaneConfiguration<T>, Triple<T>, ContactKey>,
 }
 
-impl<T: Lane> Block<T> {
+impl<T: Lane> RoverBlock<T> {
     /// Lanes without rovers.
     #[must_use]
-    pub fn new(token: T::Token, machine: &Arc<Machine>) -> Self {
+    pub fn new(token: T::Token, machine: &Arc<SharedMachine>) -> Self {
         let system = LaneSystem::new(token, machine);
         let place = LaneConfiguration::new(token, machine);
         let mut data = Data::new(token, &place, &system.tree);

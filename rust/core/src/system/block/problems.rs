@@ -239,11 +239,14 @@ impl<T: Lane> LaneSystem<T> {
             all |= own.bits();
         }
         for &slot in self.contacts.used() {
-            let (homes, places) = (self.contacts.homes(slot), self.contacts.places(slot));
+            let (problem_indices, places) = (
+                self.contacts.problem_indices(slot),
+                self.contacts.places(slot),
+            );
             let is_deep = self.contacts.mask_of(slot, is_deep);
             let active = self.contacts.slot(slot).active & is_deep;
             for lane in (0..T::LANES).filter(|lane| active.get(*lane)) {
-                let problem = &mut problems[usize::from(homes[lane])];
+                let problem = &mut problems[usize::from(problem_indices[lane])];
                 problem.q[3 * usize::from(places[lane])] = gaps[slot][0].get(lane);
             }
         }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use super::by_method::ByMethod;
 use crate::contact::ContactKey;
-use crate::contact::slots::contacts::Contacts;
-use crate::contact::slots::ground::Ground;
+use crate::contact::slots::contacts::ContactSlots;
+use crate::contact::slots::ground::BlockGround;
 use crate::contact::slots::joint_slots::JointRow;
-use crate::contact::slots::machine::Machine;
-use crate::contact::slots::rows::{Answer, Rows, in_slots};
+use crate::contact::slots::machine::SharedMachine;
+use crate::contact::slots::rows::{ContactMatrices, ContactQuantity, in_slots};
 use crate::contact::slots::yielding::spring;
 use crate::integrator::grouped::Grouped;
 use crate::integrator::systems::{MemoryOf, Systems};
@@ -24,7 +24,7 @@ use crate::system::tree_lanes::TreeLanes;
 /// Rovers of one machine, with their contacts.
 pub(super) struct LaneSystem<T: Lane> {
     pub token: T::Token,
-    pub machine: Arc<Machine>,
+    pub machine: Arc<SharedMachine>,
     pub tree: TreeLanes<T>,
     /// Friction coefficient of contacts without a law of their materials, and of each slot.
     pub friction: T,
@@ -33,19 +33,19 @@ pub(super) struct LaneSystem<T: Lane> {
     pub restitution: Vec<T>,
     /// Most dry friction of each joint that has it, N m or N.
     pub dry_friction: Vec<T>,
-    pub ground: Ground<T>,
+    pub ground: BlockGround<T>,
     pub by_method: Option<Box<ByMethod>>,
-    pub contacts: Contacts<T>,
-    pub rows: Rows<T>,
+    pub contacts: ContactSlots<T>,
+    pub rows: ContactMatrices<T>,
     /// Impulses that the sweeps start from and end with, by slot, N s.
     pub swept: Vec<Triple<T>>,
 }
 
 impl<T: Lane> LaneSystem<T> {
     /// Without rovers.
-    pub fn new(token: T::Token, machine: &Arc<Machine>) -> Self {
+    pub fn new(token: T::Token, machine: &Arc<SharedMachine>) -> Self {
         let zero = T::splat(token, 0.0);
-        let contacts = Contacts::new(token, machine);
+        let contacts = ContactSlots::new(token, machine);
         let n = contacts.n_slots();
         let (mechanism, in_sand) = (machine.mechanism(), machine.in_sand.clone());
         Self {
@@ -55,9 +55,9 @@ impl<T: Lane> LaneSystem<T> {
             mu: vec![zero; n],
             restitution: vec![zero; n],
             dry_friction: vec![zero; machine.rubbing.len()],
-            ground: Ground::new(token, machine.wheels.len(), machine.boxes.len()),
+            ground: BlockGround::new(token, machine.wheels.len(), machine.boxes.len()),
             by_method: None,
-            rows: Rows::new(token, machine, n),
+            rows: ContactMatrices::new(token, machine, n),
             swept: vec![[zero; 3]; n],
             contacts,
             machine: Arc::clone(machine),
@@ -120,7 +120,7 @@ impl<T: Lane> Systems for LaneSystem<T> {
     type Machine = TreeLanes<T>;
     type Local = Triple<T>;
     type Key = ContactKey;
-    type Contacts = Contacts<T>;
+    type Contacts = ContactSlots<T>;
     type Problems = [ContactProblem];
 
     #[inline(always)]
@@ -144,7 +144,7 @@ impl<T: Lane> Systems for LaneSystem<T> {
     }
 
     #[inline(always)]
-    fn contacts(&self) -> &Contacts<T> {
+    fn contacts(&self) -> &ContactSlots<T> {
         &self.contacts
     }
 
@@ -177,7 +177,7 @@ impl<T: Lane> Systems for LaneSystem<T> {
     #[inline(always)]
     fn read_start(&self, problems: &[ContactProblem], p: &mut [Triple<T>]) {
         self.rows
-            .read(&self.contacts, problems, Answer::Impulses, p);
+            .read(&self.contacts, problems, ContactQuantity::Impulses, p);
     }
 
     fn assemble(&mut self, v: &[T]) {
@@ -301,17 +301,19 @@ impl<T: Lane> Systems for LaneSystem<T> {
     #[inline(always)]
     fn read(&self, problems: &[ContactProblem], p: &mut [Triple<T>], u: &mut [Triple<T>]) {
         let contacts = &self.contacts;
-        self.rows.read(contacts, problems, Answer::Impulses, p);
-        self.rows.read(contacts, problems, Answer::Velocities, u);
+        self.rows
+            .read(contacts, problems, ContactQuantity::Impulses, p);
+        self.rows
+            .read(contacts, problems, ContactQuantity::Velocities, u);
     }
 
     fn place_in_memory(&self, slot: usize, lane: usize) -> usize {
         // Pieces of a surface share a key, so the contact is found by its place.
-        let home = usize::from(self.contacts.homes(slot)[lane]);
+        let problem_index = usize::from(self.contacts.problem_indices(slot)[lane]);
         let lists = self
             .contacts
             .problems_of(lane)
-            .take_while(|own| *own < home);
+            .take_while(|own| *own < problem_index);
         let before: usize = lists.map(|own| self.contacts.list(own).n).sum();
         before + usize::from(self.contacts.places(slot)[lane])
     }
@@ -364,11 +366,11 @@ impl<T: Lane> Systems for LaneSystem<T> {
     #[inline(always)]
     fn read_pushes(&self, problems: &[ContactProblem], pushes: &mut [Triple<T>]) {
         self.rows
-            .read(&self.contacts, problems, Answer::Impulses, pushes);
+            .read(&self.contacts, problems, ContactQuantity::Impulses, pushes);
     }
 }
 
-impl<T: Lane> Grouped<T> for Contacts<T> {
+impl<T: Lane> Grouped<T> for ContactSlots<T> {
     #[inline(always)]
     fn token(&self) -> T::Token {
         self.token
@@ -415,7 +417,7 @@ impl<T: Lane> Grouped<T> for Contacts<T> {
     }
 
     #[inline(always)]
-    fn home(&self, slot: usize, lane: usize) -> usize {
-        usize::from(self.homes(slot)[lane]) / T::LANES
+    fn group_leader(&self, slot: usize, lane: usize) -> usize {
+        usize::from(self.problem_indices(slot)[lane]) / T::LANES
     }
 }

@@ -178,11 +178,11 @@ impl<const D: usize> Grid<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::terrain::rocks::Random;
+    use crate::geometry::terrain::rocks::SplitMix64;
     use crate::spatial::space::length;
 
     fn finds_every_neighbour_once<const D: usize>(reach: f64) {
-        let mut random = Random::new(3);
+        let mut random = SplitMix64::new(3);
         for (n, spread) in [(1, 1.0), (40, 1.0), (100, 1.0), (500, 3.0)] {
             let count = COORDINATES * n;
             let mut q: Vec<f64> = (0..count).map(|_| spread * random.uniform()).collect();

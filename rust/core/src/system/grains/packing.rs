@@ -2,7 +2,7 @@
 
 use super::bodies::{COORDINATES, Grains, check_count, noun};
 use super::error::GrainError;
-use crate::geometry::terrain::rocks::Random;
+use crate::geometry::terrain::rocks::SplitMix64;
 use crate::quantity::{LENGTHS, MASSES, PLACES, within};
 
 /// Grains with radii drawn uniformly from a range, row upon row over a width; in space, layer upon
@@ -94,7 +94,7 @@ impl<const D: usize> Array<D> {
     }
 
     /// Coordinates of grain i of radius r, moved at random within its place.
-    fn put(&self, i: usize, r: f64, random: &mut Random) -> [f64; COORDINATES] {
+    fn put(&self, i: usize, r: f64, random: &mut SplitMix64) -> [f64; COORDINATES] {
         let mut place = [0; COORDINATES];
         let mut rest = i;
         for k in (0..D).filter(|k| *k != 1).chain([1]) {
@@ -131,7 +131,7 @@ pub fn arranged<const D: usize>(
         return Err(GrainError::Empty);
     }
     let array = Array::new(corner, sides, largest)?;
-    let mut random = Random::new(seed);
+    let mut random = SplitMix64::new(seed);
     let put = |(i, r): (usize, &f64)| array.put(i, *r, &mut random);
     Ok(radius.iter().enumerate().flat_map(put).collect())
 }
@@ -157,7 +157,7 @@ impl<const D: usize> Packing<D> {
         if self.count == 0 {
             return Err(GrainError::Empty);
         }
-        let mut random = Random::new(self.seed);
+        let mut random = SplitMix64::new(self.seed);
         let mean = 0.5 * (self.radius_min + self.radius_max);
         let (mut radius, mut mass, mut q) = (Vec::new(), Vec::new(), Vec::new());
         for i in 0..self.count {

@@ -15,7 +15,7 @@ use super::contact::{GrainContact, GrainKey};
 use super::removal::Renumbering;
 use super::scene::{GrainScene, embedded};
 use crate::integrator::{OptionsError, WarmStart};
-use crate::planar::Disc;
+use crate::planar::PlanarDisc;
 use crate::spatial::space::{body_velocities, length};
 use nalgebra::{SVector, Vector2};
 
@@ -138,7 +138,7 @@ impl<const D: usize> GrainScene<D> {
         let poses = machine.poses(self.machine_coordinates(q));
         let rate = self.machine_velocities(v);
         let mover = |k: usize| {
-            let Disc { centre, radius } = machine.disc(k, &poses);
+            let PlanarDisc { centre, radius } = machine.disc(k, &poses);
             let below = centre - Vector2::y() * radius;
             let speed = |x: &Vector2<f64>| machine.point_velocity(k, &poses, x, rate).norm();
             Mover {

@@ -15,14 +15,17 @@ use super::slabs::Slabs;
 use super::struck_pairs::{MOST_REPETITIONS, Struck};
 use crate::contact::Activation;
 use crate::geometry::Facing;
-use crate::integrator::{Dynamics, Forces, MechanicalSystem, Stabilisation, Start, StepOptions};
+use crate::integrator::{
+    Dynamics, Forces, MechanicalSystem, Stabilisation, StepOptions, StepStart,
+};
 use crate::law::newton_impact::{rebound_at_gap, slow_approach};
 use crate::planar::{PlanarPoses, PlanarTree};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
 };
 use crate::solver::{
-    Answer, ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
+    ContactSolution, ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept,
+    solve_many_bodies,
 };
 use crate::spatial::space::body_velocities;
 use crate::system::planar_matrices::PlanarMatrices;
@@ -277,7 +280,7 @@ where
         q: &[f64],
         mu: &[f64],
         options: &SolverOptions,
-        answer: Answer<'_>,
+        answer: ContactSolution<'_>,
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
         let bodies = ManyBodies {
@@ -437,7 +440,7 @@ where
     fn load(
         &mut self,
         options: &StepOptions,
-        _start: Start<'_, Vec<f64>>,
+        _start: StepStart<'_, Vec<f64>>,
         v_mean: &[f64],
         y: &mut [f64],
     ) {
@@ -649,7 +652,7 @@ where
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
         let rolling = &mut [];
-        self.solve_rolling(q, mu, options, Answer { p, u, rolling }, workspace)
+        self.solve_rolling(q, mu, options, ContactSolution { p, u, rolling }, workspace)
     }
 
     fn solve_step(
@@ -665,7 +668,8 @@ where
         let surface = |key| self.parts.surface(key).map(|surface| surface.spin);
         moments.set_free(self.scene, (v, y), surface);
         let rolling = &mut moments.contacts;
-        let report = self.solve_rolling(q, mu, options, Answer { p, u, rolling }, workspace);
+        let report =
+            self.solve_rolling(q, mu, options, ContactSolution { p, u, rolling }, workspace);
         self.parts.rolling = moments;
         report
     }

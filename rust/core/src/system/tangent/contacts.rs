@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::held_places::Varying;
-use super::held_system::Held;
+use super::held_system::HeldSystem;
 use super::held_tree::HeldContact;
 use crate::contact::contact_slope::SlopeOfBody;
 use crate::contact::jacobian::sides;
@@ -14,7 +14,7 @@ use crate::law::compliance::Compliance;
 use crate::multibody::{LaneConfiguration, Model, Poses};
 use crate::scalar::{Dual, Lane, Vec3};
 
-impl<T: Lane> Held<'_, T> {
+impl<T: Lane> HeldSystem<'_, T> {
     /// Places all contacts at the predicted end of the step, `q`.
     #[inline(always)]
     pub(super) fn place_contacts(&mut self, q: &LaneConfiguration<Dual<T>>) {

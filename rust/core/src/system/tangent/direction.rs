@@ -1,7 +1,7 @@
 //! What varies in a lane.
 
 use super::held_tree::TangentScene;
-use super::scratch::Tangent;
+use super::scratch::TangentPass;
 use crate::contact::loops::Projector;
 use crate::scalar::{Dual, Lane};
 
@@ -49,7 +49,7 @@ pub(super) fn unit<T: Lane>(token: T::Token, lane: usize, rate: f64) -> T {
     unit
 }
 
-impl<T: Lane> Tangent<T> {
+impl<T: Lane> TangentPass<T> {
     /// Sets what varies, one direction a lane.
     pub(super) fn seed(&mut self, scene: &TangentScene<'_>, directions: &[Direction]) {
         let mechanism = scene.model.mechanism();

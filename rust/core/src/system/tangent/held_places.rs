@@ -22,7 +22,7 @@ pub(super) struct HeldPlaces<T: Lane> {
     is_with_world: Vec<bool>,
     /// Cluster of each contact that touches no other.
     clusters: Vec<Option<usize>>,
-    homes: Vec<usize>,
+    group_leaders: Vec<usize>,
     leaders: Vec<usize>,
     is_joined: bool,
 }
@@ -35,7 +35,7 @@ impl<T: Lane> HeldPlaces<T> {
             varying: Vec::new(),
             is_with_world: Vec::new(),
             clusters: Vec::new(),
-            homes: Vec::new(),
+            group_leaders: Vec::new(),
             leaders: Vec::new(),
             is_joined: false,
         }
@@ -59,10 +59,10 @@ impl<T: Lane> HeldPlaces<T> {
         let own = contacts.iter().zip(&self.is_with_world);
         let own = own.map(|(contact, is_with_world)| is_with_world.then_some(both(contact)[0]));
         self.clusters = own.collect();
-        let homes = contacts
+        let group_leaders = contacts
             .iter()
             .map(|contact| self.leaders[both(contact)[0]]);
-        self.homes = homes.collect();
+        self.group_leaders = group_leaders.collect();
     }
 }
 
@@ -110,7 +110,7 @@ impl<T: Lane> Grouped<Dual<T>> for HeldPlaces<T> {
         self.clusters[i]
     }
 
-    fn home(&self, i: usize, _: usize) -> usize {
-        self.homes[i]
+    fn group_leader(&self, i: usize, _: usize) -> usize {
+        self.group_leaders[i]
     }
 }

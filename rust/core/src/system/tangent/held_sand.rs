@@ -19,9 +19,9 @@ use crate::contact::Contact;
 use crate::integrator::held_step::HeldStep;
 use crate::integrator::{Dynamics, MechanicalSystem, StepOptions};
 use crate::sand::memory::rate;
-use crate::sand::{Derivatives, Memory, Soil, Twist, WheelPose};
+use crate::sand::{Derivatives, Memory, Soil, WheelPose, WheelTwist};
 use crate::system::sand::SandContact;
-use crate::system::sand_patch::{LaneGround, Patch, SandStep};
+use crate::system::sand_patch::{LaneGround, SandPatch, SandStep};
 use crate::system::six::{self, SIX, Six};
 use crate::system::{TreeScratch, TreeSystem};
 
@@ -231,7 +231,7 @@ impl HeldSand {
 
 /// The force on a wheel in poses and with memories near those at the end of a step.
 struct Probe<'a> {
-    patch: &'a Patch<f64>,
+    patch: &'a SandPatch<f64>,
     step: &'a SandStep<f64>,
     ground: &'a LaneGround<'a>,
     twist: Vector6<f64>,
@@ -241,7 +241,7 @@ struct Probe<'a> {
 
 impl<'a> Probe<'a> {
     fn new(
-        patch: &'a Patch<f64>,
+        patch: &'a SandPatch<f64>,
         step: &'a SandStep<f64>,
         ground: &'a LaneGround<'a>,
         v_end: &[f64],
@@ -367,7 +367,7 @@ impl<'a> Probe<'a> {
         let lag = self.step.theta * h;
         let begin = Memory::of(&Vector6::from(self.patch.begin.memory));
         let drum = self.patch.wheel.shape.drum();
-        let mut recalled = begin.after(&Twist::of(&self.twist), drum, (h, length));
+        let mut recalled = begin.after(&WheelTwist::of(&self.twist), drum, (h, length));
         if rate(&self.twist.into(), drum) <= REST {
             recalled.slope = Matrix6::from_diagonal_element(recalled.fresh);
         }

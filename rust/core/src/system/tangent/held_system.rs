@@ -60,7 +60,7 @@ impl<T: Lane> HeldParts<T> {
 }
 
 /// A held step in a pass.
-pub(super) struct Held<'a, T: Lane> {
+pub(super) struct HeldSystem<'a, T: Lane> {
     pub scene: &'a TangentScene<'a>,
     pub own: &'a mut HeldParts<T>,
 }
@@ -80,7 +80,7 @@ impl<T> HeldAnswer<T> {
     };
 }
 
-impl<T: Lane> Held<'_, T> {
+impl<T: Lane> HeldSystem<'_, T> {
     #[inline(always)]
     pub(super) fn number(&self, x: f64) -> Dual<T> {
         Dual::splat(self.own.tree.token, x)
@@ -220,7 +220,7 @@ fn with_slopes<T: Lane>(mut p: Vec<Triple<Dual<T>>>, dp: &[T]) -> Vec<Triple<Dua
     p
 }
 
-impl<T: Lane> Systems for Held<'_, T> {
+impl<T: Lane> Systems for HeldSystem<'_, T> {
     type T = Dual<T>;
     type Configuration = LaneConfiguration<Dual<T>>;
     type Machine = TreeLanes<Dual<T>>;

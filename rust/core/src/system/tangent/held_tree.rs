@@ -6,7 +6,7 @@ use super::held_sand::HeldSand;
 use crate::contact::contact_slope::ContactSlope;
 use crate::contact::{Contact, Opposite, Part};
 use crate::integrator::held_step::HeldStep;
-use crate::integrator::{Dynamics, MechanicalSystem, ScratchOf, Start, StepOptions};
+use crate::integrator::{Dynamics, MechanicalSystem, ScratchOf, StepOptions, StepStart};
 use crate::multibody::{Configuration, LaneConfiguration, Model};
 use crate::scalar::Single;
 use crate::system::TreeSystem;
@@ -39,7 +39,7 @@ pub(crate) struct TangentScene<'a> {
     pub model: &'a Arc<Model>,
     pub command: &'a Command,
     pub options: &'a StepOptions,
-    pub start: Start<'a, Configuration>,
+    pub start: StepStart<'a, Configuration>,
     pub v_end: &'a [f64],
     pub held: &'a HeldTree,
 }
@@ -51,7 +51,7 @@ impl TreeSystem<'_> {
     pub(crate) fn hold(
         &mut self,
         options: &StepOptions,
-        start: Start<'_, Configuration>,
+        start: StepStart<'_, Configuration>,
         ws: &ScratchOf<Self>,
         numbers: &[usize],
     ) -> Option<HeldTree> {

@@ -41,7 +41,7 @@ mod varying_sand;
 pub(crate) use direction::Direction;
 pub(crate) use held_sand::{HeldSand, OF_WHEEL, SandError};
 pub(crate) use held_tree::{HeldTree, TangentScene};
-pub(crate) use scratch::Tangent;
+pub(crate) use scratch::TangentPass;
 
 use crate::scalar::Lane;
 

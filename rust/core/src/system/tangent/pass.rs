@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::direction::Direction;
-use super::held_system::Held;
+use super::held_system::HeldSystem;
 use super::held_tree::TangentScene;
 use super::sand::n_of_sand;
-use super::scratch::Tangent;
+use super::scratch::TangentPass;
 use super::varying_sand::VaryingSand;
 use crate::contact::placed_wheel::PlacedWheel;
 use crate::integrator::NoProbe;
@@ -20,7 +20,7 @@ use crate::scalar::{Dual, Lane, LaneMask};
 /// Relative difference of velocities that is rounding.
 const ROUNDING: f64 = 1e-13;
 
-impl<T: Lane> Tangent<T> {
+impl<T: Lane> TangentPass<T> {
     /// Calls `take` with the number of each direction and its derivatives of the configuration's
     /// motion and of the velocity at the end (nv each), and of the state of the sand (7 n). False
     /// if the step is not the one that the held equations describe; `end` then is of no use.
@@ -82,7 +82,7 @@ impl<T: Lane> Tangent<T> {
         }
         parts.is_other = false;
         let v_start = d.v.clone();
-        let s = &mut Held { scene, own: parts };
+        let s = &mut HeldSystem { scene, own: parts };
         note_energies(s, d);
         prepare(s, d, answer, &mut NoProbe);
         let mut next = Next::Retake;

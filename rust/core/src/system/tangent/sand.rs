@@ -2,12 +2,12 @@
 
 use super::along;
 use super::held_sand::OF_WHEEL;
-use super::held_system::Held;
+use super::held_system::HeldSystem;
 use super::held_tree::TangentScene;
 use crate::scalar::{Dual, Lane};
 use crate::system::six::{self, SIX};
 
-impl<T: Lane> Held<'_, T> {
+impl<T: Lane> HeldSystem<'_, T> {
     /// The wrenches of the sand with their derivative at a held velocity at the end of the step,
     /// and their impulse, which is given.
     #[inline(always)]

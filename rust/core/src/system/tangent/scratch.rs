@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::held_system::{Held, HeldAnswer, HeldParts};
+use super::held_system::{HeldAnswer, HeldParts, HeldSystem};
 use crate::contact::loops::Loops;
 use crate::integrator::data::{Data, DataOf};
 use crate::multibody::{LaneConfiguration, Model};
@@ -11,9 +11,9 @@ use crate::system::drives::Drives;
 use crate::system::tree_lanes::TreeLanes;
 
 /// Passes with the lanes of `T`.
-pub(crate) struct Tangent<T: Lane> {
+pub(crate) struct TangentPass<T: Lane> {
     pub(super) parts: HeldParts<T>,
-    pub(super) data: DataOf<Held<'static, T>>,
+    pub(super) data: DataOf<HeldSystem<'static, T>>,
     pub(super) varies_inertias: bool,
     /// Drives and configuration of the machine, without what varies.
     pub(super) own_drives: Drives<Dual<T>>,
@@ -23,7 +23,7 @@ pub(crate) struct Tangent<T: Lane> {
     pub(super) answers: [HeldAnswer<T>; 2],
 }
 
-impl<T: Lane> Tangent<T> {
+impl<T: Lane> TangentPass<T> {
     /// Room for a machine.
     pub(crate) fn new(token: T::Token, model: &Model) -> Self {
         let mechanism = Arc::clone(model.mechanism());

@@ -25,7 +25,7 @@ impl<T: Lane> TreeLanes<T> {
     }
 
     /// `y` = the bias at a velocity.
-    fn weigh(&mut self, v: &[T], y: &mut [T]) {
+    fn find_bias(&mut self, v: &[T], y: &mut [T]) {
         bias(
             &self.mechanism,
             &self.inertias,
@@ -53,7 +53,7 @@ impl<T: Lane> Forces for TreeLanes<T> {
         let mut before = std::mem::take(&mut self.bias_before);
         if before.is_empty() {
             before.resize(start.v.len(), self.number(0.0));
-            self.weigh(start.v, &mut before);
+            self.find_bias(start.v, &mut before);
         }
         let (h, _) = self.step(options);
         T::vectorize(
@@ -69,7 +69,7 @@ impl<T: Lane> Forces for TreeLanes<T> {
     }
 
     fn load(&mut self, options: &StepOptions, _: StartOf<'_, Self>, v_mean: &[T], y: &mut [T]) {
-        self.weigh(v_mean, y);
+        self.find_bias(v_mean, y);
         let (h, _) = self.step(options);
         T::vectorize(
             self.token,
@@ -154,7 +154,7 @@ impl<T: Lane> Forces for TreeLanes<T> {
         out: &mut [Work<T>],
     ) {
         let v = [start.v, v_end];
-        self.weigh_sand(v);
+        self.find_sand_work(v);
         let step = self.step(options);
         T::vectorize(
             self.token,

@@ -139,7 +139,7 @@ impl<T: Lane> TreeLanes<T> {
     }
 
     /// Work of the sand on each cluster over the step, J.
-    pub(super) fn weigh_sand(&mut self, velocities: [&[T]; 2]) {
+    pub(super) fn find_sand_work(&mut self, velocities: [&[T]; 2]) {
         let mut work = std::mem::take(&mut self.of_sand);
         work.fill(self.number(0.0));
         if let Some(mut sand) = self.sand.take() {

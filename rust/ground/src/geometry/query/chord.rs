@@ -10,7 +10,7 @@ pub(super) const LIES: f64 = 0.1;
 
 /// An end of a chord.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct End {
+pub(super) struct ChordEnd {
     /// End point of the chord, on the circle, m.
     pub point: Vector3<f64>,
     /// Position along the line, from its `start`, of the point under the end of the chord, m.
@@ -28,7 +28,7 @@ pub(super) fn ends(
     n: &Vector3<f64>,
     start: &Vector3<f64>,
     along: &Vector3<f64>,
-) -> Option<[End; 2]> {
+) -> Option<[ChordEnd; 2]> {
     let lean = n.dot(along);
     if lean.abs() > LIES {
         return None;
@@ -49,7 +49,7 @@ pub(super) fn ends(
     let half = square.sqrt();
     Some([-half, half].map(|x| {
         let place = (x - origin) / cosine;
-        End {
+        ChordEnd {
             point: disc.centre + beside + flat * x,
             place,
             height: height - lean * place,

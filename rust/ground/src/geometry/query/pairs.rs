@@ -11,7 +11,7 @@ pub fn visit_pair(
     reach: f64,
     mut visit: impl FnMut(&PairPoint),
 ) {
-    let (first, second) = thinned(first, second);
+    let (first, second) = as_mid_discs(first, second);
     match (&first, &second) {
         (PlacedShape::Box(a), PlacedShape::Box(b)) => box_box::points(a, b, reach, visit),
         (PlacedShape::Disc(a), PlacedShape::Box(b)) => disc_box::points(a, b, reach, visit),
@@ -37,7 +37,7 @@ pub fn point_of_pair(
     second: &PlacedShape<'_>,
     feature: usize,
 ) -> PairPoint {
-    let (first, second) = thinned(first, second);
+    let (first, second) = as_mid_discs(first, second);
     match (&first, &second) {
         (PlacedShape::Box(a), PlacedShape::Box(b)) => box_box::point(a, b, feature),
         (PlacedShape::Disc(a), PlacedShape::Box(b)) => disc_box::point(a, b, feature),
@@ -57,7 +57,7 @@ fn may_rest(first: &PlacedShape<'_>, second: &PlacedShape<'_>) -> bool {
 
 /// Two shapes as their pair is measured: against a box or another wheel, a wheel with a width is
 /// the disc midway along its axle.
-fn thinned<'a>(
+fn as_mid_discs<'a>(
     first: &PlacedShape<'a>,
     second: &PlacedShape<'a>,
 ) -> (PlacedShape<'a>, PlacedShape<'a>) {

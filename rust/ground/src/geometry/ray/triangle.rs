@@ -1,7 +1,7 @@
 //! Rays and triangles without gaps between neighbours.
 //!
 //! The triangle is sheared and scaled so that the ray is the axis `(0, 0, 1)`. Whether the axis
-//! passes is then told by the signs of three products of the other coordinates. Two triangles
+//! passes then follows from the signs of three products of the other coordinates. Two triangles
 //! compute the same number, but for its sign, for the edge that they share, so a ray through it
 //! meets at least one of them.
 //!

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use super::error::TerrainError;
 use super::limits::check_entry;
 use super::plane::Plane;
-use super::surface::{Edge, Face, Hinge, Rim, Vertex, Wall};
+use super::surface::{BorderEdge, Edge, EdgeHalfSpace, Face, Hinge, Vertex};
 use super::{Area, Coverage, GROUND, Neighbourhood, Primitive, Terrain};
 use crate::geometry::broad_phase::{BallTree, Bounds, BoxTree};
 use crate::geometry::ray::triangle::Sheared;
@@ -178,7 +178,7 @@ impl TriangleMesh {
         Hinge::new(&a, &b, [&self.normals[t], &self.normal_beyond(t, k)])
     }
 
-    fn wall(&self, t: usize, k: usize) -> Wall {
+    fn wall(&self, t: usize, k: usize) -> EdgeHalfSpace {
         let other = self.neighbours[t][k] as usize;
         if self.neighbours[t][k] == NONE || t < other {
             return self.hinge(t, k).walls[0];
@@ -421,7 +421,7 @@ impl Terrain for TriangleMesh {
         narrow(4 * self.triangles.len() + self.vertices.len())
     }
 
-    fn visit_rims(&self, visit: &mut dyn FnMut(&Rim)) {
+    fn visit_rims(&self, visit: &mut dyn FnMut(&BorderEdge)) {
         let m = narrow(self.triangles.len());
         for (t, triangle) in self.triangles.iter().enumerate() {
             for k in 0..3 {
@@ -433,7 +433,7 @@ impl Terrain for TriangleMesh {
                 }
                 let [start, end] = self.ends(t, k);
                 let own = 3 * narrow(t) + narrow(k);
-                visit(&Rim {
+                visit(&BorderEdge {
                     face: narrow(t),
                     wall: k,
                     piece: Some(m + own.min(self.same_edge(t, k))),

@@ -32,13 +32,13 @@ pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
 pub use soft_ground::SoftGround;
 pub use sphere_field::SphereField;
-pub use surface::{Edge, Face, Rim, Vertex};
+pub use surface::{BorderEdge, Edge, Face, Vertex};
 pub use union::Union;
 
 use super::ray::{Hit, Ray};
 use super::shape::{Disc, Sphere};
 use crate::sand::test_bed::rules_within;
-use crate::sand::{Rules, SandWheel, Soil};
+use crate::sand::{GaussRules, SandWheel, Soil};
 
 /// A convex piece of ground whose distance to every shape has a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +116,7 @@ pub trait Terrain: Send + Sync {
     }
 
     /// The plane of all pieces of a surface within `radius` (m) of `centre`, seen from above, if
-    /// the surface is level there and that is quickly told.
+    /// the surface is level there and that is quickly decided.
     fn level_near(&self, _centre: &Vector3<f64>, _radius: f64) -> Option<Plane> {
         None
     }
@@ -178,9 +178,9 @@ pub trait Terrain: Send + Sync {
     }
 
     /// Visits the edges at which a face of a surface ends, or bends away from the free side.
-    fn visit_rims(&self, _visit: &mut dyn FnMut(&Rim)) {}
+    fn visit_rims(&self, _visit: &mut dyn FnMut(&BorderEdge)) {}
 
-    /// The vertex of a number from a [`Rim`], convex or not, with all its edges.
+    /// The vertex of a number from a [`BorderEdge`], convex or not, with all its edges.
     fn rim_corner(&self, id: u32) -> Vertex {
         unreachable!("invariant: corner {id} is of a rim")
     }
@@ -243,7 +243,7 @@ pub struct SoftLayer<'a> {
 
 /// Gauss rules of wheels in a soil, found once for all rovers on a ground.
 #[derive(Debug, Default)]
-pub struct KnownRules(Mutex<Vec<(SandWheel, Arc<Rules>)>>);
+pub struct KnownRules(Mutex<Vec<(SandWheel, Arc<GaussRules>)>>);
 
 /// Accuracy of the forces on a wheel, in the worst of several motions, for which the number of its
 /// points is chosen. Soils are not known better.
@@ -251,7 +251,7 @@ const ACCURACY: f64 = 0.05;
 
 /// The plane that touches a surface at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tangent {
+pub struct TangentPlane {
     /// World, m.
     pub place: Vector3<f64>,
     /// Unit normal, out of the ground.
@@ -265,7 +265,7 @@ pub struct Tangent {
 impl SoftLayer<'_> {
     /// Where the points lie on a wheel whose forces are within 5%.
     #[must_use]
-    pub fn rules(&self, wheel: &SandWheel) -> Arc<Rules> {
+    pub fn rules(&self, wheel: &SandWheel) -> Arc<GaussRules> {
         let mut known = self.known.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, rules)) = known.iter().find(|(same, _)| same == wheel) {
             return rules.clone();
@@ -278,11 +278,11 @@ impl SoftLayer<'_> {
     /// The tangent plane under a place (world, m), from the heights within `radius`, m. None where
     /// there is no ground.
     #[must_use]
-    pub fn tangent(&self, at: &Vector3<f64>, radius: f64) -> Option<Tangent> {
+    pub fn tangent(&self, at: &Vector3<f64>, radius: f64) -> Option<TangentPlane> {
         if let Some(plane) = self.surface.ground().filter(|_| self.surface.is_plane()) {
             let normal = *plane.normal();
             let height = normal.dot(at) + plane.offset();
-            return Some(Tangent {
+            return Some(TangentPlane {
                 place: at - normal * height,
                 normal,
                 is_exact: true,
@@ -299,7 +299,7 @@ impl SoftLayer<'_> {
         // Of opposite places the mean is over or under the plane.
         let bend = [around[0] + around[1], around[2] + around[3]];
         let over = bend.map(|sum| 0.5 * sum - middle);
-        Some(Tangent {
+        Some(TangentPlane {
             place: Vector3::new(at.x, middle, at.z),
             normal,
             is_exact: false,

@@ -217,7 +217,7 @@ impl Rocks {
         let per_area = table.last().copied().unwrap_or_default();
         let expected = per_area * self.area[0] * self.area[1];
         check_count(expected.min(1e15).ceil() as usize)?;
-        let mut random = Random::new(self.seed);
+        let mut random = SplitMix64::new(self.seed);
         let count = (expected + random.uniform()) as usize;
         let mut spheres = Vec::with_capacity(count);
         for i in 0..count {
@@ -274,9 +274,9 @@ impl Rocks {
 
 /// SplitMix64 (Steele, Lea and Flood 2014), written out so that no update of a library changes the
 /// rocks of a seed.
-pub struct Random(u64);
+pub struct SplitMix64(u64);
 
-impl Random {
+impl SplitMix64 {
     /// Starts from a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
@@ -341,7 +341,7 @@ mod tests {
         assert_eq!(sample(7), sample(7));
         assert_ne!(sample(7), sample(8));
         // SplitMix64 from seed 0 begins with 0xE220A8397B1DCDAF.
-        let first = Random::new(0).uniform();
+        let first = SplitMix64::new(0).uniform();
         assert!((first - 0xE220_A839_7B1D_CDAF_u64 as f64 * 2.0_f64.powi(-64)).abs() < 1e-15);
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! A part knows only itself. At its border, and at the upper edge of a block, it bends away from
 //! the free side and would push a body that slides on to its neighbour. So the edges of every part,
-//! its [`Rim`]s, are compared once with the faces of the others. Where a face goes on beyond an
-//! edge, the union has the edge between these two faces: no piece if they are flat or form a
+//! its [`BorderEdge`]s, are compared once with the faces of the others. Where a face goes on beyond
+//! an edge, the union has the edge between these two faces: no piece if they are flat or form a
 //! valley, a ridge otherwise. What is left of the edge stays as it was. At corners there, the edges
 //! of all parts bound the vertex.
 
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::surface::{Edge, Face, Hinge, Rim, Vertex};
+use super::surface::{BorderEdge, Edge, Face, Hinge, Vertex};
 use super::{Plane, Primitive, Terrain};
 use crate::geometry::broad_phase::BallTree;
 use crate::geometry::query::any_tangent;
@@ -80,7 +80,7 @@ struct Corner {
 
 /// A direction along a rim, that away from its face, and how near others must come.
 struct Line<'a> {
-    rim: &'a Rim,
+    rim: &'a BorderEdge,
     along: Vector3<f64>,
     outward: Vector3<f64>,
     length: f64,
@@ -326,7 +326,7 @@ impl Seams {
 }
 
 impl<'a> Line<'a> {
-    fn new(rim: &'a Rim) -> Self {
+    fn new(rim: &'a BorderEdge) -> Self {
         let way = rim.end - rim.start;
         let length = way.norm();
         Self {
@@ -414,7 +414,11 @@ impl<'a> Line<'a> {
         });
     }
 
-    fn stretch_of(&self, plane: &Plane, walls: &[super::surface::Wall]) -> Option<Stretch> {
+    fn stretch_of(
+        &self,
+        plane: &Plane,
+        walls: &[super::surface::EdgeHalfSpace],
+    ) -> Option<Stretch> {
         let n = plane.normal();
         if n.dot(&self.rim.normal) < BACK {
             return None;

@@ -4,10 +4,10 @@
 //! convex edge along those between its two faces', a convex vertex along those between its edges'.
 //! A flat or concave edge pushes along nothing, so a part that rolls over it feels the faces alone.
 //!
-//! A part touches a face only with a point over it. What is over a face is bounded by a [`Wall`]
-//! through each of its edges: perpendicular to the face at a convex edge, where the edge takes
-//! over, and through the bisector at any other, where the neighbour does. Two faces with the same
-//! wall never both have a point, and one of them always has it.
+//! A part touches a face only with a point over it. What is over a face is bounded by an
+//! [`EdgeHalfSpace`] through each of its edges: perpendicular to the face at a convex edge, where
+//! the edge takes over, and through the bisector at any other, where the neighbour does. Two faces
+//! with the same wall never both have a point, and one of them always has it.
 
 use nalgebra::Vector3;
 
@@ -23,7 +23,7 @@ pub const OVERLAP: f64 = 1e-10;
 
 /// One side of a plane through an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wall {
+pub struct EdgeHalfSpace {
     /// Normal of the plane, of any length.
     normal: Vector3<f64>,
     offset: f64,
@@ -31,7 +31,7 @@ pub struct Wall {
     is_open: bool,
 }
 
-impl Wall {
+impl EdgeHalfSpace {
     fn through(a: &Vector3<f64>, normal: Vector3<f64>, is_open: bool) -> Self {
         let offset = normal.dot(a);
         Self {
@@ -70,7 +70,7 @@ pub struct Face {
     /// Through its vertices.
     pub plane: Plane,
     /// Around what is over it.
-    pub walls: [Wall; 3],
+    pub walls: [EdgeHalfSpace; 3],
 }
 
 impl Face {
@@ -303,7 +303,7 @@ impl Vertex {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hinge {
     /// Walls of the first and of the second face.
-    pub walls: [Wall; 2],
+    pub walls: [EdgeHalfSpace; 2],
     /// Whether the surface bends away from the free side.
     pub is_convex: bool,
 }
@@ -322,12 +322,12 @@ impl Hinge {
         let walls = if is_convex {
             let into_second = e.cross(second);
             [
-                Wall::through(a, into_first, false),
-                Wall::through(a, into_second, false),
+                EdgeHalfSpace::through(a, into_first, false),
+                EdgeHalfSpace::through(a, into_second, false),
             ]
         } else {
             let bisector = (first + second).cross(&e);
-            [false, true].map(|is_open| Wall::through(a, bisector, is_open))
+            [false, true].map(|is_open| EdgeHalfSpace::through(a, bisector, is_open))
         };
         Self { walls, is_convex }
     }
@@ -335,7 +335,7 @@ impl Hinge {
 
 /// An edge of a part on one side of which a face ends.
 #[derive(Clone, Copy, Debug)]
-pub struct Rim {
+pub struct BorderEdge {
     /// Number of the face.
     pub face: u32,
     /// Number of the face's wall at the edge.

@@ -19,11 +19,15 @@ use crate::scalar::{Lane, MAX_LANES};
 use crate::solver::pivoting::{Few, System, Triple};
 
 /// A 3 x 3 block, row-major.
-pub(super) type Block<T> = [T; 9];
+pub(super) type ContactBlock<T> = [T; 9];
 
 /// Block (i, j) of a symmetric `W`.
 #[inline(always)]
-fn block_of<T: Lane, const B: usize>(W: &[Block<T>; B], i: usize, j: usize) -> Block<T> {
+fn block_of<T: Lane, const B: usize>(
+    W: &[ContactBlock<T>; B],
+    i: usize,
+    j: usize,
+) -> ContactBlock<T> {
     if j <= i {
         W[block(i, j)]
     } else {
@@ -35,7 +39,7 @@ fn block_of<T: Lane, const B: usize>(W: &[Block<T>; B], i: usize, j: usize) -> B
 /// `u = W p + q` at the first n places.
 #[inline(always)]
 pub(super) fn velocities<T: Lane, const C: usize, const B: usize>(
-    W: &[Block<T>; B],
+    W: &[ContactBlock<T>; B],
     n: usize,
     q: &[Triple<T>; C],
     p: &[Triple<T>; C],
@@ -66,11 +70,11 @@ pub(super) fn velocities<T: Lane, const C: usize, const B: usize>(
 /// Block (i, j) of `Bᵀ (W + α I) C + γ`.
 #[inline(always)]
 fn assemble<T: Lane>(
-    w: Block<T>,
+    w: ContactBlock<T>,
     alpha: Option<T>,
     row_mode: &Mode<T>,
     column_mode: &Mode<T>,
-) -> Block<T> {
+) -> ContactBlock<T> {
     let mut w = w;
     if let Some(alpha) = alpha {
         for k in 0..3 {
@@ -108,11 +112,11 @@ fn assemble<T: Lane>(
 }
 
 /// Factors of the system, `L` with ones on its diagonal and `U` with the inverse of its own.
-pub(super) type Factors<T, const C: usize> = [[Block<T>; C]; C];
+pub(super) type BlockFactors<T, const C: usize> = [[ContactBlock<T>; C]; C];
 
 /// `x − L U`.
 #[inline(always)]
-fn minus_product<T: Lane>(x: &mut Block<T>, l: &Block<T>, u: &Block<T>) {
+fn minus_product<T: Lane>(x: &mut ContactBlock<T>, l: &ContactBlock<T>, u: &ContactBlock<T>) {
     for r in 0..3 {
         let row = [l[3 * r], l[3 * r + 1], l[3 * r + 2]];
         for c in 0..3 {
@@ -127,7 +131,7 @@ fn minus_product<T: Lane>(x: &mut Block<T>, l: &Block<T>, u: &Block<T>) {
 
 /// Factors a diagonal block; the diagonal of `U` is inverted.
 #[inline(always)]
-fn factor_diagonal<T: Lane>(x: &Block<T>) -> Block<T> {
+fn factor_diagonal<T: Lane>(x: &ContactBlock<T>) -> ContactBlock<T> {
     let one = x[0].like(1.0);
     let [x00, x01, x02, x10, x11, x12, x20, x21, x22] = *x;
     let d0 = one / x00;
@@ -141,7 +145,7 @@ fn factor_diagonal<T: Lane>(x: &Block<T>) -> Block<T> {
 
 /// `X U⁻¹` for a factored diagonal block.
 #[inline(always)]
-fn over_upper<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
+fn over_upper<T: Lane>(x: &ContactBlock<T>, f: &ContactBlock<T>) -> ContactBlock<T> {
     let mut out = *x;
     for r in 0..3 {
         let l0 = x[3 * r] * f[0];
@@ -156,7 +160,7 @@ fn over_upper<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
 
 /// `L⁻¹ X` for a factored diagonal block.
 #[inline(always)]
-fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
+fn under_lower<T: Lane>(x: &ContactBlock<T>, f: &ContactBlock<T>) -> ContactBlock<T> {
     let mut out = *x;
     for c in 0..3 {
         let y1 = x[3 + c] - f[3] * x[c];
@@ -169,11 +173,11 @@ fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
 /// Factors the system of the modes at the first n places.
 #[inline(always)]
 pub(super) fn factorise<T: Lane, const C: usize, const B: usize>(
-    W: &[Block<T>; B],
+    W: &[ContactBlock<T>; B],
     n: usize,
     alpha: T,
     modes: &[Mode<T>; C],
-    factors: &mut Factors<T, C>,
+    factors: &mut BlockFactors<T, C>,
 ) {
     for k in 0..n {
         let mut diagonal = assemble(W[block(k, k)], Some(alpha), &modes[k], &modes[k]);
@@ -203,7 +207,7 @@ pub(super) fn factorise<T: Lane, const C: usize, const B: usize>(
 /// `y ← L⁻¹ y` at the first n places.
 #[inline(always)]
 pub(super) fn forward<T: Lane, const C: usize>(
-    factors: &Factors<T, C>,
+    factors: &BlockFactors<T, C>,
     n: usize,
     y: &mut [Triple<T>; C],
 ) {
@@ -222,7 +226,7 @@ pub(super) fn forward<T: Lane, const C: usize>(
 /// `y ← U⁻¹ y` at the first n places.
 #[inline(always)]
 pub(super) fn backward<T: Lane, const C: usize>(
-    factors: &Factors<T, C>,
+    factors: &BlockFactors<T, C>,
     n: usize,
     y: &mut [Triple<T>; C],
 ) {
@@ -242,7 +246,7 @@ pub(super) fn backward<T: Lane, const C: usize>(
 /// `y ← U⁻ᵀ y`, of a row to the left of U.
 #[inline(always)]
 pub(super) fn backward_row<T: Lane, const C: usize>(
-    factors: &Factors<T, C>,
+    factors: &BlockFactors<T, C>,
     y: &mut [Triple<T>; C],
 ) {
     for k in 0..C {
@@ -265,7 +269,7 @@ pub(super) fn backward_row<T: Lane, const C: usize>(
 
 /// `own −= x y`.
 #[inline(always)]
-fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
+fn subtract<T: Lane>(own: &mut Triple<T>, x: &ContactBlock<T>, y: &Triple<T>) {
     for r in 0..3 {
         own[r] -= x[3 * r] * y[0];
         own[r] -= x[3 * r + 1] * y[1];
@@ -282,9 +286,9 @@ fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
 /// ([`super::velocities`]) do not resolve. They come with factors of `W`.
 #[derive(Clone, Debug)]
 pub(super) struct DenseSystem<T: Lane, const C: usize, const B: usize> {
-    W: Box<[Block<T>; B]>,
+    W: Box<[ContactBlock<T>; B]>,
     pub(super) q: [Triple<T>; C],
-    factors: Box<Factors<T, C>>,
+    factors: Box<BlockFactors<T, C>>,
     /// Number of each lane's contacts, and the places in use.
     counts: [usize; MAX_LANES],
     n: usize,

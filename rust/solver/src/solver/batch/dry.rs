@@ -12,7 +12,9 @@
 //!
 //! The contacts have the first places, the joints those behind.
 
-use super::blocks::{Block, Factors, backward, backward_row, factorise, forward, velocities};
+use super::blocks::{
+    BlockFactors, ContactBlock, backward, backward_row, factorise, forward, velocities,
+};
 use super::loaded::{Loaded, solve_one};
 use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_DENSE, MAX_DRY, block};
 use crate::law::mode::{ContactMode, Mode};
@@ -26,14 +28,14 @@ pub(super) const PLACES: usize = MAX_DENSE + MAX_DRY;
 #[derive(Clone, Debug)]
 pub(super) struct DrySystem<T: Lane> {
     /// Lower triangle of the contacts' `W` by 3 x 3 blocks, row-major, 1/kg: [`block`].
-    W: [Block<T>; DENSE_BLOCKS],
+    W: [ContactBlock<T>; DENSE_BLOCKS],
     q: [Triple<T>; PLACES],
     /// The row t of W of each joint and the contacts, and the joints, 1/kg.
     coupling: [[Triple<T>; MAX_DENSE]; MAX_DRY],
     own: [[T; MAX_DRY]; MAX_DRY],
     /// W's entry of each joint's normal, 1/kg.
     normal: [T; MAX_DRY],
-    factors: Factors<T, MAX_DENSE>,
+    factors: BlockFactors<T, MAX_DENSE>,
     /// `L⁻¹ U` and `V R⁻¹` by joint, where it sticks; zero elsewhere.
     columns: [[Triple<T>; MAX_DENSE]; MAX_DRY],
     rows: [[Triple<T>; MAX_DENSE]; MAX_DRY],

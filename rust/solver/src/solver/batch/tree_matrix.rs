@@ -15,7 +15,7 @@ pub(super) type Base<T> = [T; BASE];
 /// Three columns over the velocities that move a contact, each with its part of the base; joints
 /// are in the order of the contact's path.
 #[derive(Clone, Debug)]
-pub(super) struct Columns<T> {
+pub(super) struct JacobianColumns<T> {
     pub base: [Base<T>; 3],
     pub joints: Vec<Triple<T>>,
 }
@@ -38,7 +38,7 @@ struct Joint<T> {
     pivot: T,
 }
 
-impl<T: Lane> Columns<T> {
+impl<T: Lane> JacobianColumns<T> {
     pub(super) fn new(zero: T, n_joints: usize) -> Self {
         Self {
             base: [[zero; BASE]; 3],
@@ -95,8 +95,8 @@ impl<T: Lane> TreeMatrix<T> {
         &mut self,
         pattern: &Pattern,
         slot: usize,
-        Y: &Columns<T>,
-        X: &Columns<T>,
+        Y: &JacobianColumns<T>,
+        X: &JacobianColumns<T>,
     ) {
         let ([y0, y1, y2], [x0, x1, x2]) = (&Y.base, &X.base);
         for i in 0..BASE {

@@ -22,12 +22,12 @@
 
 use std::sync::Arc;
 
-use super::blocks::Block;
+use super::blocks::ContactBlock;
 use super::loaded::{Loaded, solve_one};
 use super::pattern::BASE;
 use super::pattern::Pattern;
 use super::problem::ContactProblem;
-use super::tree_matrix::{Base, Columns, TreeMatrix, product};
+use super::tree_matrix::{Base, JacobianColumns, TreeMatrix, product};
 use crate::law::mode::{ContactMode, Mode};
 use crate::scalar::{Lane, LaneMask, MAX_LANES};
 use crate::solver::pivoting::{Few, System, Triple};
@@ -42,17 +42,17 @@ pub(super) struct VelocitySystem<T: Lane, const C: usize> {
     slots: [u32; MAX_LANES],
     used: u32,
     /// `Z` by slot; zero in lanes without a contact there.
-    Z: Vec<Columns<T>>,
+    Z: Vec<JacobianColumns<T>>,
     q: [Triple<T>; C],
     /// Diagonal blocks of W, the diagonal of D, and what it has more along the normal, 1/kg.
-    diagonal: [Block<T>; C],
+    diagonal: [ContactBlock<T>; C],
     softness: [Triple<T>; C],
     normal: [T; C],
     /// `G_i`.
     inverse: [Triple<T>; C],
     /// Factors of `Z K Zᵀ` of a contact.
-    left: Columns<T>,
-    right: Columns<T>,
+    left: JacobianColumns<T>,
+    right: JacobianColumns<T>,
     matrix: TreeMatrix<T>,
     /// A motion of the machine.
     base: Base<T>,
@@ -82,7 +82,7 @@ impl<T: Lane, const C: usize> VelocitySystem<T, C> {
     #[cold]
     fn adopt(&mut self, pattern: &Arc<Pattern>) {
         let zero = self.zero;
-        let columns = Columns::new(zero, pattern.stride() - BASE);
+        let columns = JacobianColumns::new(zero, pattern.stride() - BASE);
         (self.left, self.right) = (columns.clone(), columns.clone());
         self.Z.resize(C, columns);
         self.joints.resize(pattern.n_joints(), zero);
@@ -303,8 +303,8 @@ impl<T: Lane, const C: usize> Loaded<T, C> for VelocitySystem<T, C> {
             softness: [[zero; 3]; C],
             normal: [zero; C],
             inverse: [[zero; 3]; C],
-            left: Columns::new(zero, 0),
-            right: Columns::new(zero, 0),
+            left: JacobianColumns::new(zero, 0),
+            right: JacobianColumns::new(zero, 0),
             matrix: TreeMatrix::new(zero),
             base: [zero; BASE],
             joints: Vec::new(),

@@ -14,11 +14,11 @@ use crate::cone::tangential_norm;
 use crate::law::mode::{ContactMode, Mode};
 use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal};
 use crate::solver::local::modes::n_unknowns;
-use crate::solver::work::{self, Work};
+use crate::solver::work::{self, WorkBudget};
 
 /// Stored factors of the reduced system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::solver) enum Factors {
+pub(in crate::solver) enum Factorisation {
     /// None, or outdated.
     None,
     /// Cholesky.
@@ -35,7 +35,7 @@ pub(in crate::solver) struct NewtonStep {
     /// Regularisation used in the factors, 1/kg.
     pub alpha: f64,
     /// Kind of the factors.
-    pub factors: Factors,
+    pub factors: Factorisation,
     /// Whether sliding impulses return radially to the cone after the step.
     pub on_cone: bool,
 }
@@ -355,7 +355,7 @@ impl ReducedSystem {
     }
 
     /// Whether the budget allows another sparse factorisation; the first call analyses the pattern.
-    fn affords_sparse(&mut self, W: &BlockSparseDelassus, work: &mut Work) -> bool {
+    fn affords_sparse(&mut self, W: &BlockSparseDelassus, work: &mut WorkBudget) -> bool {
         if !self.is_analysed {
             self.block_lu.analyse(W);
             self.is_analysed = true;
@@ -370,8 +370,8 @@ impl ReducedSystem {
         data: &Prepared<'_>,
         alpha: f64,
         allow_symmetric: bool,
-        work: &mut Work,
-    ) -> Factors {
+        work: &mut WorkBudget,
+    ) -> Factorisation {
         work.factorisations += 1;
         self.number::<D>(data);
         let m = self.m;
@@ -379,14 +379,14 @@ impl ReducedSystem {
             Operator::Dense(W) => W,
             Operator::BlockSparse(W) => {
                 if !self.affords_sparse(W, work) {
-                    return Factors::None;
+                    return Factorisation::None;
                 }
                 let is_regular =
                     (self.block_lu).factorise::<D>(W, data.mu, alpha, None, &self.modes);
                 return if is_regular {
-                    Factors::Sparse
+                    Factorisation::Sparse
                 } else {
-                    Factors::None
+                    Factorisation::None
                 };
             }
         };
@@ -394,7 +394,7 @@ impl ReducedSystem {
         // A step costs two products and two substitutions in addition to its factors.
         let cost = work::dense(m, may_be_symmetric) + 2 * data.product;
         if !work.affords(cost) {
-            return Factors::None;
+            return Factorisation::None;
         }
         let size = dense::chunks(m);
         let A = &mut self.matrix[..LANES * size * size];
@@ -405,14 +405,14 @@ impl ReducedSystem {
                 assemble::<D>(data.mu, W, alpha, &self.modes, m, A);
             }
             if dense::cholesky(A, size) {
-                return Factors::Symmetric;
+                return Factorisation::Symmetric;
             }
         }
         assemble::<D>(data.mu, W, alpha, &self.modes, m, A);
         if dense::lu(A, size, &mut self.pivots) {
-            Factors::General
+            Factorisation::General
         } else {
-            Factors::None
+            Factorisation::None
         }
     }
 
@@ -421,7 +421,7 @@ impl ReducedSystem {
     pub fn factorise_shifted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
-        work: &mut Work,
+        work: &mut WorkBudget,
     ) -> bool {
         self.modes.fill(Mode::new(ContactMode::Stick));
         work.factorisations += 1;
@@ -475,8 +475,8 @@ impl ReducedSystem {
 
     /// Solves the factored system for the stored right-hand side, in place.
     #[inline]
-    fn back_substitute<const D: usize>(&mut self, data: &Prepared<'_>, factors: Factors) {
-        if let (Factors::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
+    fn back_substitute<const D: usize>(&mut self, data: &Prepared<'_>, factors: Factorisation) {
+        if let (Factorisation::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
             self.block_lu
                 .solve::<D>(W, &mut self.rhs.as_flattened_mut()[..data.n]);
             return;
@@ -486,9 +486,9 @@ impl ReducedSystem {
         let A = &self.matrix[..LANES * size * size];
         rhs.as_flattened_mut()[self.m..].fill(0.0);
         match factors {
-            Factors::None | Factors::Sparse => rhs.fill([0.0; LANES]),
-            Factors::Symmetric => dense::cholesky_solve(A, size, rhs),
-            Factors::General => dense::lu_solve(A, size, &self.pivots, rhs),
+            Factorisation::None | Factorisation::Sparse => rhs.fill([0.0; LANES]),
+            Factorisation::Symmetric => dense::cholesky_solve(A, size, rhs),
+            Factorisation::General => dense::lu_solve(A, size, &self.pivots, rhs),
         }
     }
 
@@ -511,7 +511,7 @@ impl ReducedSystem {
             ..
         } = self;
         trial.copy_from_slice(p);
-        if step.factors == Factors::Sparse {
+        if step.factors == Factorisation::Sparse {
             rhs.fill([0.0; LANES]);
         }
         let mut u = u;

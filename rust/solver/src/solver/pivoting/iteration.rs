@@ -14,7 +14,7 @@ use super::limit::{limit, return_to_cone};
 use super::mode_memory::ModeMemory;
 use super::store::{Many, Store, Triple};
 use super::system::System;
-use super::violation::{Law, Violations, judge};
+use super::violation::{LaneViolations, LawParameters, judge};
 use crate::law::mode::{self, Mode};
 use crate::problem::Residual;
 use crate::scalar::{Lane, LaneMask, Single};
@@ -53,14 +53,14 @@ const GAIN: f64 = 0.1;
 /// Problems that are being solved, one a lane. Each method is given their systems.
 #[derive(Clone, Debug)]
 pub(crate) struct Pivoting<T: Lane, B: Store> {
-    pub(crate) laws: B::Of<Law<T>>,
+    pub(crate) laws: B::Of<LawParameters<T>>,
     /// Mean diagonal of `W`, 1/kg.
     pub(crate) mean: T,
     /// Impulses and their velocities.
     pub(crate) p: B::Of<Triple<T>>,
     pub(crate) u: B::Of<Triple<T>>,
     /// Violations of the law by them.
-    pub(super) sums: Violations<T>,
+    pub(super) sums: LaneViolations<T>,
     /// Lanes whose modes go in circles, or whose system has no factors.
     pub(crate) lost: T::Mask,
     /// Squares of `1/|q|` and `1/|(ρ_i q_i)|`.
@@ -102,7 +102,7 @@ impl<T: Lane> Pivoting<T, Many> {
     pub(crate) fn resize(&mut self, n: usize) {
         let zero = self.mean.like(0.0);
         let none = zero.lt(zero);
-        self.laws.resize(n, Law::new(zero));
+        self.laws.resize(n, LawParameters::new(zero));
         self.modes.resize(n, Mode::open(zero));
         for triples in [
             &mut self.p,
@@ -138,11 +138,11 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         let (zero, one) = (T::splat(token, 0.0), T::splat(token, 1.0));
         let none = T::mask(token, 0);
         Self {
-            laws: B::filled(Law::new(zero)),
+            laws: B::filled(LawParameters::new(zero)),
             mean: one,
             p: B::filled([zero; 3]),
             u: B::filled([zero; 3]),
-            sums: Violations::none(zero),
+            sums: LaneViolations::none(zero),
             lost: none,
             inverses: [zero, one],
             asked: zero,
@@ -487,7 +487,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         let better = lanes & sums.weighted.lt(self.sums.weighted);
         select::<T, B>(system.places(), better, &self.trial, &mut self.p);
         select::<T, B>(system.places(), better, &self.renewed, &mut self.u);
-        self.sums = Violations::select(better, &sums, &self.sums);
+        self.sums = LaneViolations::select(better, &sums, &self.sums);
     }
 
     /// Moves the impulses of blocked lanes to where the first contacts block, which change their

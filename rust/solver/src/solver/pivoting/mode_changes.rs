@@ -45,7 +45,7 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         }
         let mut worst = self.worst_contradiction(system.places(), looks);
         if self.draws.is_some() {
-            worst = self.weigh_at_random(system.places());
+            worst = self.scale_at_random(system.places());
         }
         // With the right modes nothing but α is left in the way.
         let is_settled = gains_nothing & looks & !zero.lt(worst);
@@ -121,10 +121,10 @@ impl<T: Lane, B: Store> Pivoting<T, B> {
         worst
     }
 
-    /// Weighs the contradictions at random; returns the largest. The worst of several that are
+    /// Scales the contradictions at random; returns the largest. The worst of several that are
     /// about as large is not always the one to correct: correcting it may bring about the next, and
     /// that one the first again.
-    fn weigh_at_random(&mut self, places: impl Iterator<Item = usize>) -> T {
+    fn scale_at_random(&mut self, places: impl Iterator<Item = usize>) -> T {
         let mut worst = self.mean.like(0.0);
         for i in places {
             let weight = self.draws.as_mut().map_or(1.0, Draws::next);

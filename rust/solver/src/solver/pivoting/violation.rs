@@ -7,7 +7,7 @@ use crate::scalar::Lane;
 
 /// What a contact's law needs to know of its problem.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Law<T> {
+pub(crate) struct LawParameters<T> {
     /// Friction coefficient.
     pub mu: T,
     /// `ρ_N` and `ρ_T`, kg.
@@ -20,7 +20,7 @@ pub(crate) struct Law<T> {
 
 /// Sums over the contacts' violations.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Violations<T> {
+pub(crate) struct LaneViolations<T> {
     /// `Σ |v_i|²`, (m/s)².
     pub squares: T,
     /// `Σ |ρ_i v_i|²`, (N s)².
@@ -29,7 +29,7 @@ pub(crate) struct Violations<T> {
     pub largest: T,
 }
 
-impl<T: Lane> Law<T> {
+impl<T: Lane> LawParameters<T> {
     /// Sets the law of a lane's contact.
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, mu: f64, scales: ContactScales) {
@@ -59,13 +59,13 @@ impl<T: Lane> Law<T> {
 #[inline(always)]
 pub(super) fn judge<T: Lane, B: Store>(
     places: impl Iterator<Item = usize>,
-    laws: &B::Of<Law<T>>,
+    laws: &B::Of<LawParameters<T>>,
     p: &B::Of<Triple<T>>,
     u: &B::Of<Triple<T>>,
     zero: T,
-) -> Violations<T> {
+) -> LaneViolations<T> {
     let one = zero.like(1.0);
-    let mut sums = Violations::none(zero);
+    let mut sums = LaneViolations::none(zero);
     for i in places {
         let (law, p, u) = (&laws[i], &p[i], &u[i]);
         // The normal part: min(u_N, p_N/ρ_N).
@@ -89,7 +89,7 @@ pub(super) fn judge<T: Lane, B: Store>(
     sums
 }
 
-impl<T: Lane> Violations<T> {
+impl<T: Lane> LaneViolations<T> {
     /// No violation.
     #[inline(always)]
     pub(crate) fn none(like: T) -> Self {

@@ -5,8 +5,8 @@ use crate::law::associated::natural_map;
 use crate::problem::{Prepared, Residual};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
-use crate::solver::stage::admm::{self, Law};
+use crate::solver::scratch::SolveScratch;
+use crate::solver::stage::admm::{self, AdmmLaw};
 
 /// Residual of `(p, u)` under the relaxed law, with the same two numbers as for Coulomb's law.
 fn measure<const D: usize>(data: &Prepared<'_>, p: &[f64], u: &[f64]) -> Residual {
@@ -33,10 +33,10 @@ pub(in crate::solver) fn solve<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
-    let law = Law {
+    let law = AdmmLaw {
         shifts: false,
         measure: |p: &[f64], u: &[f64]| measure::<D>(data, p, u),
         solved: SolveStatus::SolvedRelaxed,

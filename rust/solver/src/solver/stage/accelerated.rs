@@ -10,7 +10,7 @@ use crate::solver::options::SolverOptions;
 use crate::solver::report::{SolveReport, SolveStatus};
 
 /// Quality of an answer.
-pub(super) struct Measured {
+pub(super) struct SolutionQuality {
     pub residual: Residual,
     /// pᵀu, J.
     pub work: f64,
@@ -18,7 +18,7 @@ pub(super) struct Measured {
     pub free: f64,
 }
 
-impl Measured {
+impl SolutionQuality {
     fn is_within(&self, options: &SolverOptions) -> bool {
         self.residual.relative <= options.tolerance
             && self.residual.velocity <= options.velocity_tolerance
@@ -28,10 +28,10 @@ impl Measured {
 /// Sweeps after which a problem counts as hard: every short cut ends then.
 const HARD: usize = 300;
 
-/// Sweeps before the first leaps, from one leap to the next, and those over which the drift is
-/// measured.
+/// Sweeps before the first extrapolation of drifts, from one to the next, and those over which a
+/// drift is measured.
 const EASY: usize = 100;
-const LEAP: usize = 20;
+const PERIOD: usize = 20;
 const DRIFT: usize = 5;
 
 /// Contacts that are swept.
@@ -48,16 +48,16 @@ pub(super) trait Relaxation {
 
     /// The residual as [`crate::problem::evaluate_into`] defines it, with the velocities summed
     /// anew from the impulses.
-    fn measure(&mut self) -> Measured;
+    fn measure(&mut self) -> SolutionQuality;
 
     /// Multiplies all impulses.
     fn scale(&mut self, share: f64);
 
-    /// Remembers the impulses from which [`Self::leap`] measures their drift.
+    /// Remembers the impulses from which [`Self::extrapolate_drift`] measures their drift.
     fn anchor(&mut self) {}
 
     /// Goes on along the drift as far as energy falls; whether it has.
-    fn leap(&mut self) -> bool {
+    fn extrapolate_drift(&mut self) -> bool {
         false
     }
 }
@@ -85,9 +85,12 @@ pub(super) fn accelerate<R: Relaxation>(
             last_change = change;
             if report.iterations >= EASY {
                 let since = report.iterations - EASY;
-                if since % LEAP == LEAP - DRIFT {
+                if since % PERIOD == PERIOD - DRIFT {
                     contacts.anchor();
-                } else if since >= LEAP && since.is_multiple_of(LEAP) && contacts.leap() {
+                } else if since >= PERIOD
+                    && since.is_multiple_of(PERIOD)
+                    && contacts.extrapolate_drift()
+                {
                     (t, last_change) = (1.0, f64::INFINITY);
                 }
             }

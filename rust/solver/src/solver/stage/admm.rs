@@ -20,7 +20,7 @@ use crate::law::coulomb::modified_velocity;
 use crate::problem::{Prepared, Residual};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
+use crate::solver::scratch::SolveScratch;
 
 /// Initial `σ`, dimensionless; balancing adapts it.
 const SIGMA: f64 = 0.1;
@@ -36,7 +36,7 @@ const LARGEST_CHANGE: f64 = 10.0;
 const MAX_CHANGES: usize = 40;
 
 /// Factors `W + R`; `false` if that fails or the budget does not allow it.
-fn factorise<const D: usize>(data: &Prepared<'_>, sigma: f64, scratch: &mut Scratch) -> bool {
+fn factorise<const D: usize>(data: &Prepared<'_>, sigma: f64, scratch: &mut SolveScratch) -> bool {
     let blocks = scratch.system.blocks.chunks_exact_mut(D * D);
     for ((weight, mass), block) in scratch.weights.iter_mut().zip(data.masses).zip(blocks) {
         *weight = 1.0 / mass;
@@ -120,7 +120,7 @@ fn right_side<const D: usize>(
 
 /// The law that ADMM solves: Coulomb's, or another with the same matrix and projection.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::solver) struct Law<M> {
+pub(in crate::solver) struct AdmmLaw<M> {
     /// Whether De Saxcé's shift is applied.
     pub shifts: bool,
     /// Residual of `(p, u)` under the law.
@@ -135,10 +135,10 @@ pub(in crate::solver) fn solve<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
-    let law = Law {
+    let law = AdmmLaw {
         shifts: true,
         measure: |p: &[f64], u: &[f64]| data.measure::<D>(p, u),
         solved: SolveStatus::Converged,
@@ -151,10 +151,10 @@ pub(in crate::solver) fn solve<const D: usize>(
 pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Residual>(
     data: &Prepared<'_>,
     options: &SolverOptions,
-    law: &Law<M>,
+    law: &AdmmLaw<M>,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let mut sigma = SIGMA;
@@ -192,7 +192,7 @@ pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Resi
                 return (status, data.measure::<D>(p, u));
             }
         }
-        let Scratch {
+        let SolveScratch {
             system,
             weights,
             direction: dual,

@@ -22,7 +22,7 @@ use crate::space::dot;
 /// A ball: its velocity with 1/m, and `r ω` with `r²/J`.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub(super) struct Ball {
+pub(super) struct BallVelocity {
     pub linear: [f64; 4],
     pub turning: [f64; 4],
 }
@@ -116,7 +116,7 @@ impl BallRow {
 
     /// u.
     #[inline(always)]
-    pub(super) fn velocity(&self, balls: &[Ball]) -> [f64; 3] {
+    pub(super) fn velocity(&self, balls: &[BallVelocity]) -> [f64; 3] {
         let [a, b] = self.bodies;
         let (a, b) = (&balls[a as usize], &balls[b as usize]);
         let mut rim = [0.0; 3];
@@ -132,7 +132,7 @@ impl BallRow {
 
     /// The effect of an impulse.
     #[inline(always)]
-    pub(super) fn add(&self, p: &[f64; 3], balls: &mut [Ball]) {
+    pub(super) fn add(&self, p: &[f64; 3], balls: &mut [BallVelocity]) {
         let turn = cross(p, &self.n);
         let [a, b] = self.bodies;
         let ball = &mut balls[a as usize];
@@ -152,7 +152,7 @@ impl BallRow {
     /// Solves the contact law from the impulse extrapolated by `share`; returns the square of its
     /// change.
     #[inline(always)]
-    pub(super) fn visit(&mut self, share: f64, balls: &mut [Ball]) -> f64 {
+    pub(super) fn visit(&mut self, share: f64, balls: &mut [BallVelocity]) -> f64 {
         let u = self.velocity(balls);
         let mut start = self.p;
         for k in 0..3 {
@@ -170,7 +170,7 @@ impl BallRow {
 
     /// Takes its part of velocities extrapolated by `share` back; the impulse stays.
     #[inline]
-    pub(super) fn take_back(&mut self, share: f64, balls: &mut [Ball]) {
+    pub(super) fn take_back(&mut self, share: f64, balls: &mut [BallVelocity]) {
         let mut back = [0.0; 3];
         for k in 0..3 {
             back[k] = -share * (self.p[k] - self.before[k]);
@@ -181,7 +181,7 @@ impl BallRow {
 
     /// Violation of Coulomb's law, measured as by [`crate::law::coulomb::violation`].
     #[inline(always)]
-    pub(super) fn judge(&self, balls: &[Ball]) -> Judged {
+    pub(super) fn judge(&self, balls: &[BallVelocity]) -> Judged {
         let u = self.velocity(balls);
         let mass = mass_of(self.inverse);
         let or_mass = |i: f64| if i > 0.0 { i } else { mass };
@@ -198,7 +198,7 @@ impl BallRow {
 /// Rolling and drilling friction of the contact of a [`BallRow`]. A visit of the row precedes each
 /// of its own, which takes the normal impulse as given.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RollRow {
+pub(super) struct BallRollRow {
     /// k of each body.
     levers: [f64; 2],
     law: RollingFriction,
@@ -211,7 +211,7 @@ pub(super) struct RollRow {
     pub before: [f64; 3],
 }
 
-impl RollRow {
+impl BallRollRow {
     pub(super) fn new(contact: &RollingContact, pair: &RoundPair<3>) -> Self {
         Self {
             levers: contact.levers,
@@ -225,7 +225,7 @@ impl RollRow {
 
     /// w.
     #[inline(always)]
-    fn velocity(&self, row: &BallRow, balls: &[Ball]) -> [f64; 3] {
+    fn velocity(&self, row: &BallRow, balls: &[BallVelocity]) -> [f64; 3] {
         let [a, b] = row.bodies.map(|body| &balls[body as usize].turning);
         let [k_a, k_b] = self.levers;
         std::array::from_fn(|k| k_a * a[k] - k_b * b[k] + self.q[k])
@@ -233,7 +233,7 @@ impl RollRow {
 
     /// The effect of an impulse.
     #[inline(always)]
-    pub(super) fn add(&self, s: &[f64; 3], row: &BallRow, balls: &mut [Ball]) {
+    pub(super) fn add(&self, s: &[f64; 3], row: &BallRow, balls: &mut [BallVelocity]) {
         let [k_a, k_b] = self.levers;
         for (body, lever) in row.bodies.into_iter().zip([k_a, -k_b]) {
             let turning = &mut balls[body as usize].turning;
@@ -253,7 +253,7 @@ impl RollRow {
     /// Solves the law of rolling friction from the impulse extrapolated by `share`; returns the
     /// square of its change.
     #[inline(always)]
-    pub(super) fn visit(&mut self, row: &BallRow, share: f64, balls: &mut [Ball]) -> f64 {
+    pub(super) fn visit(&mut self, row: &BallRow, share: f64, balls: &mut [BallVelocity]) -> f64 {
         let w = self.velocity(row, balls);
         let mut start = self.s;
         let mut wanted = self.s;
@@ -271,7 +271,7 @@ impl RollRow {
     /// Takes the rolling impulse's part of velocities extrapolated by `share` back; the impulse
     /// stays.
     #[inline]
-    pub(super) fn take_back(&mut self, row: &BallRow, share: f64, balls: &mut [Ball]) {
+    pub(super) fn take_back(&mut self, row: &BallRow, share: f64, balls: &mut [BallVelocity]) {
         let back = std::array::from_fn(|k| -share * (self.s[k] - self.before[k]));
         self.add(&back, row, balls);
         self.before = self.s;
@@ -279,7 +279,7 @@ impl RollRow {
 
     /// Violation of the law of rolling friction under the row's normal impulse.
     #[inline(always)]
-    pub(super) fn judge(&self, row: &BallRow, balls: &[Ball]) -> Judged {
+    pub(super) fn judge(&self, row: &BallRow, balls: &[BallVelocity]) -> Judged {
         let w = self.velocity(row, balls);
         let mass = if self.inverse > 0.0 {
             self.inverse
@@ -298,7 +298,7 @@ impl RollRow {
 
 /// A contact of the machine with a ball or with something fixed, in the contact's frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct MachineRow {
+pub(super) struct MachineBallRow {
     /// Place of its ball, or of what is fixed.
     pub ball: u32,
     frame: [[f64; 3]; 3],
@@ -312,7 +312,7 @@ pub(super) struct MachineRow {
     pub before: [f64; 3],
 }
 
-impl MachineRow {
+impl MachineBallRow {
     /// `ball`: its place, or that of what is fixed.
     pub(super) fn new(
         pairs: &BodyPairs<3>,
@@ -345,7 +345,7 @@ impl MachineRow {
         &self,
         pairs: &BodyPairs<3>,
         (i, p): (usize, &[f64; 3]),
-        balls: &[Ball],
+        balls: &[BallVelocity],
         own: &[f64],
     ) -> [f64; 3] {
         let ball = &balls[self.ball as usize];
@@ -367,7 +367,7 @@ impl MachineRow {
         pairs: &BodyPairs<3>,
         i: usize,
         p: &[f64; 3],
-        balls: &mut [Ball],
+        balls: &mut [BallVelocity],
         own: &mut [f64],
     ) {
         let world = to_world(&self.frame, p);
@@ -386,7 +386,7 @@ impl MachineRow {
         pairs: &BodyPairs<3>,
         i: usize,
         share: f64,
-        balls: &mut [Ball],
+        balls: &mut [BallVelocity],
         own: &mut [f64],
     ) -> f64 {
         let mut start = self.p;

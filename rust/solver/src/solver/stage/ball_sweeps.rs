@@ -12,16 +12,18 @@
 //! together.
 //!
 //! Threads are those of the pool that the caller runs in; outside a pool there is one. In a problem
-//! that is hard the impulses leap along their drift ([`super::ball_leap`]).
+//! that is hard the impulses are extrapolated along their drift ([`super::ball_extrapolation`]).
 
 #![allow(clippy::inline_always)] // a visit is one piece of code
 
-use super::accelerated::{Measured, Relaxation};
-use super::ball_leap::{Anchor, Leaping};
-use super::ball_rows::{Ball, BallRow, Judged, MachineRow, RollRow, mass_of, to_frame};
+use super::accelerated::{Relaxation, SolutionQuality};
+use super::ball_extrapolation::{Anchor, DriftTarget};
+use super::ball_rows::{
+    BallRollRow, BallRow, BallVelocity, Judged, MachineBallRow, mass_of, to_frame,
+};
 use crate::cone::draw_in;
 use crate::law::coulomb::violation;
-use crate::problem::{BodyPairs, Magnitudes, RollingContact, Violations};
+use crate::problem::{BodyPairs, Magnitudes, RollingContact, ViolationSums};
 use crate::solver::options::SolverOptions;
 use crate::space::{body_velocities, dot};
 
@@ -53,9 +55,9 @@ impl Rest {
     fn visit(
         &mut self,
         row: &mut BallRow,
-        roll: Option<&mut RollRow>,
+        roll: Option<&mut BallRollRow>,
         (share, quiet): (f64, f64),
-        balls: &mut [Ball],
+        balls: &mut [BallVelocity],
     ) -> f64 {
         if self.left > 0 {
             self.left -= 1;
@@ -88,7 +90,7 @@ struct Part<'a> {
     rows: &'a mut [BallRow],
     rests: &'a mut [Rest],
     /// None where no contact bears a moment.
-    rolls: &'a mut [RollRow],
+    rolls: &'a mut [BallRollRow],
 }
 
 impl Part<'_> {
@@ -107,7 +109,7 @@ impl Part<'_> {
     }
 
     /// Each row with the one that rolls.
-    fn rolling(&mut self) -> impl Iterator<Item = (&mut BallRow, &mut RollRow)> {
+    fn rolling(&mut self) -> impl Iterator<Item = (&mut BallRow, &mut BallRollRow)> {
         self.rows.iter_mut().zip(&mut *self.rolls)
     }
 }
@@ -118,15 +120,15 @@ pub(super) struct BallSweeps {
     rows: Vec<BallRow>,
     rests: Vec<Rest>,
     /// Rolling friction of each row; none where no contact has any.
-    rolls: Vec<RollRow>,
+    rolls: Vec<BallRollRow>,
     /// Square of a change below which a contact rests, N² s².
     quiet: f64,
     /// Number of each row's contact.
     order: Vec<u32>,
-    machine: Vec<MachineRow>,
+    machine: Vec<MachineBallRow>,
     /// Slab by slab; the first of each is fixed and stands for everything that is.
-    balls: Vec<Ball>,
-    before: Vec<Ball>,
+    balls: Vec<BallVelocity>,
+    before: Vec<BallVelocity>,
     /// Where each slab's balls begin.
     slabs: Vec<usize>,
     /// Where each block's rows begin, then those that reach farther than to the next slab.
@@ -153,7 +155,7 @@ pub(super) struct BallSolve<'a> {
 /// Sums of a measurement.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    violations: Violations,
+    violations: ViolationSums,
     work: f64,
     free: f64,
 }
@@ -202,8 +204,8 @@ impl Layout<'_> {
         parity: usize,
         range: std::ops::Range<usize>,
         rows: Part<'_>,
-        balls: &mut [Ball],
-        visit: &(impl Fn(Part<'_>, &mut [Ball]) -> T + Sync),
+        balls: &mut [BallVelocity],
+        visit: &(impl Fn(Part<'_>, &mut [BallVelocity]) -> T + Sync),
         plus: &(impl Fn(T, T) -> T + Sync),
     ) -> T {
         let first = parity + 2 * range.start;
@@ -245,7 +247,7 @@ impl BallSweeps {
             self.rolls
                 .extend(self.order.iter().zip(&self.rows).map(|(&i, row)| {
                     let i = i as usize;
-                    let mut roll = RollRow::new(&rolling[i], &pairs.round[i]);
+                    let mut roll = BallRollRow::new(&rolling[i], &pairs.round[i]);
                     roll.s = roll.admissible(row, &roll.s);
                     roll.before = roll.s;
                     roll
@@ -261,7 +263,7 @@ impl BallSweeps {
             } else {
                 0
             };
-            MachineRow::new(pairs, k, ball, &q[i], mu[i], &p[i])
+            MachineBallRow::new(pairs, k, ball, &q[i], mu[i], &p[i])
         }));
         self.data = Magnitudes::default();
         let (mut lightest, mut sum) = (f64::INFINITY, 0.0);
@@ -302,7 +304,8 @@ impl BallSweeps {
             self.slabs[k + 1] += self.slabs[k] + 1;
         }
         self.balls.clear();
-        self.balls.resize(self.slabs[n_slabs], Ball::default());
+        self.balls
+            .resize(self.slabs[n_slabs], BallVelocity::default());
         self.next.clear();
         let firsts = self.slabs[..n_slabs].iter();
         self.next.extend(firsts.map(|first| first + 1));
@@ -402,7 +405,7 @@ impl BallSweeps {
     /// Visits all contacts but the machine's: the sum of what they return.
     fn each<T: Send + Default>(
         &mut self,
-        visit: impl Fn(Part<'_>, &mut [Ball]) -> T + Sync,
+        visit: impl Fn(Part<'_>, &mut [BallVelocity]) -> T + Sync,
         plus: impl Fn(T, T) -> T + Sync,
     ) -> T {
         let n_slabs = self.slabs.len() - 1;
@@ -437,7 +440,7 @@ impl BallSweeps {
             ball.turning[..3].fill(0.0);
         }
         self.own.fill(0.0);
-        let add = |mut rows: Part<'_>, balls: &mut [Ball]| {
+        let add = |mut rows: Part<'_>, balls: &mut [BallVelocity]| {
             for row in &*rows.rows {
                 row.add(&row.p, balls);
             }
@@ -503,13 +506,18 @@ impl BallSweeps {
 fn all_rows<'a>(
     rows: &'a mut [BallRow],
     rests: &'a mut [Rest],
-    rolls: &'a mut [RollRow],
+    rolls: &'a mut [BallRollRow],
 ) -> Part<'a> {
     Part { rows, rests, rolls }
 }
 
 /// See [`BallSweeps::extrapolate`].
-fn extrapolate(balls: &mut [Ball], before: &mut [Ball], share: f64, is_parallel: bool) {
+fn extrapolate(
+    balls: &mut [BallVelocity],
+    before: &mut [BallVelocity],
+    share: f64,
+    is_parallel: bool,
+) {
     if is_parallel && balls.len() > FEW {
         let middle = balls.len() / 2;
         let (left, right) = balls.split_at_mut(middle);
@@ -542,7 +550,7 @@ impl Relaxation for BallSolve<'_> {
         // No change is below that.
         let quiet = if is_hard { -1.0 } else { self.sweeps.quiet };
         let shares = (share, quiet);
-        let visit = |rows: Part<'_>, balls: &mut [Ball]| {
+        let visit = |rows: Part<'_>, balls: &mut [BallVelocity]| {
             let Part { rows, rests, rolls } = rows;
             let mut change = 0.0;
             let both = rows.iter_mut().zip(rests);
@@ -570,9 +578,9 @@ impl Relaxation for BallSolve<'_> {
         change
     }
 
-    fn measure(&mut self) -> Measured {
+    fn measure(&mut self) -> SolutionQuality {
         self.sweeps.sum(self.pairs);
-        let judge = |mut rows: Part<'_>, balls: &mut [Ball]| {
+        let judge = |mut rows: Part<'_>, balls: &mut [BallVelocity]| {
             let mut sums = Sums::default();
             for row in &*rows.rows {
                 sums.add(&row.judge(balls));
@@ -595,7 +603,7 @@ impl Relaxation for BallSolve<'_> {
             sums.free += dot(&row.p, &row.q);
         }
         let [inverse_speed, inverse_data] = self.sweeps.data.inverses();
-        Measured {
+        SolutionQuality {
             residual: sums.violations.residual(inverse_speed, inverse_data),
             work: sums.work,
             free: sums.free,
@@ -612,7 +620,7 @@ impl Relaxation for BallSolve<'_> {
         anchor.set(rows, machine);
     }
 
-    fn leap(&mut self) -> bool {
+    fn extrapolate_drift(&mut self) -> bool {
         let BallSweeps {
             rows,
             rolls,
@@ -626,7 +634,7 @@ impl Relaxation for BallSolve<'_> {
             own_before,
             ..
         } = &mut *self.sweeps;
-        let leapt = anchor.leap(&mut Leaping {
+        let has_moved = anchor.extrapolate(&mut DriftTarget {
             pairs: self.pairs,
             rows,
             machine,
@@ -635,7 +643,7 @@ impl Relaxation for BallSolve<'_> {
             slabs,
             blocks,
         });
-        if leapt {
+        if has_moved {
             // The next sweep extrapolates nothing.
             for row in rows {
                 row.before = row.p;
@@ -649,7 +657,7 @@ impl Relaxation for BallSolve<'_> {
             before.clone_from(balls);
             own_before.clone_from(own);
         }
-        leapt
+        has_moved
     }
 
     fn scale(&mut self, share: f64) {

@@ -39,7 +39,7 @@ pub struct BodySweeps {
 
 /// What a solve starts from and returns, contact by contact.
 #[derive(Debug)]
-pub struct Answer<'a> {
+pub struct ContactSolution<'a> {
     /// Impulses (D `n_c`), N s: on entry the warm start, on return inside their cones.
     pub p: &'a mut [f64],
     /// Velocities (D `n_c`), m/s: on return.
@@ -56,7 +56,7 @@ pub trait Swept<const D: usize> {
         q: &[f64],
         mu: &[f64],
         options: &SolverOptions,
-        answer: Answer<'_>,
+        answer: ContactSolution<'_>,
         sweeps: &mut BodySweeps,
     ) -> SolveReport;
 }
@@ -67,10 +67,10 @@ impl Swept<2> for BodyPairs<2> {
         q: &[f64],
         mu: &[f64],
         options: &SolverOptions,
-        answer: Answer<'_>,
+        answer: ContactSolution<'_>,
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
-        let Answer { p, u, rolling } = answer;
+        let ContactSolution { p, u, rolling } = answer;
         sweeps.disks.fit(self, (q, mu, p), rolling);
         let mut report = unsolved();
         let mut solve = DiskSolve {
@@ -91,10 +91,10 @@ impl Swept<3> for BodyPairs<3> {
         q: &[f64],
         mu: &[f64],
         options: &SolverOptions,
-        answer: Answer<'_>,
+        answer: ContactSolution<'_>,
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
-        let Answer { p, u, rolling } = answer;
+        let ContactSolution { p, u, rolling } = answer;
         let BodySweeps { balls, helpers, .. } = sweeps;
         helpers.run(options.threads, || {
             balls.fit(self, (q, mu, p), rolling, options);
@@ -122,14 +122,14 @@ pub fn solve_body_pairs<const D: usize>(
     q: &[f64],
     mu: &[f64],
     options: &SolverOptions,
-    answer: Answer<'_>,
+    answer: ContactSolution<'_>,
     sweeps: &mut BodySweeps,
 ) -> SolveReport
 where
     BodyPairs<D>: Swept<D>,
 {
     let n = pairs.len();
-    let Answer { p, u, rolling } = answer;
+    let ContactSolution { p, u, rolling } = answer;
     assert!(
         q.len() == D * n && mu.len() == n && p.len() == D * n && u.len() == D * n,
         "q, mu, p and u must be of the same contacts"
@@ -153,7 +153,7 @@ where
             contact.impulse = [0.0; 3];
         }
     }
-    let answer = Answer {
+    let answer = ContactSolution {
         p: &mut *p,
         u: &mut *u,
         rolling: &mut *rolling,

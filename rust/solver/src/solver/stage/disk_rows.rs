@@ -29,7 +29,7 @@ pub(super) struct Row {
 
 /// Rolling friction of the contact of a [`Row`], which is visited before it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RollRow {
+pub(super) struct DiskRollRow {
     /// k of each disk.
     levers: [f64; 2],
     law: RollingFriction,
@@ -42,7 +42,7 @@ pub(super) struct RollRow {
     before: f64,
 }
 
-impl RollRow {
+impl DiskRollRow {
     /// `row`: that of the contact, whose impulse bounds the first one.
     pub(super) fn new(contact: &RollingContact, pair: &RoundPair<2>, row: &Row) -> Self {
         let w = contact.mobility(pair);
@@ -101,7 +101,7 @@ impl RollRow {
 
 /// A contact of the machine.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct MachineRow {
+pub(super) struct MachineDiskRow {
     /// The side of the round body, the second body.
     pub(super) round: Row,
     pub(super) block: [[f64; 2]; 2],
@@ -204,7 +204,7 @@ impl Row {
     }
 }
 
-impl MachineRow {
+impl MachineDiskRow {
     /// u of the machine's contact i.
     pub(super) fn local(
         &self,

@@ -3,10 +3,10 @@
 //! Sweeps visit four places of the list in turn, so that a contact need not wait for the results of
 //! the one before it.
 
-use super::accelerated::{Measured, Relaxation};
-use super::disk_rows::{MachineRow, RollRow, Row, Velocity};
+use super::accelerated::{Relaxation, SolutionQuality};
+use super::disk_rows::{DiskRollRow, MachineDiskRow, Row, Velocity};
 use crate::law::coulomb::violation;
-use crate::problem::{BodyPairs, Magnitudes, RollingContact, Violations};
+use crate::problem::{BodyPairs, Magnitudes, RollingContact, ViolationSums};
 use crate::space::{body_velocities, dot};
 
 /// Places of the list that are visited in turn.
@@ -19,8 +19,8 @@ pub(super) struct DiskSweeps {
     /// Number of each row's contact.
     order: Vec<u32>,
     /// Rolling friction of each row; none where no contact has any.
-    rolls: Vec<RollRow>,
-    machine: Vec<MachineRow>,
+    rolls: Vec<DiskRollRow>,
+    machine: Vec<MachineDiskRow>,
     /// Velocity of each body due to the impulses: of its centre, and r ω, m/s. The last entry
     /// stands for everything fixed.
     velocity: Vec<Velocity>,
@@ -68,7 +68,7 @@ impl DiskSweeps {
             self.rolls
                 .extend(self.order.iter().zip(&self.rows).map(|(&i, row)| {
                     let i = i as usize;
-                    RollRow::new(&rolling[i], &pairs.round[i], row)
+                    DiskRollRow::new(&rolling[i], &pairs.round[i], row)
                 }));
         }
         self.machine.clear();
@@ -77,7 +77,7 @@ impl DiskSweeps {
             let i = round + k;
             let block = pairs.machine_block(k);
             let scales = [block[0][0], block[1][1]];
-            MachineRow {
+            MachineDiskRow {
                 round: Row::new(pair, scales, still, &q[i], mu[i], &p[i]),
                 block,
             }
@@ -146,9 +146,9 @@ impl DiskSweeps {
         pairs: &BodyPairs<2>,
         (p, u): (&mut [f64], &mut [f64]),
         rolling: &mut [RollingContact],
-    ) -> Measured {
+    ) -> SolutionQuality {
         self.sum(pairs);
-        let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
+        let (mut violations, mut data) = (ViolationSums::default(), Magnitudes::default());
         let (mut work, mut free) = (0.0, 0.0);
         let mut judge = |i: usize, row: &Row, own: [f64; D]| {
             let [i_n, i_t] = row.inverse;
@@ -184,7 +184,7 @@ impl DiskSweeps {
         }
         let [inverse_speed, inverse_data] = data.inverses();
         let residual = violations.residual(inverse_speed, inverse_data);
-        Measured {
+        SolutionQuality {
             residual,
             work,
             free,
@@ -221,7 +221,7 @@ impl Relaxation for DiskSolve<'_> {
         self.sweeps.sweep(self.pairs, share)
     }
 
-    fn measure(&mut self) -> Measured {
+    fn measure(&mut self) -> SolutionQuality {
         let answer = (&mut *self.p, &mut *self.u);
         self.sweeps.measure(self.pairs, answer, self.rolling)
     }

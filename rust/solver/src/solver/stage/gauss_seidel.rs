@@ -10,7 +10,7 @@ use crate::scalar::elementary::ln;
 use crate::solver::local::sweep;
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
+use crate::solver::scratch::SolveScratch;
 use crate::solver::work::SweepBudget;
 
 /// Sweeps until converged or out of budget, under Coulomb's law. `u` is `W p + q` on return.
@@ -20,7 +20,7 @@ pub(in crate::solver) fn sweeps<const D: usize>(
     budget: SweepBudget,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let law = |i: usize| Coulomb(data.mu[i]);
@@ -34,13 +34,13 @@ pub(in crate::solver) fn sweeps_under<const D: usize, L: FrictionLaw<D>>(
     budget: SweepBudget,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let mut done = 0;
     let mut last = f64::INFINITY;
     let mut best = Residual::UNSOLVED;
-    let give_best = |status, best, p: &mut [f64], u: &mut [f64], scratch: &Scratch| {
+    let give_best = |status, best, p: &mut [f64], u: &mut [f64], scratch: &SolveScratch| {
         p.copy_from_slice(&scratch.best);
         data.W.multiply_add(p, data.q, u);
         (status, best)

@@ -9,10 +9,10 @@ use crate::cone::tangential_norm;
 use crate::law::mode::{ContactMode, Mode};
 use crate::law::one_contact::estimate_one_contact;
 use crate::problem::{Operator, Prepared, Residual};
-use crate::solver::linear::reduced_system::{Factors, NewtonStep};
+use crate::solver::linear::reduced_system::{Factorisation, NewtonStep};
 use crate::solver::local::modes;
 use crate::solver::options::SolverOptions;
-use crate::solver::scratch::Scratch;
+use crate::solver::scratch::SolveScratch;
 
 /// Number of sweeps, and of Newton steps that try their modes.
 const SWEEPS: usize = 4;
@@ -94,7 +94,7 @@ pub(in crate::solver) fn solve<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> Option<Residual> {
     let Operator::Dense(W) = data.W else {
@@ -112,14 +112,14 @@ pub(in crate::solver) fn solve<const D: usize>(
     p.fill(0.0);
     u.copy_from_slice(data.q);
     let alpha = options.regularisation * data.mean_diagonal;
-    let mut factors = Factors::None;
+    let mut factors = Factorisation::None;
     let mut last = f64::INFINITY;
     scratch.system.centre.fill(0.0);
     for step in 0..STEPS.min(options.max_newton_steps) {
-        if factors == Factors::None {
+        if factors == Factorisation::None {
             factors = (scratch.system).factorise::<D>(data, alpha, true, &mut scratch.work);
         }
-        if factors == Factors::None && scratch.system.m > 0 {
+        if factors == Factorisation::None && scratch.system.m > 0 {
             return None;
         }
         // The centre stays at zero until the slip directions are known. Otherwise the guess would
@@ -150,7 +150,7 @@ pub(in crate::solver) fn solve<const D: usize>(
             return None;
         }
         if progress > REUSE_CONTRACTION {
-            factors = Factors::None;
+            factors = Factorisation::None;
         }
         last = residual.relative;
         modes::turn::<D>(data.mu, p, u, &mut scratch.system.modes);

@@ -25,7 +25,7 @@ use crate::cone::lorentz::{determinant, dot, jordan, tangential, way_out};
 use crate::problem::{Prepared, Residual};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
+use crate::solver::scratch::SolveScratch;
 
 /// Range of the friction coefficients that the cones take: what lies outside becomes the nearest
 /// bound, and the next stage corrects the answer.
@@ -290,7 +290,7 @@ fn direct<const D: usize>(
     data: &Prepared<'_>,
     cones: &mut [Cone<D>],
     share: f64,
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
 ) {
     let dp = scratch.system.solve_shifted::<D>(data, |rhs| {
         for (cone, rhs) in cones.iter().zip(rhs.chunks_exact_mut(D)) {
@@ -307,7 +307,7 @@ fn take_step<const D: usize>(
     data: &Prepared<'_>,
     cones: &mut [Cone<D>],
     share: f64,
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
 ) -> f64 {
     let gap = mean_gap(cones, 0.0);
     cones.iter_mut().for_each(Cone::aim_at_boundary);
@@ -351,7 +351,7 @@ fn follow<const D: usize>(
     course: Course,
     best: &mut Residual,
     (p, u): (&mut [f64], &mut [f64]),
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) {
     let speed = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -408,7 +408,7 @@ pub(in crate::solver) fn solve<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);

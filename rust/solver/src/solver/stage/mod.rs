@@ -6,7 +6,7 @@
 
 mod accelerated;
 pub(super) mod admm;
-mod ball_leap;
+mod ball_extrapolation;
 mod ball_rows;
 mod ball_sweeps;
 pub(super) mod body_sweeps;

@@ -7,12 +7,12 @@
 //! `W` at the centre `c`.
 
 use crate::problem::{Prepared, Proximal, Residual};
-use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
+use crate::solver::linear::reduced_system::{Factorisation, NewtonStep, ReducedSystem};
 use crate::solver::local::modes;
 use crate::solver::local::sweep;
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
+use crate::solver::scratch::SolveScratch;
 use crate::solver::work;
 
 /// Most full steps before the safeguarded method takes over. Measured on the recorded problems:
@@ -49,7 +49,7 @@ struct Course {
     /// Current `α`, 1/kg.
     alpha: f64,
     /// Stored factors.
-    factors: Factors,
+    factors: Factorisation,
     /// Whether a symmetric factorisation may be used.
     allow_symmetric: bool,
     /// Whether the modes have ever changed, so that the exact predictor is used.
@@ -66,17 +66,17 @@ impl Course {
     /// friction.
     #[inline]
     fn revise(&mut self, progress: f64, [changed, slides]: [bool; 2], smallest: f64) {
-        if self.settled > 1 && progress > SLOW && self.factors != Factors::None {
-            if self.factors == Factors::Symmetric && self.allow_symmetric {
+        if self.settled > 1 && progress > SLOW && self.factors != Factorisation::None {
+            if self.factors == Factorisation::Symmetric && self.allow_symmetric {
                 // W may be unsymmetric, so that one triangle of it is not enough.
                 self.allow_symmetric = false;
             } else {
                 self.alpha = (0.01 * self.alpha).max(smallest);
             }
-            self.factors = Factors::None;
+            self.factors = Factorisation::None;
         }
         if changed || (slides && progress > REUSE_CONTRACTION) {
-            self.factors = Factors::None;
+            self.factors = Factorisation::None;
         }
     }
 }
@@ -89,7 +89,7 @@ fn predict<const D: usize>(
     course: &mut Course,
     p: &[f64],
     u: &[f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
 ) -> bool {
     let ReducedSystem { centre, modes, .. } = &mut scratch.system;
     let prox = Proximal {
@@ -122,7 +122,7 @@ fn break_cycle<const D: usize>(
     data: &Prepared<'_>,
     course: &mut Course,
     p: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
 ) -> bool {
     let prox = scratch.system.prox(course.alpha);
     if !scratch
@@ -135,7 +135,7 @@ fn break_cycle<const D: usize>(
         sweep::sweep::<D>(data, prox, p);
     }
     course.last = f64::INFINITY;
-    course.factors = Factors::None;
+    course.factors = Factorisation::None;
     true
 }
 
@@ -147,16 +147,16 @@ fn take_step<const D: usize>(
     course: &mut Course,
     p: &mut [f64],
     u: &[f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
 ) -> bool {
-    if course.factors == Factors::None {
+    if course.factors == Factorisation::None {
         course.factors = scratch.system.factorise::<D>(
             data,
             course.alpha,
             course.allow_symmetric,
             &mut scratch.work,
         );
-        if course.factors == Factors::None && scratch.system.m > 0 {
+        if course.factors == Factorisation::None && scratch.system.m > 0 {
             return false;
         }
     }
@@ -176,7 +176,7 @@ fn give_best(
     best: Residual,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &Scratch,
+    scratch: &SolveScratch,
 ) -> (SolveStatus, Residual) {
     p.copy_from_slice(&scratch.best);
     data.W.multiply_add(p, data.q, u);
@@ -194,12 +194,12 @@ pub(in crate::solver) fn full_steps<const D: usize>(
     max_steps: usize,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let mut course = Course {
         alpha: options.regularisation * data.mean_diagonal,
-        factors: Factors::None,
+        factors: Factorisation::None,
         allow_symmetric: true,
         exact: false,
         settled: 0,

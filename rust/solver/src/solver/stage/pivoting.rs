@@ -12,12 +12,12 @@ use crate::law::mode::{ContactMode, Mode};
 use crate::law::one_contact::solve_one_contact;
 use crate::problem::{ContactScales, Prepared, Residual};
 use crate::solver::draws::Draws;
-use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
+use crate::solver::linear::reduced_system::{Factorisation, NewtonStep, ReducedSystem};
 use crate::solver::options::SolverOptions;
 use crate::solver::pivoting::{FURTHER_ALPHAS, Many, NO_GAIN, Pivoting, System, Triple};
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
-use crate::solver::work::Work;
+use crate::solver::scratch::SolveScratch;
+use crate::solver::work::WorkBudget;
 
 /// Most systems to solve, unless there are more contacts.
 const MAX_PIVOTS: usize = 80;
@@ -40,11 +40,11 @@ const CONTINUED: f64 = 1e-4;
 struct PreparedSystem<'a, const D: usize> {
     data: &'a Prepared<'a>,
     reduced: &'a mut ReducedSystem,
-    work: &'a mut Work,
+    work: &'a mut WorkBudget,
     /// Impulses and velocities, `D` a contact.
     p: &'a mut [f64],
     u: &'a mut [f64],
-    factors: Factors,
+    factors: Factorisation,
     /// Whether the factors have not solved yet: their first solution is paid with them.
     is_fresh: bool,
 }
@@ -105,7 +105,7 @@ impl<const D: usize> System<f64, Many> for PreparedSystem<'_, D> {
         self.reduced.modes.copy_from_slice(modes);
         self.factors = (self.reduced).factorise::<D>(self.data, alpha, true, self.work);
         self.is_fresh = true;
-        self.factors != Factors::None || self.reduced.m == 0
+        self.factors != Factorisation::None || self.reduced.m == 0
     }
 
     fn solve(&mut self, modes: &Vec<Mode<f64>>, r: &mut Vec<Triple<f64>>) {
@@ -172,7 +172,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
     alpha: Option<f64>,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let pivoting = &mut scratch.pivoting;
@@ -183,7 +183,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
         work: &mut scratch.work,
         p,
         u,
-        factors: Factors::None,
+        factors: Factorisation::None,
         is_fresh: false,
     };
     let tolerances = [options.tolerance, options.velocity_tolerance].map(|x| x * x);
@@ -222,7 +222,7 @@ pub(in crate::solver) fn further_pivots<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let mut best: Option<(SolveStatus, Residual)> = None;
@@ -254,7 +254,7 @@ pub(in crate::solver) fn random_pivots<const D: usize>(
     attempts: usize,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let mut best = data.measure::<D>(p, u);

@@ -12,11 +12,11 @@
 //! a small `α` tries to finish with Newton's convergence.
 
 use crate::problem::{Prepared, Proximal, Residual};
-use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
+use crate::solver::linear::reduced_system::{Factorisation, NewtonStep, ReducedSystem};
 use crate::solver::local::{modes, sweep};
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
+use crate::solver::scratch::SolveScratch;
 use crate::solver::work;
 
 /// Most Newton steps for one value of `α`.
@@ -183,7 +183,7 @@ struct Task {
 }
 
 /// Accepts the answer of a sprint that gained enough; otherwise goes back to the accepted one.
-fn end_sprint(course: &mut Course, gained: bool, p: &mut [f64], scratch: &mut Scratch) {
+fn end_sprint(course: &mut Course, gained: bool, p: &mut [f64], scratch: &mut SolveScratch) {
     if gained {
         scratch.accepted.copy_from_slice(p);
     } else {
@@ -201,7 +201,7 @@ fn backtrack<const D: usize>(
     current: f64,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
 ) -> bool {
     for ((d, t), x) in scratch
         .direction
@@ -242,7 +242,7 @@ fn descend<const D: usize>(
     task: Task,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> bool {
     let Task {
@@ -268,7 +268,7 @@ fn descend<const D: usize>(
         let factors = (scratch.system).factorise::<D>(data, alpha, false, &mut scratch.work);
         *iterations += 1;
         let mut accepted = false;
-        if factors != Factors::None || scratch.system.m == 0 {
+        if factors != Factorisation::None || scratch.system.m == 0 {
             let newton_step = NewtonStep {
                 alpha,
                 factors,
@@ -314,7 +314,7 @@ pub(in crate::solver) fn solve<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);

@@ -11,7 +11,7 @@ use crate::scalar::elementary::sin_cos;
 use crate::solver::draws::Draws;
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::Scratch;
+use crate::solver::scratch::SolveScratch;
 
 /// Starts.
 const STARTS: usize = 16;
@@ -50,7 +50,7 @@ pub(in crate::solver) fn solve<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     p.copy_from_slice(&scratch.nearest);

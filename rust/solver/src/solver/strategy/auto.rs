@@ -4,8 +4,8 @@
 use super::islands::{self, IslandSolver};
 use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::options::{Method, SolverOptions};
-use crate::solver::report::{Outcome, SolveStatus, Stage};
-use crate::solver::scratch::Scratch;
+use crate::solver::report::{SolveStatus, Stage, StageResult};
+use crate::solver::scratch::SolveScratch;
 use crate::solver::stage::{
     gauss_seidel, guided, interior_point, newton, pivoting, proximal, restarts,
 };
@@ -39,7 +39,7 @@ struct Ladder<'a> {
     /// Iterations before the current stage.
     before: usize,
     /// The best answer, whose impulse is in the scratch.
-    nearest: Outcome,
+    nearest: StageResult,
 }
 
 impl<'a> Ladder<'a> {
@@ -47,7 +47,7 @@ impl<'a> Ladder<'a> {
         Self {
             options,
             before: 0,
-            nearest: Outcome {
+            nearest: StageResult {
                 method: Method::Newton,
                 stage: Stage::AtRest,
                 status: SolveStatus::Stalled,
@@ -63,9 +63,9 @@ impl<'a> Ladder<'a> {
         stage: Stage,
         found: (SolveStatus, Residual),
         p: &[f64],
-        scratch: &mut Scratch,
+        scratch: &mut SolveScratch,
         iterations: usize,
-    ) -> Option<Outcome> {
+    ) -> Option<StageResult> {
         self.enter_as(stage.method(), stage, found, p, scratch, iterations)
     }
 
@@ -77,9 +77,9 @@ impl<'a> Ladder<'a> {
         stage: Stage,
         (status, residual): (SolveStatus, Residual),
         p: &[f64],
-        scratch: &mut Scratch,
+        scratch: &mut SolveScratch,
         iterations: usize,
-    ) -> Option<Outcome> {
+    ) -> Option<StageResult> {
         let is_rounding = status != SolveStatus::NonFinite && self.options.is_rounding(residual);
         let status = if is_rounding {
             SolveStatus::Converged
@@ -88,7 +88,7 @@ impl<'a> Ladder<'a> {
         };
         let status = scratch.list_stage(stage, status, iterations - self.before);
         self.before = iterations;
-        let outcome = Outcome {
+        let outcome = StageResult {
             method,
             stage,
             status,
@@ -111,17 +111,17 @@ impl<'a> Ladder<'a> {
         data: &Prepared<'_>,
         p: &mut [f64],
         u: &mut [f64],
-        scratch: &Scratch,
-    ) -> Outcome {
+        scratch: &SolveScratch,
+    ) -> StageResult {
         if !self.nearest.residual.is_finite() {
-            return Outcome {
+            return StageResult {
                 status: SolveStatus::NonFinite,
                 ..self.nearest
             };
         }
         p.copy_from_slice(&scratch.nearest);
         data.W.multiply_add(p, data.q, u);
-        Outcome {
+        StageResult {
             status: scratch
                 .rungs
                 .as_slice()
@@ -139,10 +139,10 @@ fn sweep_many<const D: usize>(
     ladder: &mut Ladder<'_>,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     islands: IslandSolver<'_>,
     iterations: &mut usize,
-) -> Option<Outcome> {
+) -> Option<StageResult> {
     let options = ladder.options;
     let budget = SweepBudget {
         sweeps: sweep_budget(data),
@@ -178,9 +178,9 @@ fn pivot_from_start<const D: usize>(
     ladder: &mut Ladder<'_>,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
-) -> Option<Outcome> {
+) -> Option<StageResult> {
     let options = ladder.options;
     let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
     if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
@@ -210,9 +210,9 @@ fn sweep_separate<const D: usize>(
     ladder: &mut Ladder<'_>,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
-) -> Option<Outcome> {
+) -> Option<StageResult> {
     let once = SweepBudget {
         sweeps: 1,
         predict: false,
@@ -232,9 +232,9 @@ fn guide_from_rest<const D: usize>(
     ladder: &mut Ladder<'_>,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
-) -> Option<Outcome> {
+) -> Option<StageResult> {
     if data.mu.len() > 1 && data.W.is_uncoupled::<D>(data.n) {
         let found = sweep_separate::<D>(data, ladder, p, u, scratch, iterations);
         if found.is_some() {
@@ -260,9 +260,9 @@ fn descend<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
-) -> Option<Outcome> {
+) -> Option<StageResult> {
     let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
     ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
 }
@@ -279,9 +279,9 @@ fn pivot_from_attempt<const D: usize>(
     at_random: usize,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
-) -> Option<Outcome> {
+) -> Option<StageResult> {
     if data.measure::<D>(p, u).relative > NEAR {
         return None;
     }
@@ -306,9 +306,9 @@ fn descend_many<const D: usize>(
     ladder: &mut Ladder<'_>,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     iterations: &mut usize,
-) -> Option<Outcome> {
+) -> Option<StageResult> {
     let options = ladder.options;
     let brief = SolverOptions {
         max_newton_steps: ATTEMPT.min(options.max_newton_steps),
@@ -343,10 +343,10 @@ pub(in crate::solver) fn escalate<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    scratch: &mut Scratch,
+    scratch: &mut SolveScratch,
     islands: IslandSolver<'_>,
     iterations: &mut usize,
-) -> Outcome {
+) -> StageResult {
     let mut ladder = Ladder::new(options);
     scratch.start.copy_from_slice(p);
     let steps = newton::FULL_STEPS.min(options.max_newton_steps);

@@ -8,11 +8,11 @@
 use crate::law::coulomb::Coulomb;
 use crate::problem::{
     BlockSparseDelassus, Dimension, FrictionContactProblem, Operator, Prepared, Residual,
-    Violations, evaluate_contact,
+    ViolationSums, evaluate_contact,
 };
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{SolveReport, SolveStatus};
-use crate::solver::work::Work;
+use crate::solver::work::WorkBudget;
 
 /// Most contacts of an island whose `W` is copied as a dense matrix.
 const DENSE_ISLAND: usize = 64;
@@ -106,7 +106,7 @@ pub(in crate::solver) fn solve<const D: usize>(
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    work: &mut Work,
+    work: &mut WorkBudget,
     solver: IslandSolver<'_>,
     iterations: &mut usize,
 ) -> Option<(Method, SolveStatus, Residual)> {
@@ -169,7 +169,7 @@ fn is_solved<const D: usize>(
     u: &[f64],
 ) -> bool {
     let share = contacts.len() as f64 / data.mu.len() as f64;
-    let mut violations = Violations::default();
+    let mut violations = ViolationSums::default();
     for &i in contacts {
         let square = evaluate_contact::<D>(p, u, D * i, &Coulomb(data.mu[i]), data.modes[i]);
         violations.add(square, data.masses[i]);

@@ -12,7 +12,7 @@ use crate::problem::{
 };
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus};
-use crate::solver::stage::body_sweeps::{Answer, BodySweeps, Swept, solve_body_pairs};
+use crate::solver::stage::body_sweeps::{BodySweeps, ContactSolution, Swept, solve_body_pairs};
 
 /// Most contacts for which factorisation follows unsuccessful sweeps: a step then costs some 3 µs
 /// per contact.
@@ -57,7 +57,7 @@ impl<'a, const D: usize> ManyBodies<'a, D> {
 pub(in crate::solver) fn solve<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
-    answer: Answer<'_>,
+    answer: ContactSolution<'_>,
     sweeps: &mut BodySweeps,
     solve: &mut SolvePart<'_>,
 ) -> SolveReport
@@ -83,7 +83,7 @@ where
 fn escalate<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
-    Answer { p, u, .. }: Answer<'_>,
+    ContactSolution { p, u, .. }: ContactSolution<'_>,
     sweeps: &mut BodySweeps,
     solve: &mut SolvePart<'_>,
 ) -> SolveReport
@@ -92,7 +92,7 @@ where
 {
     let mut sweep = |p: &mut [f64], u: &mut [f64]| {
         let rolling = &mut [];
-        let answer = Answer { p, u, rolling };
+        let answer = ContactSolution { p, u, rolling };
         solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, answer, sweeps)
     };
     let mut report = sweep(p, u);

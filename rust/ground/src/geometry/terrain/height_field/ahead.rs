@@ -11,7 +11,7 @@ use super::neighbourhood::ROUNDING;
 use super::wheel::OFF;
 use super::{Half, HeightField, narrow};
 use crate::geometry::shape::Disc;
-use crate::geometry::terrain::surface::{Edge, LEAN, Wall};
+use crate::geometry::terrain::surface::{Edge, EdgeHalfSpace, LEAN};
 use crate::geometry::terrain::{Coverage, Primitive, Terrain};
 
 /// Sine of the angle up to which an axle is level enough.
@@ -25,7 +25,7 @@ const MOST_SLOPE: f64 = 0.64;
 const FINE: f64 = 0.5;
 
 /// Longest motion, in sides of a cell.
-const LEAP: f64 = 0.3;
+const LONGEST: f64 = 0.3;
 
 /// Cosine between the axle and a normal up to which the lowest point moves by no more than 1.5
 /// radii times the way of the axle's tip.
@@ -62,7 +62,7 @@ impl HeightField {
     ) -> Option<f64> {
         let (c, s, R) = (&disc.centre, &disc.axle, disc.radius);
         let cell = self.spacing[0].min(self.spacing[1]);
-        let ahead = ahead.min(LEAP * cell);
+        let ahead = ahead.min(LONGEST * cell);
         let tilt = s.y.abs() + ahead / R;
         let around = R + reach + ahead;
         let is_known = || self.coverage(c, around) == Coverage::Known;
@@ -208,7 +208,7 @@ impl Search<'_> {
     /// Whether a lowest point may come to be on a face's side of a wall. `from`: place of the
     /// disc's centre from the place from which the point is, m.
     #[inline]
-    fn may_pass(&self, wall: &Wall, low: &Lowest, from: &Vector3<f64>) -> bool {
+    fn may_pass(&self, wall: &EdgeHalfSpace, low: &Lowest, from: &Vector3<f64>) -> bool {
         wall.beyond(&(self.disc.centre - from + low.point)) <= self.ahead + ROUNDING
     }
 

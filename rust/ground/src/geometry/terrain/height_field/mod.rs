@@ -339,7 +339,7 @@ impl HeightField {
     }
 
     /// Visits the borders of a cell's faces.
-    fn visit_rims_of(&self, [i, j]: [usize; 2], visit: &mut dyn FnMut(&super::Rim)) {
+    fn visit_rims_of(&self, [i, j]: [usize; 2], visit: &mut dyn FnMut(&super::BorderEdge)) {
         let first = number(j * self.columns + i);
         self.patch([i, j]).visit_borders(first, visit);
     }

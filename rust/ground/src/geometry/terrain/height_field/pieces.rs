@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::{Half, HeightField, Place};
 use crate::geometry::terrain::plane::Plane;
-use crate::geometry::terrain::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
-use crate::geometry::terrain::{Primitive, Rim};
+use crate::geometry::terrain::surface::{Edge, EdgeHalfSpace, Face, Hinge, MAX_SPOKES, Vertex};
+use crate::geometry::terrain::{BorderEdge, Primitive};
 
 /// Number of the vertex among a corner's pieces.
 const VERTEX: u32 = 5;
@@ -16,7 +16,7 @@ const SPOKES: [Place; 6] = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
 /// The heights of a cell and around it: all that its pieces depend on. Places are relative to the
 /// cell's corner.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Patch<'a> {
+pub(super) struct CellNeighbourhood<'a> {
     field: &'a HeightField,
     corner: Place,
     /// Rows and columns from −1 to 2; nan where there is none.
@@ -26,7 +26,7 @@ pub(super) struct Patch<'a> {
 impl HeightField {
     /// Around a corner, which may be the last of a row or column.
     #[inline]
-    pub(super) fn patch(&self, [i, j]: [usize; 2]) -> Patch<'_> {
+    pub(super) fn patch(&self, [i, j]: [usize; 2]) -> CellNeighbourhood<'_> {
         let corner @ [x, y] = [i, j].map(super::narrow);
         let is_inside = i > 0 && j > 0 && i + 2 < self.columns && j + 2 < self.rows;
         let heights = if is_inside {
@@ -39,7 +39,7 @@ impl HeightField {
             let ahead = [-1, 0, 1, 2];
             ahead.map(|v| ahead.map(|u| self.corner([x + u, y + v])))
         };
-        Patch {
+        CellNeighbourhood {
             field: self,
             corner,
             heights,
@@ -47,7 +47,7 @@ impl HeightField {
     }
 }
 
-impl Patch<'_> {
+impl CellNeighbourhood<'_> {
     #[inline]
     #[allow(clippy::cast_sign_loss)] // −1 to 2
     fn height(&self, [u, v]: Place) -> f64 {
@@ -104,7 +104,7 @@ impl Patch<'_> {
     /// The wall of a face with the unit normal n at an edge of which it is the first face (0) or
     /// the second. A face without a neighbour there is bounded as if the surface went on flat.
     #[inline]
-    fn wall(&self, n: &Vector3<f64>, (place, k): (Place, u32), number: usize) -> Wall {
+    fn wall(&self, n: &Vector3<f64>, (place, k): (Place, u32), number: usize) -> EdgeHalfSpace {
         let other = self
             .normal(Self::faces_at(place, k)[1 - number])
             .unwrap_or(*n);
@@ -118,7 +118,7 @@ impl Patch<'_> {
     }
 
     /// Visits the borders of the cell's faces.
-    pub(super) fn visit_borders(&self, first: u32, visit: &mut dyn FnMut(&Rim)) {
+    pub(super) fn visit_borders(&self, first: u32, visit: &mut dyn FnMut(&BorderEdge)) {
         let number = |[u, v]: Place| {
             let [i, j] = self.corner;
             let corner = usize::try_from((j + v) * super::narrow(self.field.columns) + i + u);
@@ -137,7 +137,7 @@ impl Patch<'_> {
                     ends.reverse();
                 }
                 let [start, end] = ends.map(|place| self.point(place));
-                visit(&Rim {
+                visit(&BorderEdge {
                     face: first + u32::from(k == 1),
                     wall,
                     piece: None,

@@ -7,7 +7,7 @@ use crate::geometry::ray::{self, Hit, Ray};
 use crate::geometry::shape::{Disc, Sphere};
 use crate::geometry::terrain::surface::Vertex;
 use crate::geometry::terrain::{
-    Area, Coverage, GROUND, Neighbourhood, Plane, Primitive, Rim, Terrain,
+    Area, BorderEdge, Coverage, GROUND, Neighbourhood, Plane, Primitive, Terrain,
 };
 
 impl Terrain for HeightField {
@@ -141,7 +141,7 @@ impl Terrain for HeightField {
         self.coverage(place, radius + self.spacing[0].max(self.spacing[1])) != Coverage::Known
     }
 
-    fn visit_rims(&self, visit: &mut dyn FnMut(&Rim)) {
+    fn visit_rims(&self, visit: &mut dyn FnMut(&BorderEdge)) {
         let last = [self.columns - 2, self.rows - 2];
         for j in 0..=last[1] {
             let is_outer = j == 0 || j == last[1] || self.tiles.has_hole();

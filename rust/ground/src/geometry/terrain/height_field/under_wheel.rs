@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use super::cells::{CELLS, Cells};
 use super::neighbourhood::{AWAY, ROUNDING};
-use super::wheel::{KINDS, STEEP, Wheel};
+use super::wheel::{KINDS, STEEP, SweptWheel};
 use super::{HeightField, index, narrow};
 use crate::geometry::shape::{Disc, Roller, SupportMap};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
@@ -51,7 +51,7 @@ impl HeightField {
         disc: &Disc,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        let wheel = Wheel {
+        let wheel = SweptWheel {
             part,
             disc,
             half: 0.0,
@@ -67,7 +67,7 @@ impl HeightField {
         roller: &Roller,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        let wheel = Wheel {
+        let wheel = SweptWheel {
             part,
             disc: &roller.core,
             half: roller.half,
@@ -76,7 +76,7 @@ impl HeightField {
         self.visit_under(&wheel, visit);
     }
 
-    fn visit_under(&self, wheel: &Wheel<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
+    fn visit_under(&self, wheel: &SweptWheel<'_>, visit: &mut dyn FnMut(u32, &Primitive)) {
         let part = wheel.part;
         let radius = part.shape.bound() + part.reach;
         let around = |axis: &Vector3<f64>| part.extent(axis) + part.reach + SHALLOW * radius;
@@ -107,7 +107,7 @@ impl HeightField {
     }
 
     /// Searches the strip along the wheel. Whether it suffices.
-    fn search_strip(&self, wheel: &Wheel<'_>, region: &Region, found: &mut Found) -> bool {
+    fn search_strip(&self, wheel: &SweptWheel<'_>, region: &Region, found: &mut Found) -> bool {
         let (c, axle, radius) = (&wheel.part.centre, &wheel.disc.axle, region.radius);
         let [dx, dz] = self.spacing;
         // Half the width of what the wheel crosses, by the cells' middles along the axle, for all
@@ -144,7 +144,7 @@ impl HeightField {
 
     /// Whether a face may look away from the wheel that lies beside it.
     #[cold]
-    fn may_look_away(&self, wheel: &Wheel<'_>, region: &Region) -> bool {
+    fn may_look_away(&self, wheel: &SweptWheel<'_>, region: &Region) -> bool {
         let beyond = |[a, b]: [usize; 2], n: usize| [a.saturating_sub(1), (b + 1).min(n - 2)];
         let columns = beyond(region.columns, self.columns);
         let slope = (self.tiles).steepest(columns, beyond(region.rows, self.rows));
@@ -155,7 +155,7 @@ impl HeightField {
     #[cold]
     fn visit_not_clear(
         &self,
-        wheel: &Wheel<'_>,
+        wheel: &SweptWheel<'_>,
         region: &Region,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
@@ -213,7 +213,7 @@ impl HeightField {
     }
 
     /// Whether the wheel, smaller by a depth (m), is over the planes of both faces of a cell.
-    fn is_under(&self, cell: [usize; 2], wheel: &Wheel<'_>, depth: f64) -> bool {
+    fn is_under(&self, cell: [usize; 2], wheel: &SweptWheel<'_>, depth: f64) -> bool {
         let from = wheel.part.centre - self.point(cell.map(narrow));
         let radius = wheel.disc.radius + wheel.reach() - depth;
         let half = wheel.half + wheel.reach();
@@ -230,7 +230,7 @@ impl HeightField {
     /// took all of them.
     fn take(
         &self,
-        wheel: &Wheel<'_>,
+        wheel: &SweptWheel<'_>,
         cells: &mut Cells,
         mut take: impl FnMut(([usize; 2], u32)) -> bool,
     ) -> bool {
@@ -256,7 +256,7 @@ impl HeightField {
     }
 
     /// Which pieces of cells a wheel may touch: for each kind a bit for each cell.
-    fn compare(&self, wheel: &Wheel<'_>, cells: &Cells) -> [u32; KINDS] {
+    fn compare(&self, wheel: &SweptWheel<'_>, cells: &Cells) -> [u32; KINDS] {
         match Instructions::of_this_machine() {
             Instructions::Baseline => self.compare_with::<f64>(Single::Baseline, wheel, cells),
             #[cfg(target_arch = "x86_64")]
@@ -269,7 +269,7 @@ impl HeightField {
     fn compare_with<T: Lane>(
         &self,
         token: T::Token,
-        wheel: &Wheel<'_>,
+        wheel: &SweptWheel<'_>,
         cells: &Cells,
     ) -> [u32; KINDS] {
         T::vectorize(

@@ -3,7 +3,7 @@
 //! Of a cell's faces those count whose plane is within reach of the lowest point of one of the
 //! wheel's circles over it, if this point is about over the face; of its edges those that are
 //! convex and between two such planes, with the lowest points over them beyond the edge. A cell
-//! with a steep face around it is told apart: there a lowest point may be far off its face.
+//! with a steep face around it is treated apart: there a lowest point may be far off its face.
 
 use super::cells::Cells;
 use super::neighbourhood::ROUNDING;
@@ -43,7 +43,7 @@ pub(super) const STEEP: usize = 6;
 /// A wheel: a disc in its middle, the distance of its circles from there, 0 if there is one, and
 /// what they are swept by, m.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wheel<'a> {
+pub(super) struct SweptWheel<'a> {
     pub part: &'a Neighbourhood<'a>,
     pub disc: &'a Disc,
     pub half: f64,
@@ -69,7 +69,7 @@ struct Planes<T> {
     along: [T; 4],
 }
 
-impl Wheel<'_> {
+impl SweptWheel<'_> {
     /// Which pieces the wheel may touch, of the cells from number `at` on.
     #[inline(always)]
     pub fn compare<T: Lane>(

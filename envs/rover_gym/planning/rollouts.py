@@ -1,4 +1,4 @@
-"""Futures of a rover: the same state driven on by many sequences of commands, side by side in the core's batch."""
+"""Roll-outs of a rover: the same state driven on by many sequences of commands, side by side in the core's batch."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
@@ -13,7 +13,7 @@ from rover_gym.validation import number, whole
 
 Array = npt.NDArray[np.float64]
 
-#: Solver of the futures: their physics is coarser than the environment's.
+#: Solver of the roll-outs: their physics is coarser than the environment's.
 SOLVER: dict[str, Any] = {"tolerance": 1e-4, "max_iterations": 20}
 
 
@@ -25,11 +25,11 @@ class Controller(Protocol):
 
 
 class Ends(NamedTuple):
-    """How futures ended; an entry for each.
+    """How roll-outs ended; an entry for each.
 
     Attributes:
         place: (n, 2) x and z of the trunk's origin, m.
-        time: (n,) how long the future lasted, s.
+        time: (n,) how long the roll-out lasted, s.
         reached: (n,) whether it reached the goal.
         failed: (n,) whether its episode ended otherwise.
         energy: (n,) work of the wheel motors, driving or braking, J.
@@ -46,17 +46,17 @@ class Ends(NamedTuple):
     stuck: Array
 
 
-class Futures:
+class Rollouts:
     """Drives copies of an environment's rover through sequences of commands.
 
     Args:
         env: The environment, whose state each call of `drive` reads; it does not change.
         n: Number of copies.
-        time_step: Largest physics step of the futures, s; the control period is divided into equal ones.
+        time_step: Largest physics step of the roll-outs, s; the control period is divided into equal ones.
         threads: Threads that step them; None for one per core.
-        model: The rover of the futures, its name in the gallery or its file; the episode's by default. Use
+        model: The rover of the roll-outs, its name in the gallery or its file; the episode's by default. Use
             another one to study model errors.
-        friction: Friction of wheels and ground in the futures; the episode's by default.
+        friction: Friction of wheels and ground in the roll-outs; the episode's by default.
 
     Raises:
         OptionError: An argument is out of its range, or the model has other joints.
@@ -88,7 +88,7 @@ class Futures:
         self._place, self._scale = [q.start, q.start + 2], task.layout.scale[[q.start, q.start + 2]]
 
     def _simulation(self, terrain: Terrain) -> Simulation:
-        """A rover of the futures on a terrain, at rest in the zero configuration."""
+        """A rover of the roll-outs on a terrain, at rest in the zero configuration."""
         domain = self._env.domain
         if self._has_own_model:
             domain = replace(domain, mass_scale=1.0)
@@ -103,10 +103,10 @@ class Futures:
             controller: Turns commands into actions: `CommandController`, for instance.
             commands: (n, knots, size of a command) within [-1, 1].
             hold: Control periods that each command is held.
-            terrain: The ground of the futures; the episode's by default.
+            terrain: The ground of the roll-outs; the episode's by default.
 
         Returns:
-            How each future ended: at its end, or where its episode did.
+            How each roll-out ended: at its end, or where its episode did.
         """
         plan = np.asarray(commands, dtype=np.float64)
         now, snapshot = self._env.simulation, self._env.snapshot()
@@ -127,14 +127,14 @@ class Futures:
             alive &= ~ended
             if not alive.any():
                 break
-        told: dict[str, Any] = self._batch.infos()
-        reached = np.asarray(told["termination"]) == "goal"
+        infos: dict[str, Any] = self._batch.infos()
+        reached = np.asarray(infos["termination"]) == "goal"
         return Ends(
             seen[:, self._place].astype(np.float64) * self._scale,
             time,
             reached,
             ~alive & ~reached,
-            np.asarray(told["energy"]) - self._env.progress.info()["energy"],
-            np.asarray(told["tilt"]),
+            np.asarray(infos["energy"]) - self._env.progress.info()["energy"],
+            np.asarray(infos["tilt"]),
             seen[:, self._stuck].astype(np.float64),
         )

@@ -219,7 +219,7 @@ class MassCentre {
 }
 
 // All of them, as far as a scene holds what they show.
-class Sights {
+class Markers {
   constructor(view) {
     this.view = view;
     const { scene } = view;

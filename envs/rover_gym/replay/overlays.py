@@ -68,7 +68,7 @@ def hits(sensor: LaserScanner | DepthCamera, model: RoverModel, reading: Array) 
 
 
 @dataclass
-class Sights:
+class Overlays:
     """What there is to show of n samples.
 
     Attributes:
@@ -150,7 +150,7 @@ class Sights:
             scene.facts["arcs"] = self.arcs.shape[1]
 
 
-def sights_now(env: RoverEnv, driver: Policy | None, state: Any, sensors: Sequence[str] = SENSORS) -> Sights:
+def live_overlays(env: RoverEnv, driver: Policy | None, state: Any, sensors: Sequence[str] = SENSORS) -> Overlays:
     """What a rover sees now, and what its driver intends.
 
     Args:
@@ -160,21 +160,21 @@ def sights_now(env: RoverEnv, driver: Policy | None, state: Any, sensors: Sequen
         sensors: Names of the sensors that the rover carries.
     """
     simulation = env.simulation
-    sights = Sights(scan=env.task.scan)
-    if sights.scan is None:
-        sights.missing["scan"] = NO_LIVE_SCAN
+    overlays = Overlays(scan=env.task.scan)
+    if overlays.scan is None:
+        overlays.missing["scan"] = NO_LIVE_SCAN
     else:
-        sights.heights = scan_heights(sights.scan, simulation.terrain, simulation.q[None])
-    sights.readings = {name: distances(name, simulation)[None] for name in sensors}
+        overlays.heights = scan_heights(overlays.scan, simulation.terrain, simulation.q[None])
+    overlays.readings = {name: distances(name, simulation)[None] for name in sensors}
     if driver is None or not hasattr(driver, "plan"):
-        sights.missing["plan"] = NO_LIVE_PLAN
+        overlays.missing["plan"] = NO_LIVE_PLAN
     else:
         path = driver.plan(state)
-        sights.path = np.full((1, PLAN_POINTS, 2), np.nan) if path is None else path[None]
+        overlays.path = np.full((1, PLAN_POINTS, 2), np.nan) if path is None else path[None]
         choices = getattr(driver, "choices", None)
-        sights.arcs = None if choices is None else choices()
-        sights.lay(simulation.terrain, simulation.q[None])
-    return sights
+        overlays.arcs = None if choices is None else choices()
+        overlays.lay(simulation.terrain, simulation.q[None])
+    return overlays
 
 
 def scan_heights(scan: Array, terrain: Terrain, q: Array) -> Array:
@@ -195,7 +195,7 @@ def draped(points: Array, terrain: Terrain, q: Array) -> Array:
     return np.where(np.isfinite(heights), heights, q[:, 1, None])
 
 
-def recorded_sights(data: Mapping[str, Array], scene: Mapping[str, Any], terrain: Terrain) -> Sights:
+def recorded_overlays(data: Mapping[str, Array], scene: Mapping[str, Any], terrain: Terrain) -> Overlays:
     """What a recording holds.
 
     Args:
@@ -203,24 +203,24 @@ def recorded_sights(data: Mapping[str, Array], scene: Mapping[str, Any], terrain
         scene: Its scene, as `rover drive` describes it.
         terrain: Its ground.
     """
-    sights = Sights()
+    overlays = Overlays()
     given = scene.get("height_scan")
     scan = check_scan("height_scan", tuple(given) if isinstance(given, list) else given)
     if scan is None or "q" not in data:
-        sights.missing["scan"] = NO_SCAN
+        overlays.missing["scan"] = NO_SCAN
     else:
-        sights.scan, sights.heights = scan.offsets, scan_heights(scan.offsets, terrain, data["q"])
+        overlays.scan, overlays.heights = scan.offsets, scan_heights(scan.offsets, terrain, data["q"])
     for name in SENSORS:
         if name in data:
-            sights.readings[name] = data[name]
+            overlays.readings[name] = data[name]
         else:
-            sights.missing[name] = NO_SENSOR.format(name, name)
+            overlays.missing[name] = NO_SENSOR.format(name, name)
     if PATH in data:
-        sights.path = data[PATH].reshape(len(data[PATH]), -1, 2)
+        overlays.path = data[PATH].reshape(len(data[PATH]), -1, 2)
         if isinstance(scene.get("arcs"), list):
-            sights.arcs = np.asarray(scene["arcs"], dtype=np.float64)
+            overlays.arcs = np.asarray(scene["arcs"], dtype=np.float64)
         if "q" in data:
-            sights.lay(terrain, data["q"])
+            overlays.lay(terrain, data["q"])
     else:
-        sights.missing["plan"] = NO_PLAN
-    return sights
+        overlays.missing["plan"] = NO_PLAN
+    return overlays

@@ -1,4 +1,5 @@
-//! Leaps: where the impulses of [`super::ball_sweeps`] drift, they go on along their drift at once.
+//! Extrapolation of drifts: where the impulses of [`super::ball_sweeps`] drift, they go on along
+//! their drift at once.
 //!
 //! A heavy machine on light balls leaves the sweeps slow directions. A chain of balls that bears
 //! the machine, or that no longer should, changes by about the mass of one ball times a residual
@@ -11,23 +12,23 @@
 //! A share ends where the first contact of the cluster that loses much opens. The next sweep puts
 //! impulses outside their cones back.
 
-use super::ball_rows::{Ball, BallRow, MachineRow};
+use super::ball_rows::{BallRow, BallVelocity, MachineBallRow};
 use crate::problem::BodyPairs;
 use crate::space::dot;
 
-/// Largest and smallest share. A shorter leap is not worth the sweeps' extrapolation, which it
-/// ends.
+/// Largest and smallest share. A shorter one is not worth Nesterov's extrapolation of the
+/// sweeps, which it ends.
 const LONGEST: f64 = 1e3;
 const SHORTEST: f64 = 5.0;
 
-/// Contacts whose normal impulse falls by less than this part of the largest fall do not end a
-/// leap.
+/// Contacts whose normal impulse falls by less than this part of the largest fall do not end
+/// an extrapolation.
 const SMALL: f64 = 0.3;
 
 /// Contacts that drift by less than this part of the largest drift belong to no cluster.
 const STILL: f64 = 0.1;
 
-/// Where a drift starts, and scratch of a leap.
+/// Where a drift starts, and scratch of its extrapolation.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Anchor {
     /// Impulses of round contacts, then of the machine's.
@@ -39,18 +40,18 @@ pub(super) struct Anchor {
     parents: Vec<u32>,
     /// Cluster and contact.
     members: Vec<(u32, u32)>,
-    /// Velocities of a cluster's drift; zero between leaps.
-    velocities: Vec<Ball>,
+    /// Velocities of a cluster's drift; zero between extrapolations.
+    velocities: Vec<BallVelocity>,
     own: Vec<f64>,
     touched: Vec<u32>,
 }
 
-/// What a leap changes.
-pub(super) struct Leaping<'a> {
+/// The iterate that an extrapolation changes.
+pub(super) struct DriftTarget<'a> {
     pub pairs: &'a BodyPairs<3>,
     pub rows: &'a mut [BallRow],
-    pub machine: &'a mut [MachineRow],
-    pub balls: &'a mut [Ball],
+    pub machine: &'a mut [MachineBallRow],
+    pub balls: &'a mut [BallVelocity],
     /// Velocity of the machine due to the impulses, in its factor coordinates.
     pub own: &'a mut [f64],
     /// Where each slab's balls begin; the first of each is fixed.
@@ -70,26 +71,26 @@ fn root(parents: &mut [u32], mut k: u32) -> u32 {
 
 impl Anchor {
     /// Remembers where a drift starts.
-    pub(super) fn set(&mut self, rows: &[BallRow], machine: &[MachineRow]) {
+    pub(super) fn set(&mut self, rows: &[BallRow], machine: &[MachineBallRow]) {
         self.impulses.clear();
         self.impulses.extend(rows.iter().map(|row| row.p));
         self.impulses.extend(machine.iter().map(|row| row.p));
     }
 
-    /// Adds a share of its drift to each cluster; whether any leapt.
-    pub(super) fn leap(&mut self, at: &mut Leaping<'_>) -> bool {
+    /// Adds a share of its drift to each cluster; whether any was extrapolated.
+    pub(super) fn extrapolate(&mut self, at: &mut DriftTarget<'_>) -> bool {
         self.find_drifts(at);
         self.find_clusters(at);
         let members = std::mem::take(&mut self.members);
         let mut any = false;
         for cluster in members.chunk_by(|a, b| a.0 == b.0) {
-            any |= self.leap_cluster(cluster, at);
+            any |= self.extrapolate_cluster(cluster, at);
         }
         self.members = members;
         any
     }
 
-    fn find_drifts(&mut self, at: &Leaping<'_>) {
+    fn find_drifts(&mut self, at: &DriftTarget<'_>) {
         let now = (at.rows.iter().map(|row| row.p)).chain(at.machine.iter().map(|row| row.p));
         let both = now.zip(&self.impulses);
         self.drifts.clear();
@@ -97,7 +98,7 @@ impl Anchor {
             .extend(both.map(|(p, old)| [p[0] - old[0], p[1] - old[1], p[2] - old[2]]));
     }
 
-    fn find_clusters(&mut self, at: &Leaping<'_>) {
+    fn find_clusters(&mut self, at: &DriftTarget<'_>) {
         let n_slabs = at.slabs.len() - 1;
         self.places.clear();
         for block in 0..=n_slabs {
@@ -147,7 +148,7 @@ impl Anchor {
     }
 
     /// Sums the velocities of a cluster's drift.
-    fn sum(&mut self, cluster: &[(u32, u32)], at: &Leaping<'_>) {
+    fn sum(&mut self, cluster: &[(u32, u32)], at: &DriftTarget<'_>) {
         self.own.clear();
         self.own.resize(at.own.len(), 0.0);
         self.touched.clear();
@@ -172,7 +173,7 @@ impl Anchor {
         self.touched.dedup();
     }
 
-    fn leap_cluster(&mut self, cluster: &[(u32, u32)], at: &mut Leaping<'_>) -> bool {
+    fn extrapolate_cluster(&mut self, cluster: &[(u32, u32)], at: &mut DriftTarget<'_>) -> bool {
         self.sum(cluster, at);
         let share = self.share(cluster, at);
         for &place in &self.touched {
@@ -209,7 +210,7 @@ impl Anchor {
     }
 
     /// The share of a cluster's drift that is added to it; 0 where energy falls no further.
-    fn share(&self, cluster: &[(u32, u32)], at: &Leaping<'_>) -> f64 {
+    fn share(&self, cluster: &[(u32, u32)], at: &DriftTarget<'_>) -> f64 {
         let (mut slope, mut curvature) = (0.0, 0.0);
         for &place in &self.touched {
             let (ball, drift) = (&at.balls[place as usize], &self.velocities[place as usize]);

@@ -13,8 +13,8 @@ from rover_gym.cli import app
 from rover_gym.ground import heights_of, surfaces_of
 from rover_gym.policy import ScanPolicy
 from rover_gym.record import RoverRun, read_run
+from rover_gym.replay.overlays import NO_PLAN, NO_SCAN, sensor_of
 from rover_gym.replay.rover_scene import rover_scene
-from rover_gym.replay.sights import NO_PLAN, NO_SCAN, sensor_of
 
 
 def rover(*arguments: str) -> Result:
@@ -97,7 +97,7 @@ def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly(
-    "tests/cli/test_sights.py::test_the_scans_points_lie_on_the_ground_and_the_plan_is_one_of_the_arcs"
+    "tests/cli/test_overlays.py::test_the_scans_points_lie_on_the_ground_and_the_plan_is_one_of_the_arcs"
 )
 def test_the_planner_with_futures_tells_a_path_that_leads_on(tmp_path: Path) -> None:
     pytest.importorskip("scipy")
