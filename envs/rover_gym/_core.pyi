@@ -1119,7 +1119,7 @@ class StepReport:
         `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
         `energy_lost` therefore contains the errors of the time stepping and the work of reactions
         in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
-        0 for grains and planar soils, whose energy is not audited.
+        0 for grains, whose energy is not audited.
         """
     @property
     def energy_lifted(self) -> float:
