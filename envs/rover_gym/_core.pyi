@@ -40,6 +40,7 @@ __all__: list[str] = [
     "BusyError",
     "CommandError",
     "Contacts",
+    "DiskSimulation",
     "DrawnEpisodes",
     "Drum",
     "Energy",
@@ -75,7 +76,6 @@ __all__: list[str] = [
     "Sine",
     "Snapshot",
     "SoftGround",
-    "SoilSimulation",
     "SolverReport",
     "SphereField",
     "Spline",
@@ -94,10 +94,10 @@ __all__: list[str] = [
     "arrange_balls",
     "atan2",
     "ball_packing",
+    "disk_packing",
     "exp",
     "seed_generators",
     "sin_cos",
-    "soil_packing",
     "solve_friction_contact",
     "standard_normals",
 ]
@@ -1448,7 +1448,7 @@ class Snapshot:
 class AnySimulation:
     """Base class of all simulations. It cannot be instantiated.
 
-    Its subclasses are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
+    Its subclasses are `Simulation`, `PlanarSimulation`, `DiskSimulation`, `GrainSimulation` and
     `RoverGrainSimulation`.
 
     Only one call may run at a time. A second call, from another thread or a signal handler, raises
@@ -2842,7 +2842,7 @@ class EpisodeBatch:
     def __len__(self) -> int: ...
 
 @final
-class SoilSimulation(AnySimulation):
+class DiskSimulation(AnySimulation):
     """A planar granular soil of disks, with an optional machine that drives on it.
 
     The disks move freely and touch with friction. Walls or a ground contain them.
@@ -2918,7 +2918,7 @@ class SoilSimulation(AnySimulation):
         sleep: bool = False,
         sleep_speed: float | None = None,
         sleep_distance: float | None = None,
-    ) -> SoilSimulation: ...
+    ) -> DiskSimulation: ...
     @property
     def radius(self) -> npt.NDArray[np.float64]:
         """Radii of the disks, (n,), m."""
@@ -3397,7 +3397,7 @@ def standard_normals(generators: _Rows, size: int) -> tuple[_Array, _Rows]:
         OptionError: An argument has a wrong shape or type.
     """
 
-def soil_packing(
+def disk_packing(
     count: int = 222,
     *,
     radius_min: float = 0.016,

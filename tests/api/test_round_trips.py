@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
-from rover_gym.mechanics import Snapshot, SoilSimulation, soil_packing
+from rover_gym.mechanics import DiskSimulation, Snapshot, disk_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -195,11 +195,11 @@ def test_copied_planar_simulations_go_on_alike(make: Any, a: float, b: float, ma
             assert twin.snapshot() == sim.snapshot()
 
 
-def soil(**changed: Any) -> SoilSimulation:
-    radius, mass, centres = soil_packing(30, width=0.4, seed=2)
+def soil(**changed: Any) -> DiskSimulation:
+    radius, mass, centres = disk_packing(30, width=0.4, seed=2)
     walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.4, 0.0, -1.0, 0.0]]
     given = {"radius": radius, "mass": mass, "position": centres} | changed
-    return SoilSimulation(**given, walls=walls)
+    return DiskSimulation(**given, walls=walls)
 
 
 def test_a_soils_snapshot_goes_on_alike() -> None:

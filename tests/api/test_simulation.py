@@ -15,9 +15,9 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import BusyError, RoverGymError, Simulation, SphereField
+from rover_gym.grains import DiskSimulation
 from rover_gym.mechanics import SimulationBatch
 from rover_gym.planar import BallSimulation, Line
-from rover_gym.soil import SoilSimulation
 
 
 def drive(sim, steps=200):
@@ -352,8 +352,8 @@ def ball() -> BallSimulation:
     return sim
 
 
-def soil() -> SoilSimulation:
-    return SoilSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.4]], ground=Line())
+def soil() -> DiskSimulation:
+    return DiskSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.4]], ground=Line())
 
 
 @pytest.mark.parametrize("make", [rover, ball, soil])

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym import StepError
+from rover_gym.grains import DiskSimulation, disk_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -16,7 +17,6 @@ from rover_gym.planar import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.soil import SoilSimulation, soil_packing
 from torture.audit import BLOWN_UP, GAIN, Array
 from torture.drives import log_uniform, variant
 from torture.ledger import Bounds, Ledger, Regime
@@ -146,9 +146,9 @@ def soil(restitution: float) -> Any:
 
 
 def _shake(random: Random, ledger: Ledger, restitution: float) -> None:
-    radius, mass, centres = soil_packing(int(random.integers(5, 120)), width=0.6, seed=int(random.integers(1000)))
+    radius, mass, centres = disk_packing(int(random.integers(5, 120)), width=0.6, seed=int(random.integers(1000)))
     walls = [(0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.0), (0.6, 0.0, -1.0, 0.0)]
-    sim = SoilSimulation(
+    sim = DiskSimulation(
         radius,
         mass,
         centres,

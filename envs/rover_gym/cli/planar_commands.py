@@ -10,9 +10,9 @@ import numpy as np
 import typer
 
 from rover_gym.cli.console import AsJson, Results, plain_errors, row
+from rover_gym.cli.disks_command import soil
 from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.cli.soil_command import soil
 from rover_gym.cli.usage import WholeHelp
 from rover_gym.mechanics import (
     BallSimulation,
