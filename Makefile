@@ -185,7 +185,7 @@ instructions: $(STAMPS)/test ## count the instructions of a step under valgrind 
 profiles: $(STAMPS)/test $(STAMPS)/release ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles
 
-validate: $(STAMPS)/release ## the soil beside papers and closed forms: docs/tables/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
+validate: $(STAMPS)/release ## grains beside papers and closed forms: docs/tables/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
 	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
 
 validate-sand: $(STAMPS)/test $(STAMPS)/core ## sand beside measurements: docs/validation/sand.md (a minute; the folder of the data in DATA or ROVER_GYM_SOIL_DATA)

@@ -22,7 +22,7 @@ from rover_gym.validation import checked, number, refuse
 
 __all__ = ["SavedRun", "open_run", "record_run", "saved_run_of"]
 
-#: A rover, a planar machine, a soil of disks, or balls in space.
+#: A rover, a planar machine, disks, or balls in space.
 SavedRun: TypeAlias = RoverRun | PlanarRun | DiskRun | GrainRun
 R = TypeVar("R", bound=Run)
 

@@ -179,7 +179,7 @@ def test_an_abundance_that_vanishes_gives_no_rocks() -> None:
         assert len(SphereField.rocks(abundance, (0.0, 0.0, 10.0, 10.0), 0)) == 0
 
 
-def test_a_soil_flung_to_the_end_of_the_world_is_stepped_or_refused() -> None:
+def test_disks_flung_to_the_end_of_the_world_is_stepped_or_refused() -> None:
     sim = DiskSimulation([0.1, 0.1], [1.0, 1.0], [[0.0, 0.0], [1.0, 0.0]])
     sim.set_state([[0.0, 0.0, 0.0], [1e300, -1e300, 0.0]], [[1e300, 0.0, 0.0], [0.0, 0.0, 0.0]])
     with within(5.0), suppress(StepError):

@@ -3,6 +3,7 @@
 import math
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -16,9 +17,7 @@ from rover_gym.figures.grain_frames import draw_disks
 from rover_gym.grains import (
     DiskBed,
     DiskRun,
-    DiskSimulation,
     Pull,
-    disk_packing,
     drawbar_pull,
     drive_on_disks,
     fit_traction,
@@ -26,7 +25,7 @@ from rover_gym.grains import (
     rover_on_disks,
     settled_disks,
 )
-from rover_gym.mechanics import Snapshot
+from rover_gym.mechanics import DiskSimulation, Snapshot, disk_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -36,7 +35,7 @@ from rover_gym.planar import (
     TwoWheelRoverSimulation,
 )
 from rover_gym.record import RecordingError, read_trajectory
-from rover_gym.runs import open_run, record_run
+from rover_gym.runs import open_run, record_run, saved_run_of
 
 G = 9.81
 
@@ -358,7 +357,7 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: DiskBed, tmp
     assert draw_disks(run, tmp_path / "disks.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: DiskBed, tmp_path: Path) -> None:
+def test_disks_without_a_machine_are_recorded_and_drawn(bed: DiskBed, tmp_path: Path) -> None:
     sim = DiskSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls)
     record_run(sim, 0.04, tmp_path / "disks.h5", 50.0, title="disks alone")
     run = open_run(tmp_path / "disks.h5")
@@ -369,7 +368,16 @@ def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: DiskBed, tmp_path: 
     assert [path.name for path in paths] == ["disks-and-contacts.png", "overview.png"]
 
 
-def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
+def test_a_file_of_an_earlier_version_calls_disks_a_soil(bed: DiskBed, tmp_path: Path) -> None:
+    path = tmp_path / "soil.h5"
+    record_run(DiskSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls), 0.01, path, None)
+    trajectory = read_trajectory(path)
+    scene = {**trajectory.attributes["scene"], "kind": "SoilSimulation"}
+    earlier = replace(trajectory, attributes={**trajectory.attributes, "scene": scene})
+    assert isinstance(saved_run_of(earlier, path), DiskRun)
+
+
+def test_a_file_without_disks_is_refused(tmp_path: Path) -> None:
     sim = BallSimulation(Line())
     record_run(sim, 0.01, tmp_path / "ball.h5", None, title="a ball")
     with pytest.raises(RecordingError, match="contains a PlanarRun, not a DiskRun"):
@@ -515,7 +523,7 @@ def test_removed_disks_leave_the_others_as_they_are() -> None:
         (lambda bed: record_run(rover_on_disks(bed, start=0.61), 1.0, "no.h5", -1.0), "fps"),
     ],
 )
-def test_soils_that_would_not_end_or_cannot_be_are_refused_by_name(
+def test_beds_that_would_not_end_or_cannot_be_are_refused_by_name(
     call: Callable[[DiskBed], object], field: str, narrow_bed: DiskBed
 ) -> None:
     with pytest.raises(RoverGymError) as caught:

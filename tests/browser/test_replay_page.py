@@ -362,13 +362,13 @@ def moves(browser: webdriver.Chrome, patience: float) -> bool:
     return False
 
 
-# --- The two-wheel rover on a soil of disks
+# --- The two-wheel rover on disks
 
 
 @pytest.fixture(scope="module")
-def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[DiskRun]]:
+def disks_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[DiskRun]]:
     """Half a second on 150 disks."""
-    folder = tmp_path_factory.mktemp("soil")
+    folder = tmp_path_factory.mktemp("disks")
     bed = settled_disks(150, 2, settle=0.1)
     sim = rover_on_disks(bed)
     sim.set_torques([50.0, 50.0])
@@ -380,9 +380,9 @@ def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[DiskR
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_loads_without_errors_and_without_the_network")
-def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: Shown[DiskRun]) -> None:
-    assert_alone(soil_shown)
-    browser = soil_shown.browser
+def test_a_page_of_disks_loads_alone_and_shows_rover_and_disks(disks_shown: Shown[DiskRun]) -> None:
+    assert_alone(disks_shown)
+    browser = disks_shown.browser
     assert browser.title == "the rover on 150 disks"
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
         f"wheel load, mean over {LOAD_TIME:g} s (N)",
@@ -398,8 +398,8 @@ def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: Shown[Di
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_timeline_moves_balls_and_rover_and_comes_back")
-def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_shown: Shown[DiskRun]) -> None:
-    browser, run = soil_shown.browser, soil_shown.run
+def test_the_timeline_of_disks_moves_disks_chains_and_wheels_and_comes_back(disks_shown: Shown[DiskRun]) -> None:
+    browser, run = disks_shown.browser, disks_shown.run
     go_to(browser, 0.0)
     first = picture(browser)
     go_to(browser, 0.5)

@@ -95,7 +95,7 @@ def test_bad_options_end_with_one_line(options: list[str], field: str, tmp_path:
 SMALL = ["--disks", "100", "--layers", "2"]
 
 
-@pytest.mark.nightly("tests/cli/test_planar.py::test_a_crossing_ends_where_the_soil_does")
+@pytest.mark.nightly("tests/cli/test_planar.py::test_a_crossing_ends_where_the_disks_do")
 def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> None:
     options = [*SMALL, "--duration", "0.2", "--output", str(tmp_path)]
     assert "distance" in output_of("planar", "disks", *options)
@@ -128,7 +128,7 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
 
 
 @pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
-def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_on_disks_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = [*SMALL, "--duration", "0.2", "--no-film", "--output", str(tmp_path)]
     assert rover("planar", "disks", *options).exit_code == 0
     run = open_run(tmp_path / "disks.h5")
@@ -157,7 +157,7 @@ def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert "error: --format" in error_of("plot", tmp_path / "disks.h5", "--format", "bmp")
 
 
-def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
+def test_a_crossing_ends_where_the_disks_do(tmp_path: Path) -> None:
     options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-film"]
     output_of("planar", "disks", *options, "--gravity", "0.61", "--output", tmp_path)
     assert open_run(tmp_path / "disks.h5").time[-1] < 5.0
@@ -194,7 +194,7 @@ def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pyte
         (["--sweep", "--seeds", "1", "--pull-disks", "60"], "error: --pull-disks"),
     ],
 )
-def test_a_soil_that_cannot_be_ends_with_one_line(options: list[str], message: str, tmp_path: Path) -> None:
+def test_a_bed_that_cannot_be_ends_with_one_line(options: list[str], message: str, tmp_path: Path) -> None:
     arguments = ["planar", "disks", *SMALL, *options, "--output", str(tmp_path)]
     result = rover(*arguments)
     assert result.exit_code == 2

@@ -28,8 +28,7 @@ from torture.joined import _scene as joined_scene
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, TriangleMesh
 from rover_gym.env.sand_ground import sand_rover
-from rover_gym.grains import DiskSimulation, disk_packing
-from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, ball_packing
+from rover_gym.mechanics import DiskSimulation, GrainSimulation, RoverGrainSimulation, ball_packing, disk_packing
 from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Sine, TwoWheelRoverSimulation
 from rover_gym.sand import SoftGround, named_soil
 

@@ -23,8 +23,8 @@ from rover_gym import (
     StepError,
     TriangleMesh,
 )
-from rover_gym.grains import DiskRun, DiskSimulation, disk_packing
-from rover_gym.mechanics import Snapshot
+from rover_gym.grains import DiskRun
+from rover_gym.mechanics import DiskSimulation, Snapshot, disk_packing
 from rover_gym.models import RobotFileWarning
 from rover_gym.planar import BallSimulation, Sine
 from rover_gym.policy import ArcNetworkPolicy, PolicyError, ScanPolicy
@@ -135,7 +135,7 @@ def runs(random: Random, ledger: Ledger) -> None:
         except RecordingError:
             pass
         else:
-            ledger.find("a rover's run was read as a soil's")
+            ledger.find("a rover's run was read as that of disks")
         if run is None:
             continue
         if not np.isfinite(run.positions).all():
@@ -238,15 +238,15 @@ def _ball() -> BallSimulation:
     return ball
 
 
-def _soil() -> DiskSimulation:
-    soil = DiskSimulation(*disk_packing(12, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
-    soil.step(5)
-    return soil
+def _disks() -> DiskSimulation:
+    sim = DiskSimulation(*disk_packing(12, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
+    sim.step(5)
+    return sim
 
 
 def snapshots(random: Random, ledger: Ledger) -> None:
-    """Snapshots of the rover, a ball and a soil with bytes changed; what is accepted is stepped."""
-    make = (_moving, _ball, _soil)[random.integers(3)]
+    """Snapshots of the rover, a ball and disks with bytes changed; what is accepted is stepped."""
+    make = (_moving, _ball, _disks)[random.integers(3)]
     sim: Any = make()
     data = sim.snapshot().to_bytes()
     for _ in range(15):

@@ -9,7 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from rover_gym import Plane, RoverEnv, RoverModel, Simulation, SphereField, solve_friction_contact
-from rover_gym.grains import DiskSimulation, disk_packing
+from rover_gym.mechanics import DiskSimulation, disk_packing
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine
 from torture.damage import attempt, use
 from torture.ledger import Bounds, Ledger, Regime
@@ -56,8 +56,8 @@ def _disks(n: int) -> DiskSimulation:
 
 
 FINDS: dict[str, Callable[[], Any]] = {
-    "a soil of 1e11 disks": lambda: disk_packing(10**11),
-    "a soil of 2e19 disks": lambda: disk_packing(2 * 10**19),
+    "a bed of 1e11 disks": lambda: disk_packing(10**11),
+    "a bed of 2e19 disks": lambda: disk_packing(2 * 10**19),
     "a chain of 300 solids": lambda: Simulation(_chain(300)),
     "a chain of 3000 solids": lambda: Simulation(_chain(3000)),
     "20 000 solids": lambda: Simulation(_chain(20_000)),

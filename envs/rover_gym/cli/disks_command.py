@@ -1,4 +1,4 @@
-"""`rover planar disks`: the two-wheel rover on granular soil, a crossing or a sweep of trials."""
+"""`rover planar disks`: the two-wheel rover on grains in the plane, a crossing or a sweep of trials."""
 
 import json
 import math
@@ -46,7 +46,7 @@ UNEQUAL = {"radius_min": 0.013, "radius_max": 0.0195}
 
 
 @plain_errors
-def soil(
+def disks(
     *,
     disks: Annotated[
         int | None, typer.Option(min=30, max=20_000, help="Number of disks. Default: 222; in a sweep, 444.")
@@ -68,7 +68,7 @@ def soil(
             min=0.01,
             max=1000.0,
             help="Time to simulate, s. Default: 4 s at 9.81 m/s^2, longer under weaker gravity. "
-            "The run ends early where the soil ends.",
+            "The run ends early where the disks end.",
         ),
     ] = None,
     seed: Annotated[
@@ -91,7 +91,7 @@ def soil(
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
     as_json: AsJson = False,
 ) -> None:
-    """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
+    """Drive the two-wheel rover over a bed of disks; record, draw and film it."""
     names = ("disk-curves.json", "disk-curves.png") if sweep else ("disks.h5", "disks.png", "disks.mp4")
     check_paths(output=Into(output, names))
     slowness = float(np.sqrt(EARTH / gravity))
@@ -133,7 +133,7 @@ def _cross(
     bed = settled_disks(disks, layers, seed=seed, **options)
     sim = rover_on_disks(bed, wheel_friction=wheel_friction, **options)
     sim.set_torques([torque, torque])
-    title = f"the two-wheel rover on a soil of {disks} disks"
+    title = f"the two-wheel rover on {disks} disks"
     path = output / "disks.h5"
     rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
 

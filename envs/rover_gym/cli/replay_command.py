@@ -90,7 +90,7 @@ def replay(
 _KINDS: dict[type, tuple[tuple[str, ...], str]] = {
     RoverRun: (("html", "vrml", "gltf", "film"), ""),
     PlanarRun: (("html",), "a ball or a two-wheel rover is replayed as a page, with --html"),
-    DiskRun: (("html",), "a run on a soil is replayed as a page, with --html"),
+    DiskRun: (("html",), "a run on disks is replayed as a page, with --html"),
     GrainRun: (("html", "film"), "a run of balls is replayed as a page or a film, with --html or --film"),
 }
 
@@ -119,7 +119,7 @@ def plot(
 
     Of a ball or a two-wheel rover: the path over the ground, speed, loads, gaps, energy.
 
-    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
+    Of a run on disks: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
 
     Of balls: the same, and the ruts: the surface before and after, with sections along and across a track.
     """

@@ -1,4 +1,4 @@
-"""Curves over time of a recorded soil run: speed, slip and sinkage, wheel forces, energy and contacts.
+"""Curves over time of a recorded run of disks: speed, slip and sinkage, wheel forces, energy and contacts.
 
 Signals that jump from row to row are drawn twice: every sample as a light line, and the smoothed curve as a bold one.
 """
@@ -56,7 +56,7 @@ def driving(figure: Sheet, run: DiskRun) -> None:
 
 
 def wheel_forces(figure: Sheet, run: DiskRun) -> None:
-    """Vertical and horizontal force of the soil on each wheel."""
+    """Vertical and horizontal force of the disks on each wheel."""
     load, thrust = figure.subplots(2, 1, sharex=True)
     forces = np.array(run.wheel_forces)
     forces[0] = np.nan  # no step had been taken
@@ -66,7 +66,7 @@ def wheel_forces(figure: Sheet, run: DiskRun) -> None:
     load.set(ylabel="vertical force (N)")
     thrust.axhline(0.0, color=DARK, linewidth=0.6)
     thrust.set(ylabel="horizontal force,\npositive forward (N)", xlabel="time (s)")
-    _finish(figure, (load, thrust), "Force of the soil on the wheels, mean since the row before", run)
+    _finish(figure, (load, thrust), "Force of the disks on the wheels, mean since the row before", run)
 
 
 def disks_and_contacts(figure: Sheet, run: DiskRun) -> None:

@@ -168,7 +168,7 @@ CHAIN, WHEEL, BODY = "#b3321b", "#4a5560", "#2f6f9f"
 
 WIDTH = 12.0  # inches
 
-MARGIN = 0.02  # m about the soil
+MARGIN = 0.02  # m about the disks
 
 
 def draw_disks(run: DiskRun, path: str | Path, *, row: int = -1) -> Path:

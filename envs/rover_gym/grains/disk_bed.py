@@ -1,4 +1,4 @@
-"""Beds of granular soil: disks that settled in a box under gravity."""
+"""Beds of disks that settled in a box under gravity, and the two-wheel rover on them."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def rover_on_disks(
     The rover starts just above the disks and settles for 0.2 s (at 9.81 m/s^2) before time 0.
 
     Args:
-        bed: The soil; by default `settled_disks` makes one from `count`, `layers` and `seed`.
+        bed: The disks; by default `settled_disks` makes one from `count`, `layers` and `seed`.
         count: Number of disks of the default bed.
         layers: Number of layers of the default bed.
         seed: Seed of the default bed.

@@ -1,4 +1,4 @@
-"""Trials on granular soil over several beds: rover travel against torque, and drawbar pull against slip.
+"""Trials on several beds of disks: rover travel against torque, and drawbar pull against slip.
 
 >>> from rover_gym.grains import drawbar_pull, settled_disks
 >>> bed = settled_disks(300, 4, radius_min=0.013, radius_max=0.0195)
@@ -9,7 +9,7 @@
 
 with the pull `P`, load `W` and slip `s` of a trial, the limit `A` of `P / W`, the slip `s₀` of zero pull, and the slip
 scale `K` over which the distance from the limit falls by a factor e. Janosi and Hanamoto (1961) proposed the form for
-the shear stress under a track against the shear displacement of the soil, which grows with the slip.
+the shear stress under a track against the shear displacement of the ground, which grows with the slip.
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ class Pull:
     Attributes:
         slip: 1 - speed / (radius x turning rate).
         speed: Mean travel speed over the measurement, m/s.
-        pull: Mean horizontal force of the soil on the wheel, N: positive if the wheel can pull a load.
-        weight: Mean vertical force of the soil on the wheel, N.
+        pull: Mean horizontal force of the disks on the wheel, N: positive if the wheel can pull a load.
+        weight: Mean vertical force of the disks on the wheel, N.
         sinkage: Mean depth of the wheel's lowest point below the bed's mean surface, m.
     """
 
@@ -92,7 +92,7 @@ def drive_on_disks(
     """Drives the rover from rest with the same torque at both wheels.
 
     Args:
-        bed: The soil.
+        bed: The disks.
         torque: Torque of each wheel, N m, positive forward.
         run_in: Time before the measurement begins, s.
         duration: Time of the measurement, s; it ends early if the front wheel nears the end of the bed.
@@ -150,12 +150,12 @@ def drawbar_pull(
 ) -> Pull:
     """Drawbar pull of one wheel on a single-wheel test rig: its slip is prescribed, and it sinks freely.
 
-    The rim speed is the same at every slip, so that a large slip throws no soil; the wheel travels at 1 - slip times
+    The rim speed is the same at every slip, so that a large slip throws no disks; the wheel travels at 1 - slip times
     the rim speed. Run-in and measurement cover the same stretches of the bed at every slip, because a wheel reaches a
     steady state only after it leaves its initial hole; they take 1 / (1 - slip) times as long.
 
     Args:
-        bed: The soil.
+        bed: The disks.
         slip: Below 1; negative for a braked wheel. At 1 the wheel stands and digs itself in without reaching a steady
             state.
         load: Mass that the wheel carries, kg.

@@ -1,4 +1,4 @@
-"""Runs in the plane as scenes of the player: a ball or a two-wheel rover over its ground, and disks of a soil."""
+"""Runs in the plane as scenes of the player: a ball or a two-wheel rover over its ground, and disks."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SAND_COLOURS: tuple[Colour, Colour] = (
 CHAIN_COLOUR: Colour = (0.80, 0.0, 0.10)
 DEPTH = 1.0  # out-of-plane thickness of disks, in mean diameters
 CHAINS = 300  # strongest contacts drawn
-DISKS_SEEN = 1.8  # m of soil in view at most
+DISKS_SEEN = 1.8  # m of the bed in view at most
 SKIRT = 1.04  # width of the picture, in widths of the bed
 DISKS_ASPECT = 1.2  # width over height of the picture
 FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspective
@@ -136,10 +136,10 @@ def _nearest(ground: PlanarGround, centres: Array, radius: Array) -> tuple[Array
 
 
 def disk_scene(run: DiskRun, *, follow: bool) -> PageScene:
-    """A run on a soil as a scene."""
+    """A run on disks as a scene."""
     eye = _disk_eye(run, follow=follow)
     distance = 0.5 * _seen(run) / (DISKS_ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
-    scene = PageScene("soil", _view(float(eye[0, 1]), 0.1 * distance, distance, DISKS_ASPECT), 0.5 * _seen(run))
+    scene = PageScene("disks", _view(float(eye[0, 1]), 0.1 * distance, distance, DISKS_ASPECT), 0.5 * _seen(run))
     depth, radius = _depth(run), run.wheels[0, :, 2]
     poses = np.concatenate((run.wheels[..., :2], run.wheel_angles[..., None]), axis=2)
     _add_wheels(scene, poses, radius, np.full(len(radius), depth), 0.05, 0.8 * depth)
@@ -226,7 +226,7 @@ def wheel_meshes(radius: float, depth: float) -> list[tuple[Colour, Array, npt.N
 
 
 def _walls(run: DiskRun) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
-    """Slabs under floors, as wide as the soil, and beside upright walls, as high as the soil."""
+    """Slabs under floors, as wide as the bed, and beside upright walls, as high as the bed."""
     x, y = run.positions[..., 0], run.positions[..., 1]
     left, right = float((x - run.radius).min()), float((x + run.radius).max())
     bottom, top = float((y - run.radius).min()), float((y + run.radius).max())
@@ -254,7 +254,7 @@ def _seen(run: DiskRun) -> float:
 
 
 def _disk_eye(run: DiskRun, *, follow: bool) -> Array:
-    """(n, 2) centre of the picture: the rover's smoothed path, clamped so that soil fills the picture."""
+    """(n, 2) centre of the picture: the rover's smoothed path, clamped so that disks fill the picture."""
     x = run.positions[0, :, 0]
     left, right = float(x.min()), float(x.max())
     height = float(run.wheels[0, :, 1].mean()) if run.wheels.size else 0.0

@@ -52,8 +52,8 @@ def write_page(run: SavedRun, path: str | Path, *, follow: bool = True, ghost: R
     Args:
         run: The run; every sample becomes a frame of the replay.
         path: The file to write, usually `.html`. Its folder is created.
-        follow: Whether the eye follows what moves; otherwise the ground stays fixed. A soil is followed where it is
-            wider than the picture.
+        follow: Whether the eye follows what moves; otherwise the ground stays fixed. A bed of disks is followed where
+            it is wider than the picture.
         ghost: Another run of a rover, which drives beside a rover's run, translucent and with dashed curves.
 
     Raises:
