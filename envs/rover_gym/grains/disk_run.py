@@ -84,7 +84,8 @@ class DiskSampler(Sampler):
         self.force_chains, self.wheel_forces = np.zeros((self._n_chains, 5)), np.zeros((wheels, 2))
         if sum(map(len, self._pairs)) == 0:
             return
-        every, points, impulses = map(np.concatenate, (self._pairs, self._points, self._impulses))
+        every, points = np.concatenate(self._pairs), np.concatenate(self._points)
+        impulses = np.concatenate(self._impulses)
         # Later entries overwrite earlier ones: a pair keeps its latest position.
         _, last, which = np.unique(every[::-1], axis=0, return_index=True, return_inverse=True)
         which, last = which.ravel()[::-1], len(which) - 1 - last

@@ -14,7 +14,7 @@ use rover_task::draw::DrawnGround;
 use crate::arguments::{Named, count, number, refused};
 use crate::arrays::{Array, vector};
 use crate::bed_arguments::{self, Described, Packed, grain_error, packed, rows};
-use crate::beds::{Bed, BedSimulation, columns, n_grains};
+use crate::beds::{Bed, BedSimulation, columns};
 use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
 use crate::shared::{Open, Release};
@@ -235,7 +235,7 @@ impl GrainSimulation {
     #[getter]
     fn spin(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(columns(inner.v(), n_grains(&inner), VELOCITIES, 3))
+        Ok(columns(inner.v(), inner.description().grains.len(), VELOCITIES, 3))
     }
 
     /// The terrain below the balls, or None.
@@ -269,7 +269,7 @@ impl GrainSimulation {
         spin: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         let mut inner = self.open()?;
-        let (q, v) = state(n_grains(&inner), position, velocity, spin)?;
+        let (q, v) = state(inner.description().grains.len(), position, velocity, spin)?;
         inner.set_state(&q, &v).map_err(|e| grain_error(&e))
     }
 

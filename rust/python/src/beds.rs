@@ -89,16 +89,8 @@ impl BedSimulation {
             AnyBed::Disks(_) => "disks",
             AnyBed::Balls(_) => "balls",
         };
-        opened!(self, bed => Ok(format!("{} {noun}", n_grains(bed))))
+        opened!(self, bed => Ok(format!("{} {noun}", bed.description().grains.len())))
     }
-}
-
-/// Number of grains.
-pub fn n_grains<const D: usize>(bed: &GrainSimulation<D>) -> usize
-where
-    BodyPairs<D>: Swept<D>,
-{
-    bed.description().grains.len()
 }
 
 /// Three columns of the grains' rows of `width` numbers, from one on, (n, 3).
@@ -107,20 +99,13 @@ pub fn columns(values: &[f64], n: usize, width: usize, from: usize) -> Array {
     fresh_rows(rows.map(|row| [row[from], row[from + 1], row[from + 2]]))
 }
 
-/// Centres and angles of disks, centres of balls, (n, 3).
-fn position<const D: usize>(bed: &GrainSimulation<D>) -> Array
-where
-    BodyPairs<D>: Swept<D>,
-{
-    columns(bed.q(), n_grains(bed), COORDINATES, 0)
-}
-
 /// Rates of disks, velocities of the centres of balls, (n, 3).
 fn velocity<const D: usize>(bed: &GrainSimulation<D>) -> Array
 where
     BodyPairs<D>: Swept<D>,
 {
-    columns(bed.v(), n_grains(bed), body_velocities(D), 0)
+    let n = bed.description().grains.len();
+    columns(bed.v(), n, body_velocities(D), 0)
 }
 
 /// A point of each wall now and its normal, (m, 2 D).
@@ -168,7 +153,9 @@ impl BedSimulation {
     /// Centres of balls, (n, 3), m, or centres and angles of disks, (n, 3), m and rad.
     #[getter]
     fn position(&self) -> Result<Array> {
-        opened!(self, bed => Ok(position(bed)))
+        opened!(self, bed => {
+            Ok(columns(bed.q(), bed.description().grains.len(), COORDINATES, 0))
+        })
     }
 
     /// Velocities of the centres of balls, (n, 3), m/s, or rates of disks, (n, 3), m/s and rad/s.
