@@ -128,7 +128,7 @@ docs: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/debian-test ## build the documenta
 bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).rollout
 	$(COMPARE).exploring_bench
-	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver soil)
+	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver disks)
 	cargo run --locked --quiet --profile bench -p rover-core --example sand_steps
 	-$(COMPARE).instructions
 
@@ -185,7 +185,7 @@ instructions: $(STAMPS)/test ## count the instructions of a step under valgrind 
 profiles: $(STAMPS)/test $(STAMPS)/release ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles
 
-validate: $(STAMPS)/release ## the soil beside papers and closed forms: docs/tables/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
+validate: $(STAMPS)/release ## grains beside papers and closed forms: docs/tables/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
 	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
 
 validate-sand: $(STAMPS)/test $(STAMPS)/core ## sand beside measurements: docs/validation/sand.md (a minute; the folder of the data in DATA or ROVER_GYM_SOIL_DATA)

@@ -15,8 +15,7 @@ The package consists of the subpackages below. Each one may import those above i
     rendering      images of a rover: frames and video
     record         trajectories in HDF5
     identification  parameters of a recorded run, with their uncertainty
-    soil           granular soil of disks, in the plane
-    grains         granular ground of balls, in space
+    grains         grains: beds of balls in space and of disks in the plane
     sand           wheels on sand: soils, a test bed for one wheel, fits
     env            `Rover-v0`: its card, arguments and control period
     sensors        encoders, inertial unit, cameras and scanners as observations

@@ -37,9 +37,11 @@ class _SparseArray(Protocol):
 __all__: list[str] = [
     "AnySimulation",
     "BallSimulation",
+    "BedSimulation",
     "BusyError",
     "CommandError",
     "Contacts",
+    "DiskSimulation",
     "DrawnEpisodes",
     "Drum",
     "Energy",
@@ -75,7 +77,6 @@ __all__: list[str] = [
     "Sine",
     "Snapshot",
     "SoftGround",
-    "SoilSimulation",
     "SolverReport",
     "SphereField",
     "Spline",
@@ -94,10 +95,10 @@ __all__: list[str] = [
     "arrange_balls",
     "atan2",
     "ball_packing",
+    "disk_packing",
     "exp",
     "seed_generators",
     "sin_cos",
-    "soil_packing",
     "solve_friction_contact",
     "standard_normals",
 ]
@@ -1119,7 +1120,7 @@ class StepReport:
         `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
         `energy_lost` therefore contains the errors of the time stepping and the work of reactions
         in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
-        0 for grains and planar soils, whose energy is not audited.
+        0 for grains, whose energy is not audited.
         """
     @property
     def energy_lifted(self) -> float:
@@ -1448,7 +1449,7 @@ class Snapshot:
 class AnySimulation:
     """Base class of all simulations. It cannot be instantiated.
 
-    Its subclasses are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
+    Its subclasses are `Simulation`, `PlanarSimulation`, `BedSimulation` and
     `RoverGrainSimulation`.
 
     Only one call may run at a time. A second call, from another thread or a signal handler, raises
@@ -2841,8 +2842,61 @@ class EpisodeBatch:
         """
     def __len__(self) -> int: ...
 
+class BedSimulation(AnySimulation):
+    """Base class of beds of grains. It cannot be instantiated.
+
+    Its subclasses are `DiskSimulation` and `GrainSimulation`.
+    """
+
+    @property
+    def radius(self) -> npt.NDArray[np.float64]:
+        """Radii of the disks, (n,), m."""
+    @property
+    def mass(self) -> npt.NDArray[np.float64]:
+        """Masses of the disks, (n,), kg."""
+    @property
+    def position(self) -> npt.NDArray[np.float64]:
+        """Centres and angles of the disks, (n, 3), m and rad."""
+    @property
+    def velocity(self) -> npt.NDArray[np.float64]:
+        """Rates of `position`, (n, 3), m/s and rad/s."""
+    @property
+    def kinematic(self) -> npt.NDArray[np.bool_]:
+        """Which disks have a prescribed velocity, (n,)."""
+    @property
+    def asleep(self) -> npt.NDArray[np.bool_]:
+        """Which disks sleep, (n,); True for disks with a prescribed velocity."""
+    @property
+    def walls(self) -> _Array:
+        """A point of each wall and the normal to its free side, (m, 4), m."""
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Options of contacts, gravity and solver, as keyword arguments."""
+    def remove(self, which: npt.ArrayLike) -> None:
+        """Removes disks. The others keep their order.
+
+        Args:
+            which: Which disks to remove, (n,) booleans.
+
+        Raises:
+            ModelError: The number of booleans differs from that of the disks, or no disk would be
+                left. Nothing has changed.
+        """
+    @property
+    def contacts(self) -> GrainContacts:
+        """The contacts of the last step."""
+    def momentum(self) -> npt.NDArray[np.float64]:
+        """Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
+
+        Disks with prescribed velocity are not included.
+        """
+    def penetration(self) -> float:
+        """Deepest overlap now, m."""
+    def wake(self) -> None:
+        """Wakes all disks."""
+
 @final
-class SoilSimulation(AnySimulation):
+class DiskSimulation(BedSimulation):
     """A planar granular soil of disks, with an optional machine that drives on it.
 
     The disks move freely and touch with friction. Walls or a ground contain them.
@@ -2918,25 +2972,7 @@ class SoilSimulation(AnySimulation):
         sleep: bool = False,
         sleep_speed: float | None = None,
         sleep_distance: float | None = None,
-    ) -> SoilSimulation: ...
-    @property
-    def radius(self) -> npt.NDArray[np.float64]:
-        """Radii of the disks, (n,), m."""
-    @property
-    def mass(self) -> npt.NDArray[np.float64]:
-        """Masses of the disks, (n,), kg."""
-    @property
-    def position(self) -> npt.NDArray[np.float64]:
-        """Centres and angles of the disks, (n, 3), m and rad."""
-    @property
-    def velocity(self) -> npt.NDArray[np.float64]:
-        """Rates of `position`, (n, 3), m/s and rad/s."""
-    @property
-    def kinematic(self) -> npt.NDArray[np.bool_]:
-        """Which disks have a prescribed velocity, (n,)."""
-    @property
-    def asleep(self) -> npt.NDArray[np.bool_]:
-        """Which disks sleep, (n,); True for disks with a prescribed velocity."""
+    ) -> DiskSimulation: ...
     @property
     def machine(self) -> npt.NDArray[np.float64]:
         """Coordinates of the machine, (5,), m and rad; empty without one."""
@@ -2947,17 +2983,11 @@ class SoilSimulation(AnySimulation):
     def wheels(self) -> npt.NDArray[np.float64]:
         """Centre and radius of each wheel, (n_wheels, 3), m."""
     @property
-    def walls(self) -> _Array:
-        """A point of each wall and the normal to its free side, (m, 4), m."""
-    @property
     def torques(self) -> npt.NDArray[np.float64]:
         """Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover."""
     @property
     def pull(self) -> tuple[float, float]:
         """External force at the machine's centre along x and y, N."""
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Options of contacts, gravity and solver, as keyword arguments."""
     def set_state(
         self,
         position: npt.ArrayLike,
@@ -2978,16 +3008,6 @@ class SoilSimulation(AnySimulation):
             StateError: An array has a wrong shape or an entry that is not finite, or bodies
                 overlap. Nothing has changed.
         """
-    def remove(self, which: npt.ArrayLike) -> None:
-        """Removes disks. The others keep their order.
-
-        Args:
-            which: Which disks to remove, (n,) booleans.
-
-        Raises:
-            ModelError: The number of booleans differs from that of the disks, or no disk would be
-                left. Nothing has changed.
-        """
     def set_torques(self, torques: npt.ArrayLike) -> None:
         """Sets the torques of the rover's wheels.
 
@@ -3006,20 +3026,8 @@ class SoilSimulation(AnySimulation):
         Raises:
             CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
         """
-    @property
-    def contacts(self) -> GrainContacts:
-        """The contacts of the last step."""
-    def momentum(self) -> npt.NDArray[np.float64]:
-        """Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
-
-        Disks with prescribed velocity are not included.
-        """
     def impulse_on_wheels(self) -> npt.NDArray[np.float64]:
         """Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s."""
-    def penetration(self) -> float:
-        """Deepest overlap now, m."""
-    def wake(self) -> None:
-        """Wakes all disks."""
 
 @final
 class Drum:
@@ -3133,7 +3141,7 @@ class GrainContacts:
     def __len__(self) -> int: ...
 
 @final
-class GrainSimulation(AnySimulation):
+class GrainSimulation(BedSimulation):
     """Grains in space: free balls with friction, contained by walls or a vessel, or on a terrain.
 
     World axes: x forward, y up, z to the right.
@@ -3224,38 +3232,14 @@ class GrainSimulation(AnySimulation):
         threads: int = 1,
     ) -> GrainSimulation: ...
     @property
-    def radius(self) -> _Array:
-        """Radii of the balls, (n,), m."""
-    @property
-    def mass(self) -> _Array:
-        """Masses of the balls, (n,), kg."""
-    @property
-    def position(self) -> _Array:
-        """Centres of the balls, (n, 3), m."""
-    @property
-    def velocity(self) -> _Array:
-        """Velocities of the centres, (n, 3), m/s."""
-    @property
     def spin(self) -> _Array:
         """Angular velocities of the balls, world frame, (n, 3), rad/s."""
-    @property
-    def kinematic(self) -> npt.NDArray[np.bool_]:
-        """Which balls have a prescribed velocity, (n,)."""
-    @property
-    def asleep(self) -> npt.NDArray[np.bool_]:
-        """Which balls sleep, (n,); True for balls with a prescribed velocity."""
     @property
     def terrain(self) -> Terrain | None:
         """The terrain below the balls, or None."""
     @property
     def vessel(self) -> Drum | Silo | None:
         """The vessel around the balls, or None."""
-    @property
-    def walls(self) -> _Array:
-        """A point of each wall now and the normal to its free side, (m, 6), m."""
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Options of contacts, gravity and solver, as keyword arguments."""
     def set_state(
         self,
         position: npt.ArrayLike,
@@ -3272,16 +3256,6 @@ class GrainSimulation(AnySimulation):
         Raises:
             StateError: An array has a wrong shape or an entry that is not finite, or bodies
                 overlap. Nothing has changed.
-        """
-    def remove(self, which: npt.ArrayLike) -> None:
-        """Removes balls. The others keep their order.
-
-        Args:
-            which: Which balls to remove, (n,) booleans.
-
-        Raises:
-            ModelError: The number of booleans differs from that of the balls, or no ball would be
-                left. Nothing has changed.
         """
     def exchange(
         self,
@@ -3316,18 +3290,6 @@ class GrainSimulation(AnySimulation):
             StateError: An array has a wrong shape or an entry that is not finite. Nothing has
                 changed.
         """
-    @property
-    def contacts(self) -> GrainContacts:
-        """The contacts of the last step."""
-    def momentum(self) -> _Array:
-        """Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
-
-        Balls with prescribed velocity are not included.
-        """
-    def penetration(self) -> float:
-        """Deepest overlap now, m."""
-    def wake(self) -> None:
-        """Wakes all balls."""
 
 @final
 class RoverGrainSimulation(AnySimulation):
@@ -3397,7 +3359,7 @@ def standard_normals(generators: _Rows, size: int) -> tuple[_Array, _Rows]:
         OptionError: An argument has a wrong shape or type.
     """
 
-def soil_packing(
+def disk_packing(
     count: int = 222,
     *,
     radius_min: float = 0.016,

@@ -10,24 +10,24 @@ from typing import Any, TypeAlias, TypeVar, overload
 
 import numpy as np
 
+from rover_gym.grains.disk_run import DiskRun, DiskSampler, disk_run_of, is_disks
 from rover_gym.grains.grain_run import GrainRun, GrainSampler, Recordable, grain_run_of, is_grains
-from rover_gym.mechanics import PlanarSimulation, Simulation, SoilSimulation
+from rover_gym.mechanics import DiskSimulation, PlanarSimulation, Simulation
 from rover_gym.planar.planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
 from rover_gym.record.channels import RecordingError, RoverSampler, Sampler, row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, Run, run_of
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.soil.soil_run import SoilRun, SoilSampler, is_soil, soil_run_of
 from rover_gym.validation import checked, number, refuse
 
 __all__ = ["SavedRun", "open_run", "record_run", "saved_run_of"]
 
-#: A rover, a planar machine, a soil of disks, or balls in space.
-SavedRun: TypeAlias = RoverRun | PlanarRun | SoilRun | GrainRun
+#: A rover, a planar machine, disks, or balls in space.
+SavedRun: TypeAlias = RoverRun | PlanarRun | DiskRun | GrainRun
 R = TypeVar("R", bound=Run)
 
 
-def sampler_of(sim: Simulation | PlanarSimulation | SoilSimulation | Recordable) -> Sampler:
+def sampler_of(sim: Simulation | PlanarSimulation | DiskSimulation | Recordable) -> Sampler:
     """What steps a simulation from row to row.
 
     Raises:
@@ -39,7 +39,7 @@ def sampler_of(sim: Simulation | PlanarSimulation | SoilSimulation | Recordable)
         return sampler
     if isinstance(sim, PlanarSimulation):
         return PlanarSampler(sim)
-    return SoilSampler(sim) if isinstance(sim, SoilSimulation) else GrainSampler(sim)
+    return DiskSampler(sim) if isinstance(sim, DiskSimulation) else GrainSampler(sim)
 
 
 @checked(
@@ -51,7 +51,7 @@ def sampler_of(sim: Simulation | PlanarSimulation | SoilSimulation | Recordable)
     progress=callable,
 )
 def record_run(
-    sim: Simulation | PlanarSimulation | SoilSimulation | Recordable,
+    sim: Simulation | PlanarSimulation | DiskSimulation | Recordable,
     duration: float,
     path: str | Path,
     fps: float | None = 25.0,
@@ -130,8 +130,8 @@ def saved_run_of(trajectory: Trajectory, path: str | Path) -> SavedRun:
     Raises:
         RecordingError: It holds no samples, or its parts are inconsistent.
     """
-    if is_soil(trajectory):
-        return soil_run_of(trajectory, path)
+    if is_disks(trajectory):
+        return disk_run_of(trajectory, path)
     if is_grains(trajectory):
         return grain_run_of(trajectory, path)
     return planar_run_of(trajectory, path) if is_planar(trajectory) else run_of(trajectory, path)

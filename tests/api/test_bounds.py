@@ -14,7 +14,7 @@ import pytest
 from refusals import refused
 
 from rover_gym import ModelError, RoverModel, SphereField, StepError, TerrainError
-from rover_gym.mechanics import SoilSimulation, soil_packing
+from rover_gym.mechanics import DiskSimulation, disk_packing
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
 
 
@@ -29,7 +29,7 @@ def within(seconds: float) -> Iterator[None]:
 @pytest.mark.parametrize("count", [10**7, 10**11, 2**63])
 def test_a_packing_of_a_hundred_thousand_million_disks_is_refused(count: int) -> None:
     with within(1.0), pytest.raises(ModelError, match="at most 1000000 disks") as caught:
-        soil_packing(count)
+        disk_packing(count)
     assert caught.value.field == "count"
 
 
@@ -179,8 +179,8 @@ def test_an_abundance_that_vanishes_gives_no_rocks() -> None:
         assert len(SphereField.rocks(abundance, (0.0, 0.0, 10.0, 10.0), 0)) == 0
 
 
-def test_a_soil_flung_to_the_end_of_the_world_is_stepped_or_refused() -> None:
-    sim = SoilSimulation([0.1, 0.1], [1.0, 1.0], [[0.0, 0.0], [1.0, 0.0]])
+def test_disks_flung_to_the_end_of_the_world_is_stepped_or_refused() -> None:
+    sim = DiskSimulation([0.1, 0.1], [1.0, 1.0], [[0.0, 0.0], [1.0, 0.0]])
     sim.set_state([[0.0, 0.0, 0.0], [1e300, -1e300, 0.0]], [[1e300, 0.0, 0.0], [0.0, 0.0, 0.0]])
     with within(5.0), suppress(StepError):
         sim.step()

@@ -3,6 +3,7 @@
 import math
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -12,8 +13,19 @@ from refusals import refused
 
 from rover_gym import CommandError, ModelError, OptionError, RoverGymError, StateError, TerrainError
 from rover_gym.figures import draw_run
-from rover_gym.figures.grain_frames import draw_soil
-from rover_gym.mechanics import Snapshot
+from rover_gym.figures.grain_frames import draw_disks
+from rover_gym.grains import (
+    DiskBed,
+    DiskRun,
+    Pull,
+    drawbar_pull,
+    drive_on_disks,
+    fit_traction,
+    over_beds,
+    rover_on_disks,
+    settled_disks,
+)
+from rover_gym.mechanics import DiskSimulation, Snapshot, disk_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -23,20 +35,7 @@ from rover_gym.planar import (
     TwoWheelRoverSimulation,
 )
 from rover_gym.record import RecordingError, read_trajectory
-from rover_gym.runs import open_run, record_run
-from rover_gym.soil import (
-    Bed,
-    Pull,
-    SoilRun,
-    SoilSimulation,
-    drawbar_pull,
-    drive_on_soil,
-    fit_traction,
-    over_beds,
-    rover_on_soil,
-    settled_bed,
-    soil_packing,
-)
+from rover_gym.runs import open_run, record_run, saved_run_of
 
 G = 9.81
 
@@ -234,9 +233,9 @@ def test_runs_are_recorded_with_all_that_made_them(tmp_path: Path) -> None:
     assert run.attributes["solver"]["contact"] == "nearest"
 
 
-def pair(**options: object) -> SoilSimulation:
+def pair(**options: object) -> DiskSimulation:
     """Two disks side by side on a line, at rest."""
-    return SoilSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.1]], ground=Line(), **options)  # type: ignore[arg-type]
+    return DiskSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.1]], ground=Line(), **options)  # type: ignore[arg-type]
 
 
 def test_disks_at_rest_stay_and_press_on_the_ground() -> None:
@@ -256,7 +255,7 @@ def test_disks_at_rest_stay_and_press_on_the_ground() -> None:
 
 def test_two_disks_collide_as_the_closed_form_says() -> None:
     # Head on, e = 0.5, no gravity: u+ = -e u-, momentum kept: v1 = 0, v2 = 0.5 for m = 1, 2 and v1- = 1.
-    sim = SoilSimulation(
+    sim = DiskSimulation(
         [0.1, 0.1], [1.0, 2.0], [[0.0, 0.0], [0.3, 0.0]], gravity=(0.0, 0.0), restitution=0.5, tolerance=1e-12
     )
     sim.set_state(sim.position, [[1.0, 0.0], [0.0, 0.0]])
@@ -286,7 +285,7 @@ def test_two_disks_collide_as_the_closed_form_says() -> None:
 def test_what_cannot_be_is_refused_by_name(change: dict[str, object], field: str) -> None:
     good: dict[str, object] = {"radius": [0.1, 0.1], "mass": [1.0, 2.0], "position": [[0.0, 0.1], [0.3, 0.1]]}
     with refused(ValueError, field):
-        SoilSimulation(**{**good, "ground": Line(), **change})  # type: ignore[arg-type]
+        DiskSimulation(**{**good, "ground": Line(), **change})  # type: ignore[arg-type]
 
 
 def test_a_refused_state_changes_nothing() -> None:
@@ -301,34 +300,34 @@ def test_a_refused_state_changes_nothing() -> None:
 
 
 def test_packings_repeat_and_do_not_overlap() -> None:
-    radius, mass, centres = soil_packing(100, width=0.7, seed=3)
-    again = soil_packing(100, width=0.7, seed=3)
+    radius, mass, centres = disk_packing(100, width=0.7, seed=3)
+    again = disk_packing(100, width=0.7, seed=3)
     np.testing.assert_array_equal(centres, again[2])
-    assert not np.array_equal(centres, soil_packing(100, width=0.7, seed=4)[2])
+    assert not np.array_equal(centres, disk_packing(100, width=0.7, seed=4)[2])
     assert (np.abs(centres[:, 0] - 0.35) <= 0.35 - radius).all()
     assert (centres[:, 1] >= radius).all()
     apart = np.linalg.norm(centres[:, None] - centres[None], axis=2) - radius[:, None] - radius[None]
     assert apart[np.triu_indices(100, 1)].min() >= 0.0
     np.testing.assert_allclose(mass / radius**2, mass[0] / radius[0] ** 2)
     with pytest.raises(ValueError, match="width"):
-        soil_packing(10, width=0.01)
+        disk_packing(10, width=0.01)
 
 
 @pytest.fixture(scope="module")
-def bed() -> Bed:
+def bed() -> DiskBed:
     """A hundred disks in two layers, 1.66 m wide."""
-    return settled_bed(100, 2, settle=0.1)
+    return settled_disks(100, 2, settle=0.1)
 
 
-def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_path: Path) -> None:
-    sim = rover_on_soil(bed)
+def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: DiskBed, tmp_path: Path) -> None:
+    sim = rover_on_disks(bed)
     sim.set_torques([50.0, 50.0])
     start = sim.machine
     sim.step(40)
     snapshot = Snapshot.from_bytes(sim.snapshot().to_bytes())
     assert snapshot == sim.snapshot()
     pressed = sim.impulse_on_wheels()
-    path = tmp_path / "soil.h5"
+    path = tmp_path / "disks.h5"
     record_run(sim, 0.08, path, 50.0, title="a test")
     end = sim.position
     assert sim.machine[0] > start[0]
@@ -355,25 +354,34 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
     assert (np.diff(strengths, axis=1) <= 0.0).all()  # the strongest first
     assert (strengths[:, 0] > 0.0).all()
     assert len(run.resample(25.0).time) == 3
-    assert draw_soil(run, tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG")
+    assert draw_disks(run, tmp_path / "disks.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path) -> None:
-    sim = SoilSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls)
-    record_run(sim, 0.04, tmp_path / "soil.h5", 50.0, title="disks alone")
-    run = open_run(tmp_path / "soil.h5")
+def test_disks_without_a_machine_are_recorded_and_drawn(bed: DiskBed, tmp_path: Path) -> None:
+    sim = DiskSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls)
+    record_run(sim, 0.04, tmp_path / "disks.h5", 50.0, title="disks alone")
+    run = open_run(tmp_path / "disks.h5")
     assert run.wheels.shape == (3, 0, 3)
     np.testing.assert_array_equal(run.positions[-1], sim.position)
-    assert draw_soil(run, tmp_path / "soil.png").exists()
+    assert draw_disks(run, tmp_path / "disks.png").exists()
     paths = draw_run(run, tmp_path / "plots", with_overview=True)
     assert [path.name for path in paths] == ["disks-and-contacts.png", "overview.png"]
 
 
-def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
+def test_a_file_of_an_earlier_version_calls_disks_a_soil(bed: DiskBed, tmp_path: Path) -> None:
+    path = tmp_path / "soil.h5"
+    record_run(DiskSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls), 0.01, path, None)
+    trajectory = read_trajectory(path)
+    scene = {**trajectory.attributes["scene"], "kind": "SoilSimulation"}
+    earlier = replace(trajectory, attributes={**trajectory.attributes, "scene": scene})
+    assert isinstance(saved_run_of(earlier, path), DiskRun)
+
+
+def test_a_file_without_disks_is_refused(tmp_path: Path) -> None:
     sim = BallSimulation(Line())
     record_run(sim, 0.01, tmp_path / "ball.h5", None, title="a ball")
-    with pytest.raises(RecordingError, match="contains a PlanarRun, not a SoilRun"):
-        open_run(tmp_path / "ball.h5", SoilRun)
+    with pytest.raises(RecordingError, match="contains a PlanarRun, not a DiskRun"):
+        open_run(tmp_path / "ball.h5", DiskRun)
 
 
 def test_a_weaker_gravity_gives_the_same_motion_slower() -> None:
@@ -382,7 +390,7 @@ def test_a_weaker_gravity_gives_the_same_motion_slower() -> None:
     ends = []
     for s in (1.0, 4.0):
         options = {"gravity": (0.0, -9.81 / s**2), "time_step": 1e-3 * s}
-        sim = rover_on_soil(settled_bed(80, 2, settle=0.1 * s, **options), start=0.66, **options)
+        sim = rover_on_disks(settled_disks(80, 2, settle=0.1 * s, **options), start=0.66, **options)
         sim.set_torques([50.0 / s**2] * 2)
         sim.step(400)
         ends.append((sim.position, sim.machine, s * sim.velocity, s * sim.machine_rate, sim.time / s))
@@ -392,8 +400,8 @@ def test_a_weaker_gravity_gives_the_same_motion_slower() -> None:
 
 
 def test_a_wheel_is_dragged_without_slip_and_pulls_with_half() -> None:
-    # A few slips on a short bed: the curve itself is `rover planar soil --sweep`.
-    bed = settled_bed(250, 4, radius_min=0.013, radius_max=0.0195, settle=0.2, time_step=2e-3)
+    # A few slips on a short bed: the curve itself is `rover planar disks --sweep`.
+    bed = settled_disks(250, 4, radius_min=0.013, radius_max=0.0195, settle=0.2, time_step=2e-3)
     trial = partial(drawbar_pull, rim_speed=0.2, run_in=0.2, distance=0.6, time_step=2e-3, tolerance=1e-3, sleep=True)
     (braked,), (dragged,), (slipping,) = over_beds(trial, [-0.5, 0.0, 0.5], [bed])
     assert [braked.slip, dragged.slip, slipping.slip] == [-0.5, 0.0, 0.5]
@@ -434,20 +442,20 @@ def test_a_curve_of_pull_against_slip_is_found_again() -> None:
         fit_traction(trials(slips), first=0.8)
 
 
-def test_a_drive_tells_way_slip_and_sinkage(bed: Bed) -> None:
-    drive = drive_on_soil(bed, 60.0, run_in=0.05, duration=0.2)
+def test_a_drive_tells_way_slip_and_sinkage(bed: DiskBed) -> None:
+    drive = drive_on_disks(bed, 60.0, run_in=0.05, duration=0.2)
     assert drive.torque == 60.0
     assert drive.distance > 0.0
     assert drive.speed == pytest.approx(drive.distance / 0.2)
     assert 0.0 < drive.slip < 1.0
     assert -0.01 < drive.sinkage < 0.05
-    assert np.isnan(drive_on_soil(bed, 0.0, run_in=0.02, duration=0.05).slip)  # it stands
+    assert np.isnan(drive_on_disks(bed, 0.0, run_in=0.02, duration=0.05).slip)  # it stands
 
 
 def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:
     # A disk lies on two that are held, then on the same two as a piston goes down at 0.1 m/s.
     options = {"kinematic": [True, True, False], "friction": 0.0, "tolerance": 1e-10}
-    sim = SoilSimulation([0.1, 0.1, 0.1], [1.0, 1.0, 2.0], [[-0.1, 0.0], [0.1, 0.0], [0.0, 0.18]], **options)
+    sim = DiskSimulation([0.1, 0.1, 0.1], [1.0, 1.0, 2.0], [[-0.1, 0.0], [0.1, 0.0], [0.0, 0.18]], **options)
     sim.step(400)
     np.testing.assert_allclose(sim.position[2, :2], [0.0, 0.1 * np.sqrt(3.0)], atol=1e-8)
     np.testing.assert_array_equal(sim.position[:2, :2], [[-0.1, 0.0], [0.1, 0.0]])
@@ -461,17 +469,17 @@ def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:
     np.testing.assert_allclose(sim.position[2, 1], 0.1 * np.sqrt(3.0) - 0.02, atol=1e-6)
     np.testing.assert_allclose(sim.momentum(), [0.0, -0.2, 0.0], atol=1e-6)
     with refused(ValueError, "kinematic", "kinematic"):
-        SoilSimulation([0.1], [1.0], [[0.0, 0.0]], kinematic=[True, False])
+        DiskSimulation([0.1], [1.0], [[0.0, 0.0]], kinematic=[True, False])
 
 
 def test_removed_disks_leave_the_others_as_they_are() -> None:
-    radius, mass, centres = soil_packing(40, width=0.4, seed=1)
+    radius, mass, centres = disk_packing(40, width=0.4, seed=1)
     walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.4, 0.0, -1.0, 0.0]]
     # One more, held far off: with it or without it all go on bit for bit.
     marks = np.arange(41) == 7
     more = (np.insert(radius, 7, radius[0]), np.insert(mass, 7, 0.1), np.insert(centres, 7, [0.2, 9.0], axis=0))
-    far = SoilSimulation(*more, walls=walls, kinematic=marks)
-    alone = SoilSimulation(radius, mass, centres, walls=walls)
+    far = DiskSimulation(*more, walls=walls, kinematic=marks)
+    alone = DiskSimulation(radius, mass, centres, walls=walls)
     for sim in (far, alone):
         sim.step(150)
     far.remove(marks)
@@ -489,34 +497,34 @@ def test_removed_disks_leave_the_others_as_they_are() -> None:
 @pytest.mark.parametrize(
     ("call", "field"),
     [
-        (lambda _: settled_bed(10**11), "count"),
-        (lambda _: settled_bed(0), "count"),
-        (lambda _: settled_bed(30, 2.5), "layers"),
-        (lambda _: settled_bed(10, settle=-1.0), "settle"),
-        (lambda _: settled_bed(30, radius_min=0.0), "radius_min"),
-        (lambda _: settled_bed(30, radius_min=0.02, radius_max=0.01), "radius_max"),
-        (lambda _: settled_bed(30, settle=1e300), "settle"),
-        (lambda bed: rover_on_soil(bed, start=np.nan), "start"),
-        (lambda bed: rover_on_soil(bed, start=0.5), "start"),
-        (lambda bed: rover_on_soil(bed, start=1.2), "start"),
+        (lambda _: settled_disks(10**11), "count"),
+        (lambda _: settled_disks(0), "count"),
+        (lambda _: settled_disks(30, 2.5), "layers"),
+        (lambda _: settled_disks(10, settle=-1.0), "settle"),
+        (lambda _: settled_disks(30, radius_min=0.0), "radius_min"),
+        (lambda _: settled_disks(30, radius_min=0.02, radius_max=0.01), "radius_max"),
+        (lambda _: settled_disks(30, settle=1e300), "settle"),
+        (lambda bed: rover_on_disks(bed, start=np.nan), "start"),
+        (lambda bed: rover_on_disks(bed, start=0.5), "start"),
+        (lambda bed: rover_on_disks(bed, start=1.2), "start"),
         (lambda bed: drawbar_pull(bed, 1.0), "slip"),
         (lambda bed: drawbar_pull(bed, 0.1, rim_speed=0.0), "rim_speed"),
         (lambda bed: drawbar_pull(bed, 0.1, distance=3.0), "distance"),
-        (lambda bed: drive_on_soil(bed, 50.0, duration=0.0), "duration"),
-        (lambda bed: drive_on_soil(bed, np.nan, start=0.61), "torques[0]"),
-        (lambda bed: rover_on_soil(bed, rover=[1]), "rover"),
-        (lambda bed: rover_on_soil(bed, rover={"wheel_radius": "big"}), "rover.wheel_radius[0]"),
-        (lambda bed: rover_on_soil(bed, rover={"axle_a": 3.0}), "rover.axle_a"),
-        (lambda bed: drive_on_soil(bed, 0.0, duration=1e300, start=0.61), "duration"),
+        (lambda bed: drive_on_disks(bed, 50.0, duration=0.0), "duration"),
+        (lambda bed: drive_on_disks(bed, np.nan, start=0.61), "torques[0]"),
+        (lambda bed: rover_on_disks(bed, rover=[1]), "rover"),
+        (lambda bed: rover_on_disks(bed, rover={"wheel_radius": "big"}), "rover.wheel_radius[0]"),
+        (lambda bed: rover_on_disks(bed, rover={"axle_a": 3.0}), "rover.axle_a"),
+        (lambda bed: drive_on_disks(bed, 0.0, duration=1e300, start=0.61), "duration"),
         (lambda bed: drawbar_pull(bed, 1.0 - 1e-12, run_in=0.1, distance=0.1, radius=0.1), "slip"),
         (lambda bed: drawbar_pull(bed, 0.5, radius=-1.0), "radius"),
         (lambda bed: over_beds(lambda *_: 0, [1.0], [bed], workers=-1), "workers"),
-        (lambda bed: record_run(rover_on_soil(bed, start=0.61), 1e300, "no.h5"), "duration"),
-        (lambda bed: record_run(rover_on_soil(bed, start=0.61), 1.0, "no.h5", -1.0), "fps"),
+        (lambda bed: record_run(rover_on_disks(bed, start=0.61), 1e300, "no.h5"), "duration"),
+        (lambda bed: record_run(rover_on_disks(bed, start=0.61), 1.0, "no.h5", -1.0), "fps"),
     ],
 )
-def test_soils_that_would_not_end_or_cannot_be_are_refused_by_name(
-    call: Callable[[Bed], object], field: str, narrow_bed: Bed
+def test_beds_that_would_not_end_or_cannot_be_are_refused_by_name(
+    call: Callable[[DiskBed], object], field: str, narrow_bed: DiskBed
 ) -> None:
     with pytest.raises(RoverGymError) as caught:
         call(narrow_bed)
@@ -525,6 +533,6 @@ def test_soils_that_would_not_end_or_cannot_be_are_refused_by_name(
 
 
 @pytest.fixture(scope="module")
-def narrow_bed() -> Bed:
+def narrow_bed() -> DiskBed:
     """As wide as the rover."""
-    return settled_bed(90, 2, settle=0.02)
+    return settled_disks(90, 2, settle=0.02)

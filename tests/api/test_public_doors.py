@@ -24,11 +24,10 @@ from rover_gym.extras import MissingExtraError
 from rover_gym.grains import settled_balls
 from rover_gym.grains.lab import PlatePoint, ShearLaw, ShearPoint, WheelPoint
 from rover_gym.live import LiveChoices, LiveLoop, LiveRover
-from rover_gym.mechanics import GrainSimulation, ball_packing
+from rover_gym.mechanics import DiskSimulation, GrainSimulation, ball_packing, disk_packing
 from rover_gym.planar import BallSimulation, Line
 from rover_gym.record import Channel, Recorder, RoverSampler, describe, read_run
 from rover_gym.runs import open_run, record_run
-from rover_gym.soil import SoilSimulation, soil_packing
 
 pytest.importorskip("h5py")
 
@@ -64,9 +63,9 @@ class World:
         ball = BallSimulation(Line())
         record_run(ball, 0.1, folder / "planar.h5")
         self.planar = open_run(folder / "planar.h5")
-        soil = SoilSimulation(*soil_packing(6, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
-        record_run(soil, 0.02, folder / "soil.h5", 50.0)
-        self.soil = open_run(folder / "soil.h5")
+        disks = DiskSimulation(*disk_packing(6, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
+        record_run(disks, 0.02, folder / "disks.h5", 50.0)
+        self.disks = open_run(folder / "disks.h5")
         self.bed = settled_balls(20, 0.12, 0.12, radius_min=0.01, radius_max=0.012)
         self.rover = LiveRover()
         self.loop = LiveLoop(self.rover, folder)

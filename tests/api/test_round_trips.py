@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
-from rover_gym.mechanics import Snapshot, SoilSimulation, soil_packing
+from rover_gym.mechanics import DiskSimulation, Snapshot, disk_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -195,15 +195,15 @@ def test_copied_planar_simulations_go_on_alike(make: Any, a: float, b: float, ma
             assert twin.snapshot() == sim.snapshot()
 
 
-def soil(**changed: Any) -> SoilSimulation:
-    radius, mass, centres = soil_packing(30, width=0.4, seed=2)
+def disks(**changed: Any) -> DiskSimulation:
+    radius, mass, centres = disk_packing(30, width=0.4, seed=2)
     walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.4, 0.0, -1.0, 0.0]]
     given = {"radius": radius, "mass": mass, "position": centres} | changed
-    return SoilSimulation(**given, walls=walls)
+    return DiskSimulation(**given, walls=walls)
 
 
-def test_a_soils_snapshot_goes_on_alike() -> None:
-    sim, twin = soil(), soil()
+def test_a_snapshot_of_disks_goes_on_alike() -> None:
+    sim, twin = disks(), disks()
     sim.step(80)
     snapshot = Snapshot.from_bytes(sim.snapshot().to_bytes())
     twin.restore(pickle.loads(pickle.dumps(snapshot)))  # noqa: S301 - our own
@@ -214,9 +214,9 @@ def test_a_soils_snapshot_goes_on_alike() -> None:
 
 
 def test_snapshots_of_other_masses_are_refused() -> None:
-    """A snapshot of a planar system or a soil identifies its system, not just its number of coordinates."""
+    """A snapshot of a planar system or of disks identifies its system, not just its number of coordinates."""
     rover = RoverModel()
-    heavy = soil().mass.copy()
+    heavy = disks().mass.copy()
     heavy[3] *= 2.0
     moved, turned = rover.to_dict(), rover.to_dict()
     moved["solids"][2]["centre_of_mass"] = [0.0, 1e-9, 0.0]
@@ -231,8 +231,8 @@ def test_snapshots_of_other_masses_are_refused() -> None:
         (BallSimulation(Line(), inertia=1.0), BallSimulation(Line(), inertia=2.0)),
         (TwoWheelRoverSimulation(Line()), TwoWheelRoverSimulation(Line(), wheel_mass=(60.0, 61.0))),
         (MirroredRoverSimulation(Line()), MirroredRoverSimulation(Line(), model=rover.replace(mass_scale=1.1))),
-        (soil(), soil(mass=heavy)),
-        (soil(), soil(kinematic=[True] + [False] * 29)),
+        (disks(), disks(mass=heavy)),
+        (disks(), disks(kinematic=[True] + [False] * 29)),
     ]
     for one, other in cases:
         other.step(3)
@@ -243,13 +243,13 @@ def test_snapshots_of_other_masses_are_refused() -> None:
 
 
 def test_snapshots_of_another_kind_are_refused() -> None:
-    sims = [Simulation(), BallSimulation(Line()), soil()]
+    sims = [Simulation(), BallSimulation(Line()), disks()]
     for one, other in itertools.permutations(sims, 2):
         with refused(StateError, "snapshot", "another kind"):
             one.restore(other.snapshot())
 
 
-@pytest.mark.parametrize("sim", [Simulation(), BallSimulation(Line()), soil()])
+@pytest.mark.parametrize("sim", [Simulation(), BallSimulation(Line()), disks()])
 def test_a_snapshot_with_a_flipped_bit_is_refused(sim: Any) -> None:
     """Most flipped bits gave another state, which went on."""
     data, draw = sim.snapshot().to_bytes(), np.random.default_rng(8)
@@ -260,7 +260,7 @@ def test_a_snapshot_with_a_flipped_bit_is_refused(sim: Any) -> None:
             Snapshot.from_bytes(bytes(damaged))
 
 
-@pytest.mark.parametrize("sim", [Simulation(), BallSimulation(Line()), soil()])
+@pytest.mark.parametrize("sim", [Simulation(), BallSimulation(Line()), disks()])
 def test_bytes_that_are_no_snapshot_are_refused(sim: Any) -> None:
     data = sim.snapshot().to_bytes()
     sim.restore(Snapshot.from_bytes(data))
@@ -294,7 +294,7 @@ def test_a_quaternion_that_is_no_rotation_is_refused() -> None:
 @settings(max_examples=60, deadline=None)
 def test_a_snapshot_with_damaged_bytes_is_refused_or_goes_on(data: st.DataObject) -> None:
     """Snapshots on a damaged sine hung: the search went wave by wave from a million kilometres below the ground."""
-    for sim in [TwoWheelRoverSimulation(Sine(0.05, 2.0)), driven(Simulation()), soil()]:
+    for sim in [TwoWheelRoverSimulation(Sine(0.05, 2.0)), driven(Simulation()), disks()]:
         sim.step(3)
         damaged = bytearray(sim.snapshot().to_bytes()[:-4])
         for _ in range(data.draw(st.integers(1, 4))):

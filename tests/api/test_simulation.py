@@ -15,9 +15,8 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import BusyError, RoverGymError, Simulation, SphereField
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.mechanics import DiskSimulation, SimulationBatch
 from rover_gym.planar import BallSimulation, Line
-from rover_gym.soil import SoilSimulation
 
 
 def drive(sim, steps=200):
@@ -352,11 +351,11 @@ def ball() -> BallSimulation:
     return sim
 
 
-def soil() -> SoilSimulation:
-    return SoilSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.4]], ground=Line())
+def disks() -> DiskSimulation:
+    return DiskSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.4]], ground=Line())
 
 
-@pytest.mark.parametrize("make", [rover, ball, soil])
+@pytest.mark.parametrize("make", [rover, ball, disks])
 def test_a_long_step_ends_at_ctrl_c_with_the_state_of_the_last_whole_step(make: Callable[[], Any]) -> None:
     # `sim.step(10**6)` could not be stopped: Ctrl-C was heard when all steps had been taken.
     sim, twin = make(), make()
@@ -488,7 +487,7 @@ def test_a_signal_handler_that_looks_at_the_simulation_is_refused_and_does_not_w
     assert sim.time > 0.0
 
 
-@pytest.mark.parametrize(("make", "use"), [(ball, "q"), (soil, "position")])
+@pytest.mark.parametrize(("make", "use"), [(ball, "q"), (disks, "position")])
 def test_planar_simulations_are_busy_too(make: Callable[[], Any], use: str) -> None:
     sim = make()
     with alarm(0.05, lambda: getattr(sim, use)), pytest.raises(BusyError):

@@ -30,7 +30,7 @@ from rover_gym import (
     mechanics,
     solve_friction_contact,
 )
-from rover_gym.mechanics import SoilSimulation, soil_packing
+from rover_gym.mechanics import DiskSimulation, disk_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -124,7 +124,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         BallSimulation,
         {"ground": Line(), "mass": 3.0, "radius": 1.5, "inertia": 1.0, "time_step": 5e-3},
     ),
-    "soil_packing": (soil_packing, {"count": 12, "radius_min": 0.016, "radius_max": 0.0165, "mass": 0.7, "width": 0.5}),
+    "disk_packing": (disk_packing, {"count": 12, "radius_min": 0.016, "radius_max": 0.0165, "mass": 0.7, "width": 0.5}),
     "solve_friction_contact": (
         solve_friction_contact,
         {
@@ -152,9 +152,9 @@ NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
     ("height", lambda x: Polyline.step(0.0, x)),
     ("inertia", lambda x: TwoWheelRoverSimulation(Line(), inertia=x)),
     ("friction", lambda x: TwoWheelRoverSimulation(Line(), friction=x)),
-    ("wall_friction", lambda x: SoilSimulation(*one_disk, wall_friction=x)),
-    ("rolling_friction", lambda x: SoilSimulation(*one_disk, rolling_friction=x)),
-    ("sleep_distance", lambda x: SoilSimulation(*one_disk, sleep_distance=x)),
+    ("wall_friction", lambda x: DiskSimulation(*one_disk, wall_friction=x)),
+    ("rolling_friction", lambda x: DiskSimulation(*one_disk, rolling_friction=x)),
+    ("sleep_distance", lambda x: DiskSimulation(*one_disk, sleep_distance=x)),
 ]
 
 COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
@@ -163,7 +163,7 @@ COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
     ("n", lambda n: Simulation().step(n)),
     ("n", lambda n: Simulation().profile(n)),
     ("n", lambda n: BallSimulation(Line()).step(n)),
-    ("n", lambda n: SoilSimulation(*one_disk).step(n)),
+    ("n", lambda n: DiskSimulation(*one_disk).step(n)),
 ]
 
 OTHERS: list[tuple[str, Callable[[], Any]]] = [
@@ -178,9 +178,9 @@ OTHERS: list[tuple[str, Callable[[], Any]]] = [
     ("path", lambda: SphereField.from_file(3)),  # type: ignore[arg-type]
     ("text", lambda: RoverModel.from_text(3)),  # type: ignore[arg-type]
     ("burial", lambda: SphereField.rocks(*rocks, burial=(0.1, 0.2, 0.3))),  # type: ignore[arg-type]
-    ("kinematic[0]", lambda: SoilSimulation(*one_disk, kinematic=[1.0])),  # type: ignore[list-item]
-    ("which", lambda: SoilSimulation(*one_disk).remove(3)),  # type: ignore[arg-type]
-    ("rover", lambda: SoilSimulation(*one_disk, rover=3)),  # type: ignore[arg-type]
+    ("kinematic[0]", lambda: DiskSimulation(*one_disk, kinematic=[1.0])),  # type: ignore[list-item]
+    ("which", lambda: DiskSimulation(*one_disk).remove(3)),  # type: ignore[arg-type]
+    ("rover", lambda: DiskSimulation(*one_disk, rover=3)),  # type: ignore[arg-type]
     ("accuracy", lambda: accuracy_options(10**400)),  # type: ignore[arg-type]
     ("accuracy", lambda: accuracy_options(True)),
     ("accuracy", lambda: accuracy_options(np.timedelta64(1, "s"))),  # type: ignore[arg-type]
@@ -239,7 +239,7 @@ def refused(field: str, call: Callable[[], Any]) -> None:
 OTHER_FIELDS = {
     "RoverModel.replace": ("solids", "wheels"),
     "Simulation": ("parts",),
-    "soil_packing": ("radius",),
+    "disk_packing": ("radius",),
     "HeightField.fractal": ("heights",),
 }
 
@@ -331,8 +331,8 @@ def test_whatever_is_a_number_is_taken() -> None:
         ("max_diameter", lambda: SphereField.rocks(*rocks, max_diameter=1e300)),
         ("min_diameter", lambda: SphereField.rocks(*rocks, min_diameter=5e-324)),
         ("clear", lambda: SphereField.rocks(*rocks, clear=[(1e300, 0.0, 1.0)])),
-        ("sleep_distance", lambda: SoilSimulation(*one_disk, sleep_distance=1e-300)),
-        ("mass[0]", lambda: SoilSimulation([0.1], [1e300], [[0.0, 0.0]])),
+        ("sleep_distance", lambda: DiskSimulation(*one_disk, sleep_distance=1e-300)),
+        ("mass[0]", lambda: DiskSimulation([0.1], [1e300], [[0.0, 0.0]])),
     ],
 )
 def test_absurd_magnitudes_are_refused_by_name(field: str, call: Callable[[], Any]) -> None:

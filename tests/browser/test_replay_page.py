@@ -19,13 +19,13 @@ from selenium.common.exceptions import TimeoutException, WebDriverException
 from selenium.webdriver.common.by import By
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
+from rover_gym.grains import DiskRun, rover_on_disks, settled_disks
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.rendering.appearance import GROUND_COLOUR, SKY_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page
 from rover_gym.replay.charts import LOAD_TIME
 from rover_gym.replay.rover_scene import WHEEL_NAMES
 from rover_gym.runs import open_run, record_run
-from rover_gym.soil import SoilRun, rover_on_soil, settled_bed
 
 R = TypeVar("R")
 
@@ -362,27 +362,27 @@ def moves(browser: webdriver.Chrome, patience: float) -> bool:
     return False
 
 
-# --- The two-wheel rover on a soil of disks
+# --- The two-wheel rover on disks
 
 
 @pytest.fixture(scope="module")
-def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[SoilRun]]:
+def disks_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[DiskRun]]:
     """Half a second on 150 disks."""
-    folder = tmp_path_factory.mktemp("soil")
-    bed = settled_bed(150, 2, settle=0.1)
-    sim = rover_on_soil(bed)
+    folder = tmp_path_factory.mktemp("disks")
+    bed = settled_disks(150, 2, settle=0.1)
+    sim = rover_on_disks(bed)
     sim.set_torques([50.0, 50.0])
-    record_run(sim, 0.5, folder / "soil.h5", 20.0, title="the rover on 150 disks")
-    run = open_run(folder / "soil.h5")
-    page = write_page(run, folder / "soil.html")
+    record_run(sim, 0.5, folder / "disks.h5", 20.0, title="the rover on 150 disks")
+    run = open_run(folder / "disks.h5")
+    page = write_page(run, folder / "disks.html")
     with opened(page, folder / "profile") as browser:
         yield Shown(browser, run, page)
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_loads_without_errors_and_without_the_network")
-def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: Shown[SoilRun]) -> None:
-    assert_alone(soil_shown)
-    browser = soil_shown.browser
+def test_a_page_of_disks_loads_alone_and_shows_rover_and_disks(disks_shown: Shown[DiskRun]) -> None:
+    assert_alone(disks_shown)
+    browser = disks_shown.browser
     assert browser.title == "the rover on 150 disks"
     assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
         f"wheel load, mean over {LOAD_TIME:g} s (N)",
@@ -398,8 +398,8 @@ def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: Shown[So
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_timeline_moves_balls_and_rover_and_comes_back")
-def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_shown: Shown[SoilRun]) -> None:
-    browser, run = soil_shown.browser, soil_shown.run
+def test_the_timeline_of_disks_moves_disks_chains_and_wheels_and_comes_back(disks_shown: Shown[DiskRun]) -> None:
+    browser, run = disks_shown.browser, disks_shown.run
     go_to(browser, 0.0)
     first = picture(browser)
     go_to(browser, 0.5)

@@ -24,7 +24,7 @@ TABLES = {
     "model check rover": ("loads", "step_height"),
     "planar ball --duration 0.1 --output {to}": ("x", "speed", "smallest_gap", "written"),
     "planar rover --duration 0.1 --output {to}": ("x", "unconverged_rows", "written"),
-    "planar soil --duration 0.02 --no-film --output {to}": ("slip", "mean_sinkage", "written"),
+    "planar disks --duration 0.02 --no-film --output {to}": ("slip", "mean_sinkage", "written"),
     "grains collapse --balls 60 --tube 0.03 --time-step 0.004 --duration 0.05 --output {to}": ("run_out_in_radii",),
     "grains silo --balls 60 --tube 0.03 --hole 0.01 --time-step 0.004 --duration 0.05 --output {to}": ("share_out",),
     "grains drum --balls 60 --time-step 0.004 --duration 0.05 --output {to}": ("slope_deg",),

@@ -15,11 +15,12 @@ from matplotlib.figure import Figure
 from pages import held
 
 from rover_gym.figures.chapter_3 import _sine_path, draw_chapter_3
+from rover_gym.figures.disk_run_figures import DISK_DRAWINGS
 from rover_gym.figures.drawing import KINDS
 from rover_gym.figures.incline_figure import fill_incline
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
-from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
 from rover_gym.figures.style import STYLE
+from rover_gym.grains import DiskRun
 from rover_gym.planar import BallSimulation, Line, PlanarRun, Polyline, Sine, TwoWheelRoverSimulation
 from rover_gym.planar.incline import Incline
 from rover_gym.record import RecordingError, read_trajectory
@@ -28,7 +29,6 @@ from rover_gym.replay.flat_scene import planar_scene
 from rover_gym.replay.page_scene import PageScene
 from rover_gym.reproduction.scene_runs import ball_on_incline, ball_on_sine, published
 from rover_gym.runs import open_run, record_run
-from rover_gym.soil import SoilRun
 
 OTHER_BALL = pytest.mark.nightly(
     "tests/cli/test_planar.py::test_a_ball_on_an_incline_slides_and_rolls_as_the_closed_form_says"
@@ -95,22 +95,22 @@ def test_bad_options_end_with_one_line(options: list[str], field: str, tmp_path:
 SMALL = ["--disks", "100", "--layers", "2"]
 
 
-@pytest.mark.nightly("tests/cli/test_planar.py::test_a_crossing_ends_where_the_soil_does")
+@pytest.mark.nightly("tests/cli/test_planar.py::test_a_crossing_ends_where_the_disks_do")
 def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> None:
     options = [*SMALL, "--duration", "0.2", "--output", str(tmp_path)]
-    assert "distance" in output_of("planar", "soil", *options)
-    run = open_run(tmp_path / "soil.h5")
+    assert "distance" in output_of("planar", "disks", *options)
+    run = open_run(tmp_path / "disks.h5")
     assert run.trajectory.attributes["complete"]
     assert run.n_frames == 11
     assert run.time[-1] == pytest.approx(0.2)
     assert run.wheels[-1, 1, 0] > run.wheels[0, 1, 0]
-    width, height = png_size(tmp_path / "soil.png")
+    width, height = png_size(tmp_path / "disks.png")
     assert width == 1200
     assert height > 300
     command = [
         imageio_ffmpeg.get_ffmpeg_exe(),
         "-i",
-        str(tmp_path / "soil.mp4"),
+        str(tmp_path / "disks.mp4"),
         "-f",
         "rawvideo",
         "-pix_fmt",
@@ -121,19 +121,19 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
     frames = np.frombuffer(film, np.uint8).astype(int).reshape(6, -1, 1200)
     assert (np.abs(frames[0] - frames[-1]) > 60).mean() > 0.001  # it moves
 
-    page = tmp_path / "soil.html"
-    output_of("replay", tmp_path / "soil.h5", "--html", page)
+    page = tmp_path / "disks.html"
+    output_of("replay", tmp_path / "disks.h5", "--html", page)
     assert page.stat().st_size > 500_000
-    assert "error: --gltf" in error_of("replay", tmp_path / "soil.h5", "--gltf", tmp_path / "soil.glb")
+    assert "error: --gltf" in error_of("replay", tmp_path / "disks.h5", "--gltf", tmp_path / "disks.glb")
 
 
 @pytest.mark.nightly("tests/cli/test_planar.py::test_a_planar_run_is_plotted_and_replayed")
-def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_on_disks_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = [*SMALL, "--duration", "0.2", "--no-film", "--output", str(tmp_path)]
-    assert rover("planar", "soil", *options).exit_code == 0
-    run = open_run(tmp_path / "soil.h5")
-    figures = {name: Figure() for name in SOIL_DRAWINGS}
-    for name, drawing in SOIL_DRAWINGS.items():
+    assert rover("planar", "disks", *options).exit_code == 0
+    run = open_run(tmp_path / "disks.h5")
+    figures = {name: Figure() for name in DISK_DRAWINGS}
+    for name, drawing in DISK_DRAWINGS.items():
         drawing.draw(figures[name], run)
         assert run.title in figures[name].get_suptitle()
     labels = [[axes.get_ylabel().split("\n")[-1] for axes in figure.axes] for figure in figures.values()]
@@ -149,27 +149,27 @@ def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert np.isfinite(ratios[:, 1:]).all()
     assert 0.0 < ratios.mean() < 100.0
 
-    monkeypatch.setitem(KINDS, SoilRun, ({"driving": SOIL_DRAWINGS["driving"]}, 1))
-    output_of("plot", tmp_path / "soil.h5", "--overview")
-    files = sorted((tmp_path / "soil-plots").iterdir())
+    monkeypatch.setitem(KINDS, DiskRun, ({"driving": DISK_DRAWINGS["driving"]}, 1))
+    output_of("plot", tmp_path / "disks.h5", "--overview")
+    files = sorted((tmp_path / "disks-plots").iterdir())
     assert [file.name for file in files] == ["driving.png", "overview.png"]
     assert all(is_png(file) for file in files)
-    assert "error: --format" in error_of("plot", tmp_path / "soil.h5", "--format", "bmp")
+    assert "error: --format" in error_of("plot", tmp_path / "disks.h5", "--format", "bmp")
 
 
-def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
+def test_a_crossing_ends_where_the_disks_do(tmp_path: Path) -> None:
     options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-film"]
-    output_of("planar", "soil", *options, "--gravity", "0.61", "--output", tmp_path)
-    assert open_run(tmp_path / "soil.h5").time[-1] < 5.0
+    output_of("planar", "disks", *options, "--gravity", "0.61", "--output", tmp_path)
+    assert open_run(tmp_path / "disks.h5").time[-1] < 5.0
 
 
 @pytest.mark.nightly("tests/cli/test_planar.py::test_a_run_is_recorded_and_drawn")
 def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, values in (("TORQUES", (50.0,)), ("SLIPS", (0.0, 0.2, 0.5, 0.7)), ("LOADS", (10.0,))):
-        monkeypatch.setattr(f"rover_gym.cli.soil_command.{name}", values)
+        monkeypatch.setattr(f"rover_gym.cli.disks_command.{name}", values)
     options = [*SMALL, "--sweep", "--seeds", "1", "--pull-disks", "190", "--pull-layers", "3"]
-    output = output_of("planar", "soil", *options, "--output", tmp_path)
-    numbers = json.loads((tmp_path / "soil-curves.json").read_text())
+    output = output_of("planar", "disks", *options, "--output", tmp_path)
+    numbers = json.loads((tmp_path / "disk-curves.json").read_text())
     assert [row[0]["torque"] for row in numbers["drives"]] == [50.0]
     pulls = [row[0] for row in numbers["pulls"]["10.0"]]
     assert [pull["slip"] for pull in pulls] == [0.0, 0.2, 0.5, 0.7]
@@ -178,7 +178,7 @@ def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pyte
     ratio = [pull["pull"] / pull["weight"] for pull in pulls]
     assert fit["last_slope"] == {"value": pytest.approx((ratio[3] - ratio[2]) / 0.2), "error": None}
     assert "slope from s = 0.5 on" in output
-    assert is_png(tmp_path / "soil-curves.png")
+    assert is_png(tmp_path / "disk-curves.png")
 
 
 @pytest.mark.parametrize(
@@ -194,8 +194,8 @@ def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pyte
         (["--sweep", "--seeds", "1", "--pull-disks", "60"], "error: --pull-disks"),
     ],
 )
-def test_a_soil_that_cannot_be_ends_with_one_line(options: list[str], message: str, tmp_path: Path) -> None:
-    arguments = ["planar", "soil", *SMALL, *options, "--output", str(tmp_path)]
+def test_a_bed_that_cannot_be_ends_with_one_line(options: list[str], message: str, tmp_path: Path) -> None:
+    arguments = ["planar", "disks", *SMALL, *options, "--output", str(tmp_path)]
     result = rover(*arguments)
     assert result.exit_code == 2
     assert message in result.output

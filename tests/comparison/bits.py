@@ -24,10 +24,9 @@ from comparison.scene import Array, RoverScene, steps_in
 from comparison.scenes import flat_drive, parked, rocks, rug
 from rover_gym import PDPolicy
 from rover_gym.env.sand_ground import sand_rover
-from rover_gym.mechanics import Plane, Simulation, SimulationBatch
+from rover_gym.mechanics import DiskSimulation, Plane, Simulation, SimulationBatch, disk_packing
 from rover_gym.planar import BallSimulation, Line, TwoWheelRoverSimulation
 from rover_gym.sand import SoftGround, named_soil
-from rover_gym.soil import SoilSimulation, soil_packing
 
 COMMITTED = Path(__file__).parents[1] / "golden" / "bits.json"
 #: Simulated of each scene, s, and between two states that are hashed.
@@ -99,10 +98,10 @@ def planar(simulation: Any, torques: Array | None = None) -> Trajectory:
         yield simulation.q, simulation.v
 
 
-def soil() -> Trajectory:
+def disks() -> Trajectory:
     """Disks that fall into a heap on a line."""
-    radius, mass, position = soil_packing(60, width=0.6)
-    simulation = SoilSimulation(radius, mass, position, ground=Line())
+    radius, mass, position = disk_packing(60, width=0.6)
+    simulation = DiskSimulation(radius, mass, position, ground=Line())
     for _ in range(20):
         simulation.step(20)
         yield simulation.position, simulation.velocity
@@ -149,7 +148,7 @@ def trajectories() -> dict[str, Callable[[], Trajectory]]:
     found["PD baseline, rocks"] = partial(baseline, terrain="rocks")
     found["ball on a line"] = lambda: planar(BallSimulation(Line(slope=-0.2)))
     found["two-wheel rover"] = lambda: planar(TwoWheelRoverSimulation(Line()), np.array([20.0, 20.0]))
-    found["soil"] = soil
+    found["disks"] = disks
     found["sand"] = sand
     return found
 

@@ -46,7 +46,7 @@ SCENES = {
     "rover in a curve": Scene("drive_steps", (), 1, 1001),
     "rover in a curve, Newton": Scene("drive_steps", ("newton",), 1, 301),
     "rover on sand": Scene("sand_steps", ("explore",), 10, 110),
-    "bed of disks": Scene("soil_steps", (), 1, 101),
+    "bed of disks": Scene("disk_steps", (), 1, 101),
     "derivatives in sand": Scene("sand_steps", ("derivatives",), 10, 50),
     "derivatives on firm ground": Scene("sand_steps", ("derivatives-on-firm-ground",), 10, 50),
     "two rovers with a hitch": Scene("machine_steps", ("tow", "alone"), 10, 210),

@@ -28,10 +28,9 @@ from torture.joined import _scene as joined_scene
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, TriangleMesh
 from rover_gym.env.sand_ground import sand_rover
-from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, ball_packing
+from rover_gym.mechanics import DiskSimulation, GrainSimulation, RoverGrainSimulation, ball_packing, disk_packing
 from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Sine, TwoWheelRoverSimulation
 from rover_gym.sand import SoftGround, named_soil
-from rover_gym.soil import SoilSimulation, soil_packing
 
 Arrays = tuple[npt.NDArray[np.float64], ...]
 #: Time between two states that are recorded, s, and how many there are of each drive.
@@ -214,7 +213,7 @@ def drives() -> dict[str, Made]:
     found["ball, line"] = (PLANAR, partial(BallSimulation, Line(slope=-0.2)))
     found["two wheels, waves"] = (PLANAR, partial(TwoWheelRoverSimulation, Sine(0.05, 1.0)))
     found["mirrored rover, line"] = (PLANAR, partial(MirroredRoverSimulation, Line()))
-    found["disks"] = (DISKS, lambda: SoilSimulation(*soil_packing(60, width=0.6), ground=Line()))
+    found["disks"] = (DISKS, lambda: DiskSimulation(*disk_packing(60, width=0.6), ground=Line()))
     found["balls"] = (BALLS, _balls)
     found["rover among balls"] = (AMONG_BALLS, _among_balls)
     return found

@@ -92,8 +92,8 @@ rover("plot", "run/episode-0.h5", "--output", "plots")
 assert len(list(Path("plots").glob("*.png"))) == 7
 rover("replay", "run/episode-0.h5", "--html", "page.html")
 rover("planar", "rover", "--duration", "0.5", "--output", "planar")
-rover("planar", "soil", "--duration", "0.05", "--output", "planar")
-assert Path("planar/soil.mp4").stat().st_size > 1000
+rover("planar", "disks", "--duration", "0.05", "--output", "planar")
+assert Path("planar/disks.mp4").stat().st_size > 1000
 rover("report", "--duration", "1", "--figures", "--output", "report")
 rover("model", "show", "mars-rover", "--picture", "rover.png")
 rover("grains", "collapse", "--balls", "60", "--tube", "0.03", "--duration", "0.05", "--film", "--output", "grains")

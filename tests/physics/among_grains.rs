@@ -10,7 +10,7 @@ use rover_core::law::rolling::RollingFriction;
 use rover_core::multibody::{Model, ModelDescription};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::{
-    GrainSimulation, RoverInGrains, RoverSimulation, Scene as _, TogetherError, soil_options,
+    GrainSimulation, RoverInGrains, RoverSimulation, Scene as _, TogetherError, grain_options,
 };
 use rover_core::solver::SolverOptions;
 use rover_core::system::grains::{
@@ -106,7 +106,7 @@ impl Scene {
 
     /// Linear momentum, and angular momentum about the origin.
     fn momentum(&self) -> [Vector3<f64>; 2] {
-        let (linear, moment) = self.bed.soil().momentum(self.bed.q(), self.bed.v());
+        let (linear, moment) = self.bed.momentum();
         let own = self.rover.momentum();
         [linear + own.linear, moment + own.angular]
     }
@@ -331,7 +331,7 @@ fn what_does_not_belong_together_is_refused() {
     let options = options(9.81, 1e-3, 1e-6);
     let bed = |options| balls(&[[0.0, -0.3, 0.0]], 0.05, 1.0, false, options);
     let mut own = rover(nowhere(), [0.0, 1.0, 0.0], &options);
-    let slow = soil_options(&bed(&options).soil().grains);
+    let slow = grain_options(&bed(&options).description().grains);
     let other = StepOptions {
         time_step: 2e-3,
         ..slow

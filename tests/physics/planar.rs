@@ -4,7 +4,7 @@
 mod scenes;
 
 mod ball;
+mod disks;
 mod mirrored_rover;
 mod siconos;
-mod soil;
 mod two_wheel_rover;

@@ -8,7 +8,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::law::rolling::RollingFriction;
 use rover_core::nalgebra::{SVector, Vector3};
 use rover_core::problem::BodyPairs;
-use rover_core::simulation::{GrainSimulation, soil_options};
+use rover_core::simulation::{GrainSimulation, grain_options};
 use rover_core::solver::Swept;
 use rover_core::spatial::space::body_velocities;
 use rover_core::system::grains::{Cohesion, GrainFriction, GrainScene, Grains, Packing, Wall};
@@ -33,7 +33,7 @@ fn scene<const D: usize>(n: usize, rolling: f64, drilling: f64) -> GrainScene<D>
 }
 
 fn exact<const D: usize>(scene: &GrainScene<D>) -> StepOptions {
-    let mut options = soil_options(&scene.grains);
+    let mut options = grain_options(&scene.grains);
     options.solver.tolerance = 1e-10;
     options.solver.velocity_tolerance = 1e-10;
     options.solver.max_sweeps = 20_000;
@@ -169,8 +169,7 @@ fn two_balls_share_their_spin_and_keep_the_momentum() {
     let mut v = vec![0.0; 12];
     v[3] = 2.0;
     run.set_state(&q, &v).expect("a state");
-    let momentum = |run: &GrainSimulation<3>| run.soil().momentum(run.q(), run.v());
-    let before = momentum(&run);
+    let before = run.momentum();
     let n = 100;
     run.step(n).expect("finite");
     let time = run.options().time_step * n as f64;
@@ -184,7 +183,7 @@ fn two_balls_share_their_spin_and_keep_the_momentum() {
     // Now one that rolls on the other, too.
     v[5] = 5.0;
     run.set_state(&q, &v).expect("a state");
-    let rolling = momentum(&run);
+    let rolling = run.momentum();
     let mut energy = run.energy().kinetic;
     for _ in 0..300 {
         run.step(1).expect("finite");
@@ -192,7 +191,7 @@ fn two_balls_share_their_spin_and_keep_the_momentum() {
         assert!(now <= energy * (1.0 + 1e-12), "{now} J after {energy} J");
         energy = now;
     }
-    let after = momentum(&run);
+    let after = run.momentum();
     assert!((after.0 - before.0).norm() < 1e-12);
     assert!(
         (after.1 - rolling.1).norm() < 1e-7 * rolling.1.norm(),
@@ -238,7 +237,7 @@ fn heap(rolling: f64, threads: usize) -> GrainSimulation<3> {
         grains,
         ..scene::<3>(1, rolling, 0.5 * rolling)
     };
-    let mut options = soil_options(&scene.grains);
+    let mut options = grain_options(&scene.grains);
     options.time_step = 2e-3;
     options.solver.threads = threads;
     GrainSimulation::new(Arc::new(scene), options, None, q).expect("a bed")

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rover_core::geometry::{Drum, Floor, Silo, Support};
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::simulation::{GrainSimulation, soil_options};
+use rover_core::simulation::{GrainSimulation, grain_options};
 use rover_core::system::grains::{Cohesion, GrainFriction, GrainScene, Grains, Wall};
 
 const G: f64 = 9.81;
@@ -36,7 +36,7 @@ fn scene(
 }
 
 fn exact(scene: &GrainScene<3>) -> StepOptions {
-    let mut options = soil_options(&scene.grains);
+    let mut options = grain_options(&scene.grains);
     options.solver.tolerance = 1e-9;
     options.solver.velocity_tolerance = 1e-9;
     options
@@ -149,7 +149,7 @@ fn cohesion_adds_to_the_load_of_friction() {
     let expected = 3.0 - MU * 2.5 * G * 0.05;
     assert!((ball.v()[0] - expected).abs() < 1e-6, "{:?}", ball.v());
     let contact = &ball.contacts()[0];
-    let whole = contact.impulse[0] - 1e-3 * ball.soil().attraction(&contact.contact);
+    let whole = contact.impulse[0] - 1e-3 * ball.description().attraction(&contact.contact);
     assert!(
         (whole - 1e-3 * MASS * G).abs() < 1e-8,
         "it bears its weight"
@@ -166,14 +166,14 @@ fn two_balls_that_cohere_move_as_one_and_keep_their_momentum() {
     let mut v = [0.0; 12];
     (v[1], v[7]) = (-0.5, 0.5);
     pair.set_state(&q, &v).expect("a state");
-    let before = pair.soil().momentum(pair.q(), pair.v());
+    let before = pair.momentum();
     pair.step(1000).expect("steps");
     let apart = (0..3).map(|k| (pair.q()[k] - pair.q()[3 + k]).powi(2));
     assert!(
         (apart.sum::<f64>().sqrt() - 2.0 * RADIUS).abs() < 0.01 * RADIUS,
         "F exceeds the centrifugal force of 5 N"
     );
-    let after = pair.soil().momentum(pair.q(), pair.v());
+    let after = pair.momentum();
     assert!((before.0 - after.0).norm() < 1e-12);
     assert!((before.1 - after.1).norm() < 1e-3 * before.1.norm());
 }

@@ -23,7 +23,8 @@ from rover_gym import (
     StepError,
     TriangleMesh,
 )
-from rover_gym.mechanics import Snapshot
+from rover_gym.grains import DiskRun
+from rover_gym.mechanics import DiskSimulation, Snapshot, disk_packing
 from rover_gym.models import RobotFileWarning
 from rover_gym.planar import BallSimulation, Sine
 from rover_gym.policy import ArcNetworkPolicy, PolicyError, ScanPolicy
@@ -31,7 +32,6 @@ from rover_gym.policy.arc_network_policy import ARCS_FILE
 from rover_gym.policy.network_files import ANYWHERE, FOLDER
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
 from rover_gym.runs import open_run
-from rover_gym.soil import SoilRun, SoilSimulation, soil_packing
 from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import (
     mutate_bytes,
@@ -117,7 +117,7 @@ def use(ledger: Ledger, what: str, sim: Any) -> None:
     for _ in range(5):
         if attempt(ledger, what, sim.step) is None:
             return
-        state = (sim.position, sim.velocity) if isinstance(sim, SoilSimulation) else (sim.q, sim.v)
+        state = (sim.position, sim.velocity) if isinstance(sim, DiskSimulation) else (sim.q, sim.v)
         if not all(np.isfinite(part).all() for part in state):
             ledger.find(f"{what}: not finite after a step")
 
@@ -131,11 +131,11 @@ def runs(random: Random, ledger: Ledger) -> None:
         mutate_hdf5(random, path, _elsewhere())
         run = attempt(ledger, "read_run", lambda: read_run(path), RecordingError, str(path))
         try:
-            open_run(path, SoilRun)
+            open_run(path, DiskRun)
         except RecordingError:
             pass
         else:
-            ledger.find("a rover's run was read as a soil's")
+            ledger.find("a rover's run was read as that of disks")
         if run is None:
             continue
         if not np.isfinite(run.positions).all():
@@ -238,15 +238,15 @@ def _ball() -> BallSimulation:
     return ball
 
 
-def _soil() -> SoilSimulation:
-    soil = SoilSimulation(*soil_packing(12, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
-    soil.step(5)
-    return soil
+def _disks() -> DiskSimulation:
+    sim = DiskSimulation(*disk_packing(12, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
+    sim.step(5)
+    return sim
 
 
 def snapshots(random: Random, ledger: Ledger) -> None:
-    """Snapshots of the rover, a ball and a soil with bytes changed; what is accepted is stepped."""
-    make = (_moving, _ball, _soil)[random.integers(3)]
+    """Snapshots of the rover, a ball and disks with bytes changed; what is accepted is stepped."""
+    make = (_moving, _ball, _disks)[random.integers(3)]
     sim: Any = make()
     data = sim.snapshot().to_bytes()
     for _ in range(15):

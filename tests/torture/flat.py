@@ -1,10 +1,11 @@
-"""The planar machines and the soil."""
+"""The planar machines and disks."""
 
 from typing import Any
 
 import numpy as np
 
 from rover_gym import StepError
+from rover_gym.mechanics import DiskSimulation, disk_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -16,7 +17,6 @@ from rover_gym.planar import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.soil import SoilSimulation, soil_packing
 from torture.audit import BLOWN_UP, GAIN, Array
 from torture.drives import log_uniform, variant
 from torture.ledger import Bounds, Ledger, Regime
@@ -136,7 +136,7 @@ def machine(kind: str) -> Any:
     return run
 
 
-def soil(restitution: float) -> Any:
+def disks(restitution: float) -> Any:
     """Disks in a box, thrown at up to 10 m/s, with friction or with restitution; not projected, which lifts."""
 
     def run(random: Random, ledger: Ledger) -> None:
@@ -146,9 +146,9 @@ def soil(restitution: float) -> Any:
 
 
 def _shake(random: Random, ledger: Ledger, restitution: float) -> None:
-    radius, mass, centres = soil_packing(int(random.integers(5, 120)), width=0.6, seed=int(random.integers(1000)))
+    radius, mass, centres = disk_packing(int(random.integers(5, 120)), width=0.6, seed=int(random.integers(1000)))
     walls = [(0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.0), (0.6, 0.0, -1.0, 0.0)]
-    sim = SoilSimulation(
+    sim = DiskSimulation(
         radius,
         mass,
         centres,
@@ -189,7 +189,7 @@ REGIMES = [
     Regime("planar: ball", machine("ball"), 40),
     Regime("planar: two wheels", machine("two wheels"), 40),
     Regime("planar: the rover's image", machine("rover"), 40),
-    Regime("soil in a box", soil(0.0), 15, Bounds(not_converged=0.05)),
+    Regime("disks in a box", disks(0.0), 15, Bounds(not_converged=0.05)),
     # Newton's law looks at velocities before the step, gravity's part of it adds up to (g h)^2 / 2 for each kg.
-    Regime("soil in a box, e = 0.9", soil(0.9), 5, Bounds(not_converged=0.05, gained=4e-4)),
+    Regime("disks in a box, e = 0.9", disks(0.9), 5, Bounds(not_converged=0.05, gained=4e-4)),
 ]

@@ -9,8 +9,8 @@ import numpy as np
 from rich.table import Table
 
 from rover_gym import Plane, RoverEnv, RoverModel, Simulation, SphereField, solve_friction_contact
+from rover_gym.mechanics import DiskSimulation, disk_packing
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine
-from rover_gym.soil import SoilSimulation, soil_packing
 from torture.damage import attempt, use
 from torture.ledger import Bounds, Ledger, Regime
 
@@ -50,14 +50,14 @@ def _placed(x: float) -> Simulation:
     return sim
 
 
-def _disks(n: int) -> SoilSimulation:
+def _disks(n: int) -> DiskSimulation:
     """Many disks, all in one place."""
-    return SoilSimulation(np.full(n, 0.01), np.ones(n), np.zeros((n, 2)))
+    return DiskSimulation(np.full(n, 0.01), np.ones(n), np.zeros((n, 2)))
 
 
 FINDS: dict[str, Callable[[], Any]] = {
-    "a soil of 1e11 disks": lambda: soil_packing(10**11),
-    "a soil of 2e19 disks": lambda: soil_packing(2 * 10**19),
+    "a bed of 1e11 disks": lambda: disk_packing(10**11),
+    "a bed of 2e19 disks": lambda: disk_packing(2 * 10**19),
     "a chain of 300 solids": lambda: Simulation(_chain(300)),
     "a chain of 3000 solids": lambda: Simulation(_chain(3000)),
     "20 000 solids": lambda: Simulation(_chain(20_000)),
@@ -90,7 +90,7 @@ FINDS: dict[str, Callable[[], Any]] = {
 def play(what: str, ledger: Ledger) -> None:
     """Makes one of them, steps it if it is made, and takes it back to where it is."""
     made = attempt(ledger, what, FINDS[what])
-    if isinstance(made, Simulation | BallSimulation | SoilSimulation):
+    if isinstance(made, Simulation | BallSimulation | DiskSimulation):
         use(ledger, what, made)
         attempt(ledger, what, lambda: made.restore(made.snapshot()))
 

@@ -1,4 +1,4 @@
-"""Validation of the soil as granular matter, against papers and closed forms."""
+"""Validation of grains as granular matter, against papers and closed forms."""
 
 import os
 

@@ -65,7 +65,7 @@ def page(parts: dict[str, dict[str, Any]]) -> tuple[str, list[findings.Finding]]
 
 def main() -> None:
     """Measures, draws, writes."""
-    parser = argparse.ArgumentParser(description="Whether the soil behaves as granular matter does.")
+    parser = argparse.ArgumentParser(description="Whether grains behave as granular matter does.")
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="all if none is named")
     parser.add_argument("--write", action="store_true", help="only draw and write the page from the JSON files")
     arguments = parser.parse_args()

@@ -66,7 +66,7 @@ def bed(count: int, friction: float, seed: int, ledger: Ledger, *, shakes: int =
         seed: Of the disks.
         ledger: What the steps are entered into.
         shakes: How often the settled bed is shaken before it is looked at.
-        **options: Of `SoilSimulation`.
+        **options: Of `DiskSimulation`.
     """
     width = DIAMETER * np.sqrt(count * np.pi / 4.0 / 0.82)
     sample = loose(count, width, seed)

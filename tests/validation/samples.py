@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import SoilSimulation, soil_packing
+from rover_gym.mechanics import DiskSimulation, disk_packing
 from validation.watch import GRAVITY, Watched
 
 Array = npt.NDArray[np.float64]
@@ -64,14 +64,14 @@ class Sample:
         """Those that are not kinematic."""
         return self[~self.kinematic]
 
-    def after(self, sim: SoilSimulation) -> Sample:
+    def after(self, sim: DiskSimulation) -> Sample:
         """The same disks where a simulation left them."""
         return replace(self, position=sim.position, velocity=sim.velocity)
 
     def watched(self, *, walls: object = None, friction: float, has_energy: bool = True, **options: object) -> Watched:
         """A simulation of these disks; their friction with walls is the same as among them unless given."""
         given = {"wall_friction": friction, "time_step": TIME_STEP} | options
-        sim = SoilSimulation(
+        sim = DiskSimulation(
             self.radius, self.mass, self.position, kinematic=self.kinematic, walls=walls, friction=friction, **given
         )
         sim.set_state(self.position, self.velocity)
@@ -80,7 +80,7 @@ class Sample:
 
 def loose(count: int, width: float, seed: int, *, left: float = 0.0, bottom: float = 0.0) -> Sample:
     """Disks in loose rows over a width, none of which touch."""
-    radius, mass, centres = soil_packing(
+    radius, mass, centres = disk_packing(
         count,
         radius_min=RADIUS * (1.0 - SPREAD),
         radius_max=RADIUS * (1.0 + SPREAD),

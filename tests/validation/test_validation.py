@@ -43,7 +43,7 @@ def test_columns_run_out_the_farther_the_taller_and_nearly_in_proportion() -> No
     held(ledger)
 
 
-@pytest.mark.nightly("tests/physics/planar/soil.rs::the_floor_carries_the_weight")
+@pytest.mark.nightly("tests/physics/planar/disks.rs::the_floor_carries_the_weight")
 def test_disks_without_friction_pack_at_random_and_isostatically_those_with_friction_loosely() -> None:
     ledger = Ledger()
     smooth, rough = (bed(250, mu, 0, ledger) for mu in (0.0, 1.0))
@@ -66,7 +66,7 @@ def test_a_slope_stays_the_steeper_the_more_friction() -> None:
     held(ledger)
 
 
-@pytest.mark.nightly("tests/physics/planar/soil.rs::the_floor_carries_the_weight")
+@pytest.mark.nightly("tests/physics/planar/disks.rs::the_floor_carries_the_weight")
 def test_rough_walls_bear_the_filling_and_smooth_ones_do_not() -> None:
     ledger = Ledger()
     low, high = (weigh(height, 0, ledger, diameters=8.0, travel=2.0, start=1.0) for height in (0.5, 4.0))
@@ -79,7 +79,7 @@ def test_rough_walls_bear_the_filling_and_smooth_ones_do_not() -> None:
     held(ledger)
 
 
-@pytest.mark.nightly("tests/physics/planar/soil.rs::sweeps_and_the_dense_newton_give_the_same_velocities")
+@pytest.mark.nightly("tests/physics/planar/disks.rs::sweeps_and_the_dense_newton_give_the_same_velocities")
 def test_disks_run_out_of_a_silo_steadily_and_faster_than_in_proportion_to_the_opening() -> None:
     ledger = Ledger()
     runs = [

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.mechanics import GrainSimulation, SoilSimulation
+from rover_gym.mechanics import DiskSimulation, GrainSimulation
 
 GRAVITY = 9.81
 
@@ -64,7 +64,7 @@ class Watched:
         has_energy: False where kinematic disks move and do work: the energy is not looked at then.
     """
 
-    def __init__(self, sim: SoilSimulation | GrainSimulation, *, has_energy: bool = True) -> None:
+    def __init__(self, sim: DiskSimulation | GrainSimulation, *, has_energy: bool = True) -> None:
         self.sim = sim
         self.ledger = Ledger()
         #: Impulse of kinematic disks on the free ones in the last step, N s.

@@ -1,4 +1,4 @@
-"""`rover planar ball|rover|soil`: the planar systems of the report's chapter 3."""
+"""`rover planar ball|rover|disks`: the planar systems of the report's chapter 3."""
 
 import math
 from dataclasses import dataclass
@@ -10,9 +10,9 @@ import numpy as np
 import typer
 
 from rover_gym.cli.console import AsJson, Results, plain_errors, row
+from rover_gym.cli.disks_command import disks
 from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.cli.soil_command import soil
 from rover_gym.cli.usage import WholeHelp
 from rover_gym.mechanics import (
     BallSimulation,
@@ -32,7 +32,7 @@ from rover_gym.validation import number, refuse
 planar = typer.Typer(
     cls=WholeHelp,
     rich_markup_mode=None,
-    help="Planar systems: a ball, a two-wheel rover, soil of disks.",
+    help="Planar systems: a ball, a two-wheel rover, beds of disks.",
     no_args_is_help=True,
 )
 
@@ -189,7 +189,7 @@ def _moment(time: float) -> str:
     return f"{time:.3f} s" if math.isfinite(time) else "never"
 
 
-planar.command()(soil)
+planar.command()(disks)
 
 
 def _ground(

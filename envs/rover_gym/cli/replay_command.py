@@ -10,13 +10,13 @@ from rover_gym.cli.newest import newest_run, show_in_browser
 from rover_gym.cli.options import OpenIt, complete_recording
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.extras import require
+from rover_gym.grains.disk_run import DiskRun
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.mechanics import OptionError
 from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.replay import write_gltf, write_page, write_vrml
 from rover_gym.runs import open_run
-from rover_gym.soil.soil_run import SoilRun
 from rover_gym.validation import refuse
 
 
@@ -90,7 +90,7 @@ def replay(
 _KINDS: dict[type, tuple[tuple[str, ...], str]] = {
     RoverRun: (("html", "vrml", "gltf", "film"), ""),
     PlanarRun: (("html",), "a ball or a two-wheel rover is replayed as a page, with --html"),
-    SoilRun: (("html",), "a run on a soil is replayed as a page, with --html"),
+    DiskRun: (("html",), "a run on disks is replayed as a page, with --html"),
     GrainRun: (("html", "film"), "a run of balls is replayed as a page or a film, with --html or --film"),
 }
 
@@ -119,7 +119,7 @@ def plot(
 
     Of a ball or a two-wheel rover: the path over the ground, speed, loads, gaps, energy.
 
-    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
+    Of a run on disks: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
 
     Of balls: the same, and the ruts: the surface before and after, with sections along and across a track.
     """

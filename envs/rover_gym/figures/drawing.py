@@ -6,15 +6,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rover_gym.figures.disk_run_figures import DISK_DRAWINGS
 from rover_gym.figures.grain_run_figures import GRAIN_DRAWINGS
 from rover_gym.figures.planar_drawing import PLANAR_DRAWINGS, planar_page
 from rover_gym.figures.run_figures import DRAWINGS
-from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
 from rover_gym.figures.style import WIDTH, Drawing, check_format, save_figures
+from rover_gym.grains.disk_run import DiskRun
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.record.rover_run import RoverRun
-from rover_gym.soil.soil_run import SoilRun
 from rover_gym.validation import checked
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 KINDS: dict[type, tuple[Mapping[str, Drawing], int]] = {
     RoverRun: (DRAWINGS, 2),
     PlanarRun: (PLANAR_DRAWINGS, 2),
-    SoilRun: (SOIL_DRAWINGS, 1),
+    DiskRun: (DISK_DRAWINGS, 1),
     GrainRun: (GRAIN_DRAWINGS, 1),
 }
 
@@ -37,7 +37,7 @@ def drawable(run: SavedRun) -> dict[str, Drawing]:
     return {name: drawing for name, drawing in KINDS[type(run)][0].items() if drawing.fits(run)}
 
 
-@checked(run=("RoverRun", "PlanarRun", "SoilRun", "GrainRun"), folder=Path, file_format=str, with_overview=bool)
+@checked(run=("RoverRun", "PlanarRun", "DiskRun", "GrainRun"), folder=Path, file_format=str, with_overview=bool)
 def draw_run(run: SavedRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False) -> list[Path]:
     """Draws all figures of a run for which its recording has the data.
 
@@ -65,7 +65,7 @@ def draw_run(run: SavedRun, folder: str | Path, *, file_format: str = "png", wit
     return paths
 
 
-@checked(run=("RoverRun", "PlanarRun", "SoilRun", "GrainRun"), path=Path)
+@checked(run=("RoverRun", "PlanarRun", "DiskRun", "GrainRun"), path=Path)
 def draw_overview(run: SavedRun, path: str | Path) -> Path:
     """Draws all figures of a run on one page.
 

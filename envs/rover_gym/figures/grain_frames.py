@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from rover_gym.grains.disk_run import DiskRun
     from rover_gym.grains.grain_run import GrainRun
-    from rover_gym.soil.soil_run import SoilRun
 
 
-__all__ = ["draw_grains", "draw_soil", "film_run", "film_soil"]
+__all__ = ["draw_disks", "draw_grains", "film_disks", "film_run"]
 
 SIZE = 960, 540  # pixels
 
@@ -168,10 +168,10 @@ CHAIN, WHEEL, BODY = "#b3321b", "#4a5560", "#2f6f9f"
 
 WIDTH = 12.0  # inches
 
-MARGIN = 0.02  # m about the soil
+MARGIN = 0.02  # m about the disks
 
 
-def draw_soil(run: SoilRun, path: str | Path, *, row: int = -1) -> Path:
+def draw_disks(run: DiskRun, path: str | Path, *, row: int = -1) -> Path:
     """Draws one sample; a red line's width scales with the root of the contact's mean force since the previous sample.
 
     Args:
@@ -189,7 +189,7 @@ def draw_soil(run: SoilRun, path: str | Path, *, row: int = -1) -> Path:
     return Path(path)
 
 
-def film_soil(run: SoilRun, path: str | Path, *, frames_per_second: int = 25) -> Path:
+def film_disks(run: DiskRun, path: str | Path, *, frames_per_second: int = 25) -> Path:
     """Writes all samples of a run to an MP4 video (H.264).
 
     Raises:
@@ -211,7 +211,7 @@ def film_soil(run: SoilRun, path: str | Path, *, frames_per_second: int = 25) ->
     return Path(path)
 
 
-def _sheet(run: SoilRun) -> tuple[Figure, Axes]:
+def _sheet(run: DiskRun) -> tuple[Figure, Axes]:
     """A figure of the scene's shape, and its axes, with the limits of the whole run."""
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an extra
@@ -227,7 +227,7 @@ def _sheet(run: SoilRun) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _paint(axes: Axes, run: SoilRun, row: int) -> None:
+def _paint(axes: Axes, run: DiskRun, row: int) -> None:
     from matplotlib.collections import EllipseCollection, LineCollection  # noqa: PLC0415 - an extra
     from matplotlib.patches import Circle  # noqa: PLC0415 - an extra
 
@@ -265,7 +265,7 @@ def _paint(axes: Axes, run: SoilRun, row: int) -> None:
     axes.set_title(f"t = {run.time[row]:.2f} s", loc="left", fontsize=9)
 
 
-def _bearing(run: SoilRun) -> float:
+def _bearing(run: DiskRun) -> float:
     """Force scale of the chains, N: the largest load that a wheel carried most of the time."""
     loads: npt.NDArray[np.float64] = np.linalg.norm(run.wheel_forces[1:], axis=-1)
     return float(np.median(loads, axis=0).max()) if loads.size else float(run.force_chains[..., 4].max())

@@ -1,9 +1,15 @@
-"""Granular ground in space: beds of balls, scenes on them and in vessels, and recordings.
+"""Grains: beds of balls in space and of disks in the plane, scenes on them and in vessels, trials, recordings.
 
 >>> from rover_gym.grains import settled_balls
 >>> bed = settled_balls(200, 0.2, 0.2, radius_min=0.009, radius_max=0.011)
 >>> 0.02 < bed.surface < 0.04
 True
+
+>>> from rover_gym.grains import rover_on_disks
+>>> sim = rover_on_disks(count=222, layers=3)
+>>> sim.set_torques([50.0, 50.0])
+>>> sim.step(100).steps
+100
 """
 
 from rover_gym.grains.ball_bed import (
@@ -29,6 +35,18 @@ from rover_gym.grains.bed_scenes import (
     striking_sphere,
     with_wheel_width,
 )
+from rover_gym.grains.disk_bed import DiskBed, rover_on_disks, settled_disks
+from rover_gym.grains.disk_run import DiskRun, DiskSampler
+from rover_gym.grains.disk_trials import (
+    BedEstimate,
+    DiskDrive,
+    Pull,
+    Traction,
+    drawbar_pull,
+    drive_on_disks,
+    fit_traction,
+    over_beds,
+)
 from rover_gym.grains.grain_run import GrainRun, GrainSampler
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.grains.moving_window import BedEnergy, MovingWindow, WindowSnapshot
@@ -37,24 +55,37 @@ from rover_gym.grains.pit import Pit, PitFill
 __all__ = [
     "BallBed",
     "BedEnergy",
+    "BedEstimate",
+    "DiskBed",
+    "DiskDrive",
+    "DiskRun",
+    "DiskSampler",
     "GrainRun",
     "GrainSampler",
     "MovingWindow",
     "Pit",
     "PitFill",
+    "Pull",
     "SurfaceMap",
+    "Traction",
     "WindowSnapshot",
     "box_walls",
     "column",
+    "drawbar_pull",
+    "drive_on_disks",
     "drum",
     "even_radii",
+    "fit_traction",
     "lognormal_radii",
     "outflow",
+    "over_beds",
     "penetration_depths",
     "rover_on_bed",
+    "rover_on_disks",
     "run_out",
     "settle",
     "settled_balls",
+    "settled_disks",
     "settled_track",
     "sieved_radii",
     "silo",

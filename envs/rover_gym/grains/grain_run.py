@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.grains.bed_run import Array, bed_channels, strongest_contacts
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.grains.moving_window import MovingWindow
 from rover_gym.mechanics import (
@@ -34,12 +35,10 @@ from rover_gym.mechanics import (
 )
 from rover_gym.record.channels import (
     ITERATIONS,
-    RESIDUAL,
     TIME,
     Channel,
     RecordingError,
     Sampler,
-    energy_channels,
     origins,
     rover_channels,
     sound,
@@ -90,7 +89,6 @@ def checked_vessel(vessel: Any) -> dict[str, Any] | None:
     return result
 
 
-Array = npt.NDArray[np.float64]
 #: Balls in space, alone or under a rover.
 Recordable: TypeAlias = GrainSimulation | RoverGrainSimulation | MovingWindow
 
@@ -133,7 +131,8 @@ class StoredPlaces:
 
 def grain_channels(balls: int, walls: int, model: RoverModel | None, chains: int) -> tuple[Channel, ...]:
     """The channels of so many balls, walls and strongest contacts, with a rover among them or without."""
-    strongest = "strongest contacts of the last step: from x, y, z to x, y, z (m), force (N); zeros where none are"
+    strongest = " of the last step: from x, y, z to x, y, z (m), force"
+    counted = "most contacts of a step since the last row"
     forces = "force of balls and ground on each wheel, world x, y, z, mean since the last row"
     centres = "centre of each ball: x forward, y up, z right"
     normals = "a point of each wall and the normal to its free side"
@@ -142,11 +141,7 @@ def grain_channels(balls: int, walls: int, model: RoverModel | None, chains: int
         Channel("position", "m", centres, (balls, 3), packed=True, read="places"),
         Channel("walls", "m, 1", normals, (walls, 6), read="grains.walls"),
         Channel("n_asleep", "1", "number of balls that sleep", read="n_asleep"),
-        *energy_channels(" of all", "all mass centres at height 0"),
-        Channel("n_contacts", "1", "most contacts of a step since the last row", read="n_contacts"),
-        Channel("penetration", "m", "deepest overlap", read="sim.penetration"),
-        Channel("force_chains", "m, N", strongest, (chains, 7), packed=True, read="force_chains"),
-        RESIDUAL,
+        *bed_channels((chains, 7), strongest, counted, packed=True),
         ITERATIONS,
         *(() if model is None else rover_channels(model, "wheel_forces", forces)),
     )
@@ -200,22 +195,12 @@ class GrainSampler(Sampler):
         return int(np.count_nonzero(self.grains.asleep))
 
     def force_chains(self) -> Array:
-        """(n_chains, 7) the strongest contacts of the last step: ends, m, and force, N; zeros where there are fewer.
-
-        A contact of two balls joins their centres, any other a ball's centre and the point that it touches.
-        """
+        """(n_chains, 7) the strongest contacts of the last step, see `strongest_contacts`."""
         grains = self._contacts
-        contacts, chains = grains.contacts, np.zeros((self._n_chains, 7))
+        contacts = grains.contacts
         strengths = np.linalg.norm(contacts.world_impulses.reshape(-1, 3), axis=1) / grains.time_step
-        kept = np.argsort(-strengths, kind="stable")[: self._n_chains]
-        kept = kept[strengths[kept] > 0.0]
-        centres, points = grains.position, contacts.points.reshape(-1, 3)[kept]
-        for side, bodies in enumerate(contacts.bodies.reshape(-1, 2)[kept].T):
-            is_ball = (bodies >= 0) & (bodies < len(centres))
-            ends = np.where(is_ball[:, None], centres[np.where(is_ball, bodies, 0)], points)
-            chains[: len(kept), 3 * side : 3 * side + 3] = ends
-        chains[: len(kept), 6] = strengths[kept]
-        return chains
+        bodies, points = contacts.bodies.reshape(-1, 2), contacts.points.reshape(-1, 3)
+        return strongest_contacts(self._n_chains, bodies, points, strengths, grains.position)
 
     def wheel_forces(self) -> Array:
         """(n_wheels, 3) mean force on each wheel since the last row, N."""

@@ -115,7 +115,7 @@ class Recorder:
             data = self._file.create_dataset(
                 self._places[channel.name],
                 shape=(0, *channel.shape),
-                # HDF5 has no empty chunks, so an empty channel (the wheels of a soil without a machine) is resizable.
+                # HDF5 has no empty chunks, so an empty channel (the wheels of disks without a machine) is resizable.
                 maxshape=(None, *(n or None for n in channel.shape)),
                 chunks=(self._rows_per_flush, *(min(n, most or n) or 1 for n in channel.shape)),
                 dtype="f4" if channel.packed else "f8",

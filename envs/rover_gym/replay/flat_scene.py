@@ -1,4 +1,4 @@
-"""Runs in the plane as scenes of the player: a ball or a two-wheel rover over its ground, and disks of a soil."""
+"""Runs in the plane as scenes of the player: a ball or a two-wheel rover over its ground, and disks."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from rover_gym.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_conten
 from rover_gym.replay.page_scene import FrameChannel, PageScene
 
 if TYPE_CHECKING:
+    from rover_gym.grains.disk_run import DiskRun
     from rover_gym.planar.planar_run import PlanarRun
-    from rover_gym.soil.soil_run import SoilRun
 
 SAND_COLOURS: tuple[Colour, Colour] = (
     (0.97, 0.90, 0.76),
@@ -35,9 +35,9 @@ SAND_COLOURS: tuple[Colour, Colour] = (
 CHAIN_COLOUR: Colour = (0.80, 0.0, 0.10)
 DEPTH = 1.0  # out-of-plane thickness of disks, in mean diameters
 CHAINS = 300  # strongest contacts drawn
-SOIL_SEEN = 1.8  # m of soil in view at most
+DISKS_SEEN = 1.8  # m of the bed in view at most
 SKIRT = 1.04  # width of the picture, in widths of the bed
-SOIL_ASPECT = 1.2  # width over height of the picture
+DISKS_ASPECT = 1.2  # width over height of the picture
 FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspective
 
 SEEN = 9.0  # width of the picture, in diameters of the largest disc
@@ -135,11 +135,11 @@ def _nearest(ground: PlanarGround, centres: Array, radius: Array) -> tuple[Array
     return feet, np.where(above, out / np.maximum(far, 1e-12), normals)
 
 
-def soil_scene(run: SoilRun, *, follow: bool) -> PageScene:
-    """A run on a soil as a scene."""
-    eye = _soil_eye(run, follow=follow)
-    distance = 0.5 * _seen(run) / (SOIL_ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
-    scene = PageScene("soil", _view(float(eye[0, 1]), 0.1 * distance, distance, SOIL_ASPECT), 0.5 * _seen(run))
+def disk_scene(run: DiskRun, *, follow: bool) -> PageScene:
+    """A run on disks as a scene."""
+    eye = _disk_eye(run, follow=follow)
+    distance = 0.5 * _seen(run) / (DISKS_ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
+    scene = PageScene("disks", _view(float(eye[0, 1]), 0.1 * distance, distance, DISKS_ASPECT), 0.5 * _seen(run))
     depth, radius = _depth(run), run.wheels[0, :, 2]
     poses = np.concatenate((run.wheels[..., :2], run.wheel_angles[..., None]), axis=2)
     _add_wheels(scene, poses, radius, np.full(len(radius), depth), 0.05, 0.8 * depth)
@@ -152,7 +152,7 @@ def soil_scene(run: SoilRun, *, follow: bool) -> PageScene:
     ]
     scene.arrays["radii"] = ("f4", run.radius)
     scene.facts |= {"title": run.title, "flat": True, "far": 20.0 * distance, "chain": CHAIN_COLOUR}
-    scene.facts |= {"front": True, "sand": SAND_COLOURS, "curves": _soil_curves(run)}
+    scene.facts |= {"front": True, "sand": SAND_COLOURS, "curves": _disk_curves(run)}
     return scene
 
 
@@ -167,7 +167,7 @@ def about_z(angles: Array) -> Array:
     return np.stack((zero, zero, np.sin(0.5 * angles), np.cos(0.5 * angles)), axis=-1)
 
 
-def _depth(run: SoilRun) -> float:
+def _depth(run: DiskRun) -> float:
     return 2.0 * DEPTH * float(run.radius.mean())
 
 
@@ -197,7 +197,7 @@ def _add_wheels(scene: PageScene, poses: Array, radius: Array, depth: Array, bod
     scene.channels += [FrameChannel.fine("places", places), FrameChannel.turns("turns", about_z(poses[..., 2]))]
 
 
-def _chains(run: SoilRun) -> Array:
+def _chains(run: DiskRun) -> Array:
     """(n, n_chains, 5) ends x, y, x, y and width of the strongest contacts as bars, m."""
     chains = run.force_chains[:, :CHAINS].copy()
     loads = np.linalg.norm(run.wheel_forces[1:], axis=-1)
@@ -225,8 +225,8 @@ def wheel_meshes(radius: float, depth: float) -> list[tuple[Colour, Array, npt.N
     return [surface_mesh(part) for part in parts]
 
 
-def _walls(run: SoilRun) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
-    """Slabs under floors, as wide as the soil, and beside upright walls, as high as the soil."""
+def _walls(run: DiskRun) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
+    """Slabs under floors, as wide as the bed, and beside upright walls, as high as the bed."""
     x, y = run.positions[..., 0], run.positions[..., 1]
     left, right = float((x - run.radius).min()), float((x + run.radius).max())
     bottom, top = float((y - run.radius).min()), float((y + run.radius).max())
@@ -247,14 +247,14 @@ def _walls(run: SoilRun) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
     return slabs
 
 
-def _seen(run: SoilRun) -> float:
+def _seen(run: DiskRun) -> float:
     """Width of the picture, m: the bed, or the rover's surroundings on a longer one."""
     x = run.positions[0, :, 0]
-    return min(SOIL_SEEN, SKIRT * float(x.max() - x.min() + 2.0 * run.radius.max()))
+    return min(DISKS_SEEN, SKIRT * float(x.max() - x.min() + 2.0 * run.radius.max()))
 
 
-def _soil_eye(run: SoilRun, *, follow: bool) -> Array:
-    """(n, 2) centre of the picture: the rover's smoothed path, clamped so that soil fills the picture."""
+def _disk_eye(run: DiskRun, *, follow: bool) -> Array:
+    """(n, 2) centre of the picture: the rover's smoothed path, clamped so that disks fill the picture."""
     x = run.positions[0, :, 0]
     left, right = float(x.min()), float(x.max())
     height = float(run.wheels[0, :, 1].mean()) if run.wheels.size else 0.0
@@ -266,7 +266,7 @@ def _soil_eye(run: SoilRun, *, follow: bool) -> Array:
     return np.column_stack((middle, np.full(run.n_frames, height)))
 
 
-def _soil_curves(run: SoilRun) -> dict[str, Any]:
+def _disk_curves(run: DiskRun) -> dict[str, Any]:
     """Contents of the panel."""
     names = ("wheel",) if run.wheels.shape[1] == 1 else ("back wheel", "front wheel")
     wheels = list(zip(names, PLANAR_WHEEL_COLOURS[: len(names)], strict=True))

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rover_gym.files import written_whole
+from rover_gym.grains.disk_run import DiskRun
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.mechanics import OptionError
 from rover_gym.planar.planar_run import PlanarRun
 from rover_gym.record.rover_run import RoverRun
-from rover_gym.replay.flat_scene import planar_scene, soil_scene
+from rover_gym.replay.flat_scene import disk_scene, planar_scene
 from rover_gym.replay.grain_scene import grain_scene
 from rover_gym.replay.page_scene import SAMPLES
 from rover_gym.replay.rover_scene import rover_scene
-from rover_gym.soil.soil_run import SoilRun
 from rover_gym.validation import checked, refuse
 
 if TYPE_CHECKING:
@@ -42,18 +42,18 @@ SCRIPTS = (
 )
 
 #: What makes the scene of each kind of run.
-SCENES: dict[type, Any] = {RoverRun: rover_scene, PlanarRun: planar_scene, SoilRun: soil_scene, GrainRun: grain_scene}
+SCENES: dict[type, Any] = {RoverRun: rover_scene, PlanarRun: planar_scene, DiskRun: disk_scene, GrainRun: grain_scene}
 
 
-@checked(run=("RoverRun", "PlanarRun", "SoilRun", "GrainRun"), path=Path, follow=bool, ghost=("RoverRun", None))
+@checked(run=("RoverRun", "PlanarRun", "DiskRun", "GrainRun"), path=Path, follow=bool, ghost=("RoverRun", None))
 def write_page(run: SavedRun, path: str | Path, *, follow: bool = True, ghost: RoverRun | None = None) -> Path:
     """Writes a run as a single browser page: the scene with a timeline and, beside it, curves.
 
     Args:
         run: The run; every sample becomes a frame of the replay.
         path: The file to write, usually `.html`. Its folder is created.
-        follow: Whether the eye follows what moves; otherwise the ground stays fixed. A soil is followed where it is
-            wider than the picture.
+        follow: Whether the eye follows what moves; otherwise the ground stays fixed. A bed of disks is followed where
+            it is wider than the picture.
         ghost: Another run of a rover, which drives beside a rover's run, translucent and with dashed curves.
 
     Raises:

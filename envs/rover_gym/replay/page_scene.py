@@ -104,7 +104,7 @@ class PageScene:
     """A scene of the player.
 
     Attributes:
-        kind: "rover", "grains", "planar" or "soil".
+        kind: "rover", "grains", "planar" or "disks".
         view: Where the eye stands and looks at the start, m, and the vertical field of view, rad.
         reach: Size of what is looked at, m: a camera and the shadow fit it.
         frames: Number of moving frames, the places and turns of the channels `places` and `turns`.

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::simulation::{GrainSimulation, soil_options};
+use rover_core::simulation::{GrainSimulation, grain_options};
 use rover_core::system::grains::{
     COORDINATES, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
 };
@@ -63,7 +63,7 @@ fn simulation(
     options: Option<StepOptions>,
     q: Vec<f64>,
 ) -> GrainSimulation<3> {
-    let options = options.unwrap_or_else(|| soil_options(&grains));
+    let options = options.unwrap_or_else(|| grain_options(&grains));
     let scene = GrainScene {
         walls: walls(side),
         ground: None,
@@ -97,7 +97,7 @@ fn settled(count: usize) -> (Vec<f64>, Vec<f64>) {
         seed: 1,
     };
     let (grains, q) = packing.build().expect("a packing");
-    let mut options = soil_options(&grains);
+    let mut options = grain_options(&grains);
     options.time_step = 2e-3;
     options.solver.tolerance = 1e-3;
     options.solver.velocity_tolerance = 1e-2;
@@ -158,7 +158,7 @@ fn scene(count: usize, motion: Motion, h: f64, tolerance: f64) -> GrainSimulatio
     let grains = Grains::<3>::new(radius, mass)
         .and_then(|grains| grains.with_kinematic(kinematic))
         .expect("grains");
-    let mut options = soil_options(&grains);
+    let mut options = grain_options(&grains);
     options.time_step = h;
     options.solver.tolerance = tolerance;
     options.solver.velocity_tolerance = 10.0 * tolerance;
@@ -189,7 +189,7 @@ fn measure(name: &str, run: &mut GrainSimulation<3>, steps: usize) {
         converged += usize::from(report.is_converged());
     }
     let (time, wall) = (cpu_seconds() - before, clock.elapsed().as_secs_f64());
-    let n = run.soil().grains.len();
+    let n = run.description().grains.len();
     let h = run.options().time_step;
     let simulated = (n * steps) as f64 * h;
     let fastest = run
@@ -208,7 +208,7 @@ fn measure(name: &str, run: &mut GrainSimulation<3>, steps: usize) {
         contacts as f64 / (steps * n) as f64,
         converged as f64 / steps as f64,
         1e9 * time / visits as f64,
-        100.0 * run.penetration() / run.soil().grains.smallest(),
+        100.0 * run.penetration() / run.description().grains.smallest(),
         fastest,
     );
 }

@@ -1,140 +1,114 @@
-//! Balls in space as arguments and as arrays: what every class with balls reads and tells alike.
+//! `GrainSimulation`, `ball_packing` and `arrange_balls`: grains in space.
 
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::{Support, TerrainSupport};
-use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::system::grains::{
-    COORDINATES, Cohesion, GrainScene, Grains, Packing, SleepOptions, Wall,
-};
+use rover_core::simulation::GrainSimulation as CoreSimulation;
+use rover_core::spatial::space::body_velocities;
+use rover_core::system::grains::{COORDINATES, Cohesion, Grains, Packing, Wall, arranged};
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Named, refused};
-use crate::arrays::{Array, fresh, fresh_rows, triple};
-use crate::bed_arguments::{self, Usual, check_rows, grain_error, rows};
+use crate::arguments::{Named, count, number, refused};
+use crate::arrays::{Array, vector};
+use crate::bed_arguments::{self, Described, Packed, grain_error, packed, rows};
+use crate::beds::{Bed, BedSimulation, columns};
 use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
-use crate::shared::Release;
+use crate::shared::{Open, Release};
 use crate::terrain::parse;
-use crate::vessels::Vessel;
+use crate::union;
+use crate::vessels::{Drum, Silo, Vessel};
+
+type Core = CoreSimulation<3>;
 
 /// Velocities of a ball: of its centre, then its spin.
-const VELOCITIES: usize = 6;
+const VELOCITIES: usize = body_velocities(3);
 
-/// Radii, masses and centres of a packing.
-pub type Packed = (Array, Array, Array);
-
-/// Grains of a packing, built with the interpreter free for others.
-pub fn packed<const D: usize>(py: Python<'_>, packing: &Packing<D>) -> Result<Packed> {
-    let built = py.release(|| packing.build())?;
-    let (grains, q) = built.map_err(|e| grain_error(&e))?;
-    let centres: Vec<f64> = q
-        .chunks_exact(COORDINATES)
-        .flat_map(|c| &c[..D])
-        .copied()
-        .collect();
-    let centres = Array::shaped(centres, &[grains.len(), D]);
-    Ok((fresh(grains.radius()), fresh(grains.mass()), centres))
+/// Grains in space: free balls with friction, contained by walls or a vessel, or on a terrain.
+///
+/// World axes: x forward, y up, z to the right.
+///
+/// Args:
+///     radius: Radii of the balls, (n,), m.
+///     mass: Masses of the balls, which are homogeneous, (n,), kg.
+///     position: Centres, (n, 3), m.
+///     kinematic: Which balls have a prescribed velocity, (n,); none by default. Use it for grains
+///         glued to a rough floor, or for a piston with the velocity given to `set_state`. These
+///         balls may overlap each other and walls.
+///     walls: A point of each wall and the normal to its free side, (m, 6), m; none by default.
+///     wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. `walls` gives their
+///         places at time 0.
+///     vessel: A `Drum` or a `Silo` around the balls; none by default.
+///     terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
+///         them, below the balls; none by default. Balls fall where the ground is unknown. A vessel
+///         and a terrain cannot be combined.
+///     friction: Coulomb's coefficient between balls.
+///     wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
+///     rolling_friction: Coefficient of rolling friction of balls: the largest resisting moment
+///         divided by the normal force and the rolling radius r. Between two balls 1/r = 1/r_1 +
+///         1/r_2; on a wall, vessel or terrain r is the ball's radius. A ball stays at rest on a
+///         slope whose tangent is at most this coefficient.
+///     drilling_friction: The same for rotation about the contact normal. Neither acts on a rover,
+///         nor if Coulomb's coefficient is 0.
+///     cohesion: Attractive force between bodies in contact, N: the pull that separates them. The
+///         contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
+///         impulse is at most friction (p_N + h cohesion).
+///     cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
+///         default, at most 20%.
+///     restitution: Newton's coefficient of all contacts, in [0, 1].
+///     gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
+///     time_step: Time step, s.
+///     tolerance: Largest relative residual of the contact problem. Errors of velocities are also
+///         at most 25 times this value, times the square root of gravity times the smallest radius;
+///         without gravity 9.81 m/s² is used.
+///     max_iterations: Largest number of sweeps of the contact solver in a step.
+///     stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart,
+///         "push_out" removes a fifth of the excessive overlap in each step, "none" leaves it. The
+///         first two may add energy by lifting the bodies above. The default is "push_out", or
+///         "projection" with restitution or in a vessel, whose curved walls cause an overlap in
+///         every step.
+///     penetration_tolerance: Overlap that stabilisation does not correct, m; 0.5% of the smallest
+///         radius by default.
+///     sleep: Whether to skip balls that are at rest and far from moving bodies.
+///     sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
+///     sleep_distance: A ball sleeps if no body within this distance moves, m; 0.2 by default.
+///     threads: Number of threads that solve the contact problem. The result does not depend on it.
+///         With fewer than some thousands of balls, a second thread gains little.
+///
+/// Raises:
+///     ModelError: A radius or mass is not finite and positive.
+///     StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
+///         terrain overlap.
+///     TerrainError: A wall has no direction, or `terrain` is not a terrain, or `vessel` is not a
+///         vessel.
+///     OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
+#[pyclass(module = "rover_gym.mechanics", extends = BedSimulation, frozen)]
+pub struct GrainSimulation {
+    pub inner: Arc<Bed<3>>,
+    terrain: Option<DrawnGround>,
+    vessel: Option<Vessel>,
 }
 
-/// When the grains of a bed sleep; None where they never do.
-pub fn sleep(given: &Named<'_>) -> Result<Option<SleepOptions>> {
-    let usual = SleepOptions::default();
-    let rest = SleepOptions {
-        speed: given.maybe("sleep_speed")?.unwrap_or(usual.speed),
-        distance: given.maybe("sleep_distance")?.unwrap_or(usual.distance),
-        ..usual
-    };
-    rest.check()?;
-    Ok(given.flag("sleep", false)?.then_some(rest))
-}
-
-/// A bed of balls that was read: without a machine, not yet checked as a whole.
-pub struct Balls {
-    pub scene: GrainScene<3>,
-    pub options: StepOptions,
-    pub sleep: Option<SleepOptions>,
-    /// Centres, (3 n,).
-    pub q: Vec<f64>,
-    pub terrain: Option<DrawnGround>,
-    pub vessel: Option<Vessel>,
-}
-
-/// Velocities are right to 25 times the tolerance, in units of the speed that the smallest ball
-/// gains over its radius, √(g r): the same bed at another scale is solved alike.
-fn usual(balls: &Grains<3>) -> Usual {
-    const EARTH: f64 = 9.81;
-    Usual {
-        time_step: 2e-3,
-        tolerance: 1e-3,
-        speed: 25.0 * (EARTH * balls.smallest()).sqrt(),
+impl GrainSimulation {
+    fn open(&self) -> Result<MutexGuard<'_, Core>> {
+        self.inner.open()
     }
 }
 
-impl Balls {
-    /// Reads everything: radii, masses, centres, and options by their names.
-    pub fn read(
-        radius: &Bound<'_, PyAny>,
-        mass: &Bound<'_, PyAny>,
-        position: &Bound<'_, PyAny>,
-        options: Option<&Bound<'_, PyDict>>,
-    ) -> Result<Self> {
-        let given = Named::keywords(radius.py(), options)?;
-        let grains = bed_arguments::grains::<3>(radius, mass, given.get("kinematic")?)?;
-        let q = rows(position, Kind::State, "position", COORDINATES)?;
-        check_rows("balls", grains.len(), &q)?;
-        let vessel = given
-            .some("vessel")?
-            .as_ref()
-            .map(Vessel::parse)
-            .transpose()?;
-        let gravity = given.read("gravity", triple)?.map(Vector3::from);
-        let how = (gravity, vessel.is_some());
-        let mut options = bed_arguments::step_options(&given, &grains, how, usual(&grains))?;
-        options.solver.threads = given.count("threads", 1)?;
-        let force = given.number("cohesion", 0.0)?;
-        let range = given.maybe("cohesion_range")?;
-        let cohesion = Cohesion::new(force, range, grains.smallest());
-        let cohesion = cohesion.map_err(|e| grain_error(&e.into()))?;
-        let grains = if force > 0.0 {
-            grains.with_cohesion(cohesion)
-        } else {
-            grains
-        };
-        let walls = bed_arguments::walls(given.some("walls")?.as_ref())?;
-        let walls = moving(walls, given.some("wall_velocity")?.as_ref())?;
-        let terrain = given.some("terrain")?.as_ref().map(parse).transpose()?;
-        let ground: Option<Arc<dyn Support<3>>> = match (&terrain, &vessel) {
-            (Some(terrain), None) => Some(Arc::new(TerrainSupport::new(terrain.terrain()))),
-            (None, Some(vessel)) => Some(vessel.support()?),
-            (None, None) => None,
-            (Some(_), Some(_)) => {
-                let message = "vessel: balls have a terrain or a vessel, not both".to_owned();
-                return Err(Kind::Option.error("vessel", message, Value::Nothing));
-            }
-        };
-        let friction = bed_arguments::friction(&given, false, false)?;
-        let sleep = sleep(&given)?;
-        given.finish()?;
-        let scene = GrainScene {
-            grains,
-            walls,
-            ground,
-            machine: None,
-            friction,
-        };
-        Ok(Self {
-            scene,
-            options,
-            sleep,
-            q,
-            terrain,
-            vessel,
-        })
-    }
+/// Cohesion by its names; none without a force.
+fn cohering(grains: Grains<3>, given: &Named<'_>) -> Result<Grains<3>> {
+    let force = given.number("cohesion", 0.0)?;
+    let range = given.maybe("cohesion_range")?;
+    let cohesion = Cohesion::new(force, range, grains.smallest());
+    let cohesion = cohesion.map_err(|e| grain_error(&e.into()))?;
+    Ok(if force > 0.0 {
+        grains.with_cohesion(cohesion)
+    } else {
+        grains
+    })
 }
 
 /// Walls with their velocities (m, 3), m/s.
@@ -164,7 +138,7 @@ fn moving(walls: Vec<Wall<3>>, velocity: Option<&Bound<'_, PyAny>>) -> Result<Ve
 }
 
 /// Centres (3 n) and velocities (6 n) of `n` balls from arrays (n, 3); at rest where none is given.
-pub fn state(
+fn state(
     n: usize,
     position: &Bound<'_, PyAny>,
     velocity: Option<&Bound<'_, PyAny>>,
@@ -203,7 +177,7 @@ pub fn state(
 }
 
 /// Numbers of balls, (n,); none for -1.
-pub fn numbers(before: &Bound<'_, PyAny>) -> Result<Vec<Option<u32>>> {
+fn numbers(before: &Bound<'_, PyAny>) -> Result<Vec<Option<u32>>> {
     let wrong = |value: &Bound<'_, PyAny>, field: &str| {
         refused(value, Kind::Model, field, "a whole number from -1")
     };
@@ -219,27 +193,234 @@ pub fn numbers(before: &Bound<'_, PyAny>) -> Result<Vec<Option<u32>>> {
     entries.enumerate().map(read).collect()
 }
 
-/// Columns `from` to `from + 2` of `n` rows of `width` entries as a new (n, 3) array.
-fn columns(values: &[f64], (n, width, from): (usize, usize, usize)) -> Array {
-    fresh_rows(
-        values
-            .chunks_exact(width)
-            .take(n)
-            .map(|row| [row[from], row[from + 1], row[from + 2]]),
-    )
+#[pymethods]
+impl GrainSimulation {
+    #[new]
+    #[pyo3(signature = (radius, mass, position, **options),
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, rolling_friction=0.0, drilling_friction=0.0, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None, threads=1)")]
+    fn new(
+        radius: &Bound<'_, PyAny>,
+        mass: &Bound<'_, PyAny>,
+        position: &Bound<'_, PyAny>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<PyClassInitializer<Self>> {
+        let given = Named::keywords(radius.py(), options)?;
+        let (terrain, vessel) = (given.some("terrain")?, given.some("vessel")?);
+        let terrain = terrain.as_ref().map(parse).transpose()?;
+        let vessel = vessel.as_ref().map(Vessel::parse).transpose()?;
+        let ground: Option<Arc<dyn Support<3>>> = match (&terrain, &vessel) {
+            (Some(terrain), None) => Some(Arc::new(TerrainSupport::new(terrain.terrain()))),
+            (None, Some(vessel)) => Some(vessel.support()?),
+            (None, None) => None,
+            (Some(_), Some(_)) => {
+                let message = "vessel: balls have a terrain or a vessel, not both".to_owned();
+                return Err(Kind::Option.error("vessel", message, Value::Nothing));
+            }
+        };
+        let ground = (ground, vessel.is_some());
+        let mut bed = Described::read([radius, mass, position], &given, ground)?;
+        bed.options.solver.threads = given.count("threads", 1)?;
+        bed.scene.grains = cohering(bed.scene.grains, &given)?;
+        bed.scene.walls = moving(bed.scene.walls, given.some("wall_velocity")?.as_ref())?;
+        given.finish()?;
+        let (base, inner) = BedSimulation::build(bed)?;
+        Ok(base.add_subclass(Self {
+            inner,
+            terrain,
+            vessel,
+        }))
+    }
+
+    /// Angular velocities of the balls, world frame, (n, 3), rad/s.
+    #[getter]
+    fn spin(&self) -> Result<Array> {
+        let inner = self.open()?;
+        Ok(columns(inner.v(), inner.description().grains.len(), VELOCITIES, 3))
+    }
+
+    /// The terrain below the balls, or None.
+    #[getter]
+    fn terrain<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyAny>>> {
+        let terrain = self.terrain.as_ref();
+        terrain.map(|ground| union::object(py, ground)).transpose()
+    }
+
+    /// The vessel around the balls, or None.
+    #[getter]
+    fn vessel<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyAny>>> {
+        self.vessel.as_ref().map(|v| v.to_object(py)).transpose()
+    }
+
+    /// Sets positions and velocities; time starts at 0.
+    ///
+    /// Args:
+    ///     position: Centres, (n, 3), m.
+    ///     velocity: Velocities of the centres, (n, 3), m/s; at rest by default.
+    ///     spin: Angular velocities, (n, 3), rad/s; at rest by default.
+    ///
+    /// Raises:
+    ///     StateError: An array has a wrong shape or an entry that is not finite, or bodies
+    ///         overlap. Nothing has changed.
+    #[pyo3(signature = (position, velocity = None, spin = None))]
+    fn set_state(
+        &self,
+        position: &Bound<'_, PyAny>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        spin: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        let mut inner = self.open()?;
+        let (q, v) = state(inner.description().grains.len(), position, velocity, spin)?;
+        inner.set_state(&q, &v).map_err(|e| grain_error(&e))
+    }
+
+    /// Replaces the balls. Time and options do not change.
+    ///
+    /// Balls that are kept stay asleep, and keep their contact impulses for the warm start of the
+    /// next step. Overlaps are allowed, because they can arise in a run. An earlier snapshot can be
+    /// restored once the simulation has the same balls again.
+    ///
+    /// Args:
+    ///     radius: Radii of the new set of balls, (n,), m.
+    ///     mass: Their masses, (n,), kg.
+    ///     position: Their centres, (n, 3), m.
+    ///     before: Index of each ball in the present set, (n,); -1 for a new ball. The kept balls
+    ///         must be in their present order.
+    ///     kinematic: Which balls have a prescribed velocity, (n,); none by default.
+    ///     velocity: Velocities of their centres, (n, 3), m/s; at rest by default.
+    ///     spin: Their angular velocities, (n, 3), rad/s; at rest by default.
+    ///
+    /// Raises:
+    ///     ModelError: A radius or mass is not finite and positive, or `before` does not increase.
+    ///         Nothing has changed.
+    ///     StateError: An array has a wrong shape or an entry that is not finite. Nothing has
+    ///         changed.
+    #[pyo3(signature = (radius, mass, position, before, **options),
+        text_signature = "($self, radius, mass, position, before, *, kinematic=None, velocity=None, spin=None)")]
+    fn exchange(
+        &self,
+        radius: &Bound<'_, PyAny>,
+        mass: &Bound<'_, PyAny>,
+        position: &Bound<'_, PyAny>,
+        before: &Bound<'_, PyAny>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<()> {
+        let mut inner = self.open()?;
+        let given = Named::keywords(radius.py(), options)?;
+        let grains = bed_arguments::grains::<3>(radius, mass, given.get("kinematic")?)?;
+        let (velocity, spin) = (given.some("velocity")?, given.some("spin")?);
+        given.finish()?;
+        let (q, v) = state(grains.len(), position, velocity.as_ref(), spin.as_ref())?;
+        let before = numbers(before)?;
+        inner
+            .exchange(grains, &q, &v, &before)
+            .map_err(|e| grain_error(&e))
+    }
 }
 
-/// Centres of the first `n` bodies, (n, 3).
-pub fn centres(q: &[f64], n: usize) -> Array {
-    columns(q, (n, COORDINATES, 0))
+/// Initial state for a bed: balls in loose layers over a rectangle, without overlap.
+///
+/// The radii are drawn uniformly from their range.
+///
+/// Args:
+///     count: Number of balls, at most 1 000 000.
+///     radius_min: Smallest radius, m.
+///     radius_max: Largest radius, m.
+///     mass: Mass of a ball of the mean radius, kg; masses are proportional to volume.
+///     width: Width of the rectangle along x, m.
+///     depth: Width of the rectangle along z, m.
+///     left: Smallest x, m.
+///     back: Smallest z, m.
+///     bottom: Height of the lower edge, m.
+///     seed: Seed of the random numbers; equal seeds give equal balls.
+///
+/// Returns:
+///     Radii, (n,), m, masses, (n,), kg, and centres, (n, 3), m.
+///
+/// Raises:
+///     ModelError: A number is not finite or out of its range, `radius_max` is below `radius_min`,
+///         or a ball does not fit.
+#[pyfunction]
+#[pyo3(signature = (count, **options),
+    text_signature = "(count, *, radius_min, radius_max, mass, width, depth, left=0.0, back=0.0, bottom=0.0, seed=0)")]
+pub fn ball_packing(
+    count: &Bound<'_, PyAny>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> Result<Packed> {
+    let given = Named::keywords(count.py(), options)?.of(Kind::Model);
+    let packing = Packing::<3> {
+        count: self::count(count, Kind::Model, "count")?,
+        radius_min: given.need("radius_min", number)?,
+        radius_max: given.need("radius_max", number)?,
+        mass: given.need("mass", number)?,
+        corner: corner(&given)?,
+        sides: sides(&given)?,
+        seed: given.whole("seed", 0)?,
+    };
+    given.finish()?;
+    packed(count.py(), &packing)
 }
 
-/// Velocities of the centres of the first `n` bodies, (n, 3).
-pub fn velocities(v: &[f64], n: usize) -> Array {
-    columns(v, (n, VELOCITIES, 0))
+/// Lowest corner of the rectangle that balls are laid over, m.
+fn corner(given: &Named<'_>) -> Result<[f64; 3]> {
+    let [left, bottom, back] = ["left", "bottom", "back"];
+    Ok([
+        given.number(left, 0.0)?,
+        given.number(bottom, 0.0)?,
+        given.number(back, 0.0)?,
+    ])
 }
 
-/// Spins of the first `n` bodies, (n, 3).
-pub fn spins(v: &[f64], n: usize) -> Array {
-    columns(v, (n, VELOCITIES, 3))
+/// Sides of the rectangle that balls are laid over, m, without an upper end.
+fn sides(given: &Named<'_>) -> Result<[f64; 3]> {
+    Ok([
+        given.need("width", number)?,
+        f64::INFINITY,
+        given.need("depth", number)?,
+    ])
+}
+
+/// Places balls of given radii in loose layers over a rectangle, without overlap.
+///
+/// Each ball gets a place as wide as the largest ball. Layers are filled in the order of `radius`.
+///
+/// Args:
+///     radius: Radii, (n,), m.
+///     width: Width of the rectangle along x, m.
+///     depth: Width of the rectangle along z, m.
+///     left: Smallest x, m.
+///     back: Smallest z, m.
+///     bottom: Height of the lower edge, m.
+///     seed: Seed of the random numbers; equal seeds give equal places.
+///
+/// Returns:
+///     Centres, (n, 3), m.
+///
+/// Raises:
+///     ModelError: A number is not finite or out of its range, or a ball does not fit.
+#[pyfunction]
+#[pyo3(signature = (radius, **options), text_signature = "(radius, *, width, depth, left=0.0, back=0.0, bottom=0.0, seed=0)")]
+pub fn arrange_balls(
+    radius: &Bound<'_, PyAny>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> Result<Array> {
+    let given = Named::keywords(radius.py(), options)?.of(Kind::Model);
+    let (corner, sides) = (corner(&given)?, sides(&given)?);
+    let seed = given.whole("seed", 0)?;
+    given.finish()?;
+    let radii = vector(radius, Kind::Model, "radius")?;
+    let places = radius
+        .py()
+        .release(|| arranged::<3>(&radii, corner, sides, seed))?;
+    let q = places.map_err(|e| grain_error(&e))?;
+    Ok(columns(&q, radii.len(), COORDINATES, 0))
+}
+
+/// Adds the classes of grains in space to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
+    module.add_class::<GrainSimulation>()?;
+    module.add_class::<Drum>()?;
+    module.add_class::<Silo>()?;
+    module.add_function(wrap_pyfunction!(arrange_balls, module)?)?;
+    module.add_function(wrap_pyfunction!(ball_packing, module)?)?;
+    Ok(())
 }

@@ -241,7 +241,7 @@ impl GrainContacts {
     where
         GrainBed<D>: Scene<Contact = GrainContact<D>, Memory = BedMemory>,
     {
-        let (scene, h) = (&bed.scene().soil, bed.options().time_step);
+        let (scene, h) = (&bed.scene().description, bed.options().time_step);
         let wheels = scene.machine.as_ref().map_or(0, |m| m.n_wheels());
         let mut active = bed.contacts().to_vec();
         for one in &mut active {

@@ -8,7 +8,9 @@ mod arrays;
 mod balls;
 mod batch;
 mod bed_arguments;
+mod beds;
 mod contacts;
+mod disks;
 mod draw;
 mod elementary;
 mod episode;
@@ -18,7 +20,6 @@ mod errors;
 mod friction_contact;
 mod generators;
 mod given_problem;
-mod grains;
 mod height_field;
 mod infos;
 mod linearisation;
@@ -32,7 +33,6 @@ mod path_search;
 mod planar;
 mod planar_ground;
 mod planar_machines;
-mod planar_soil;
 mod plane;
 mod rays;
 mod reading;
@@ -128,8 +128,10 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<planar_machines::BallSimulation>()?;
     module.add_class::<planar_machines::TwoWheelRoverSimulation>()?;
     module.add_class::<planar_machines::MirroredRoverSimulation>()?;
-    planar_soil::register(module)?;
-    grains::register(module)?;
+    module.add_class::<contacts::GrainContacts>()?;
+    module.add_class::<beds::BedSimulation>()?;
+    disks::register(module)?;
+    balls::register(module)?;
     rover_grains::register(module)?;
     Ok(())
 }

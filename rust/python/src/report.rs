@@ -90,7 +90,7 @@ pub struct StepReport {
     /// `energy_released`, minus `energy_dissipated`, `energy_lost` and `energy_removed`.
     /// `energy_lost` therefore contains the errors of the time stepping and the work of reactions
     /// in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
-    /// 0 for grains and planar soils, whose energy is not audited.
+    /// 0 for grains, whose energy is not audited.
     #[pyo3(get)]
     energy_lost: f64,
     /// Work against gravity and springs by removing penetration, summed over the steps, J.

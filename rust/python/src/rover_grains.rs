@@ -10,9 +10,9 @@ use rover_core::simulation::{
 
 use crate::arguments::{Given, refused};
 use crate::arrays::Array;
+use crate::balls::GrainSimulation;
 use crate::bed_arguments::grain_error;
 use crate::errors::{BorderError, Kind, Result, Value};
-use crate::grains::GrainSimulation;
 use crate::report::{Energy, StepReport};
 use crate::shared::{Open, Release, Shared, Watch};
 use crate::simulation::Simulation;
@@ -202,7 +202,7 @@ impl RoverGrainSimulation {
     fn __repr__(slf: PyRef<'_, Self>) -> String {
         let read = |_: &_, rover: &RoverSimulation, grains: &Grains<3>| {
             let name = &rover.model().description().name;
-            format!("{name:?} among {} balls", grains.soil().grains.len())
+            format!("{name:?} among {} balls", grains.description().grains.len())
         };
         let what = slf.together.read(read);
         slf.as_super().shown("RoverGrainSimulation", what)

@@ -16,7 +16,7 @@ use crate::snapshot::{KeptScene, Snapshot, other_kind, snapshot};
 
 /// Base class of all simulations. It cannot be instantiated.
 ///
-/// Its subclasses are `Simulation`, `PlanarSimulation`, `SoilSimulation`, `GrainSimulation` and
+/// Its subclasses are `Simulation`, `PlanarSimulation`, `BedSimulation` and
 /// `RoverGrainSimulation`.
 ///
 /// Only one call may run at a time. A second call, from another thread or a signal handler, raises

@@ -3,7 +3,7 @@
 Pressure under a plate at a depth (Bekker 1969):       p = k zⁿ
 Shear stress at a displacement (Janosi and Hanamoto 1961): τ = τ_max (1 − exp(−j / K))
 Its limit under a normal stress (Mohr and Coulomb):      τ_max = c + σ tan φ
-Pull of a wheel at a slip, in loads:                     A (1 − exp(−(s − s₀) / K)), as `rover_gym.soil` fits it
+Pull of a wheel at a slip, in loads:                     A (1 − exp(−(s − s₀) / K)), as `rover_gym.grains` fits it
 
 Errors are standard errors from the scatter about the curve, as if the points scattered independently.
 """
@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.grains.disk_trials import Pull, Traction, fit_traction
 from rover_gym.grains.lab.plate_and_shear import PlatePoint, ShearPoint
 from rover_gym.grains.lab.wheel import WheelPoint
 from rover_gym.mechanics import OptionError
-from rover_gym.soil.soil_trials import Pull, Traction, fit_traction
 from rover_gym.validation import checked, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -167,7 +167,7 @@ def fit_strength(laws: Sequence[ShearLaw]) -> Strength:
 
 @checked(points=["WheelPoint"])
 def fit_pull(points: Sequence[WheelPoint]) -> Traction:
-    """Fits `rover_gym.soil.fit_traction`'s curve to the pulls of one wheel test.
+    """Fits `rover_gym.grains.fit_traction`'s curve to the pulls of one wheel test.
 
     Args:
         points: Of one wheel test, at four slips or more.

@@ -109,7 +109,7 @@ class Arrows {
   }
 }
 
-// The strongest contacts of a soil as bars before the disks, wider where the force is larger.
+// The strongest contacts of disks as bars before the disks, wider where the force is larger.
 class Chains {
   constructor(view, channel) {
     this.shown = null;

@@ -65,7 +65,7 @@ pub struct StepReport {
     ///
     /// It is what all other entries leave unexplained of the change of the energy, of which that of
     /// springs and position controls is a part: errors of the time step, and the normal work of
-    /// contacts that persist. 0 among grains and planar soils, which are not audited.
+    /// contacts that persist. 0 among grains, which are not audited.
     pub energy_lost: f64,
     /// Energy that contacts which yield gave off, all steps together, J; negative where they stored
     /// some. What they hold is remembered, so the sum over any run is no more than they held at its

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::SVector;
+use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::active_contact::LocatedContact;
@@ -29,7 +29,7 @@ use crate::system::grains::{
 /// tolerance would be left to project. If requested, projection starts at 0.5% of the smallest
 /// radius.
 #[must_use]
-pub fn soil_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
+pub fn grain_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
     StepOptions {
         theta: 1.0,
         forecast: 1.0,
@@ -52,8 +52,8 @@ const MAX_STEPS: usize = 1 << 53;
 /// Grains, their ground, and when they sleep. The description is shared.
 #[derive(Clone, Debug)]
 pub struct GrainBed<const D: usize> {
-    /// The description.
-    pub soil: Arc<GrainScene<D>>,
+    /// The grains, their ground and their machine.
+    pub description: Arc<GrainScene<D>>,
     /// When grains sleep; None: never.
     pub sleep: Option<SleepOptions>,
 }
@@ -93,7 +93,7 @@ impl BedMemory {
 pub type GrainSimulation<const D: usize> = Simulation<GrainBed<D>>;
 
 /// A bed of disks, stepped through time.
-pub type SoilSimulation = GrainSimulation<2>;
+pub type DiskSimulation = GrainSimulation<2>;
 
 impl<const D: usize> LocatedContact for GrainContact<D> {
     fn normal(&self) -> [f64; D] {
@@ -122,7 +122,7 @@ where
     type System<'a> = GrainSystem<'a, D>;
 
     fn nv(&self) -> usize {
-        self.soil.nv()
+        self.description.nv()
     }
 
     fn moved(&self, q: &Vec<f64>) -> Vec<f64> {
@@ -130,7 +130,7 @@ where
     }
 
     fn command(&self) -> BedCommand<D> {
-        let machine = self.soil.machine.as_ref();
+        let machine = self.description.machine.as_ref();
         BedCommand {
             torques: vec![0.0; machine.map_or(0, |m| m.n_inputs())],
             pull: SVector::zeros(),
@@ -141,7 +141,7 @@ where
         BedMemory {
             count: 0,
             elapsed: 0.0,
-            sleep: Sleep::new(self.soil.grains.kinematic()),
+            sleep: Sleep::new(self.description.grains.kinematic()),
             moments: Moments::new(),
         }
     }
@@ -151,7 +151,7 @@ where
     }
 
     fn contact_capacity(&self) -> usize {
-        3 * self.soil.grains.len()
+        3 * self.description.grains.len()
     }
 
     fn system<'a>(
@@ -163,7 +163,7 @@ where
     ) -> GrainSystem<'a, D> {
         parts.wall_time = memory.elapsed;
         GrainSystem {
-            scene: &self.soil,
+            scene: &self.description,
             asleep: memory.sleep.asleep(),
             moments: &memory.moments,
             inputs: &command.torques,
@@ -182,9 +182,9 @@ where
         let Some(options) = &self.sleep else {
             return;
         };
-        let movers = (self.soil).movers(&taken.state.configuration, &taken.state.v);
+        let movers = (self.description).movers(&taken.state.configuration, &taken.state.v);
         let step = grains::StepTaken {
-            scene: &self.soil,
+            scene: &self.description,
             weight_impulse: taken.options.gravity.norm() * taken.options.time_step,
             q: &taken.state.configuration,
             v: &mut taken.state.v,
@@ -206,17 +206,17 @@ where
         let State {
             configuration, v, ..
         } = state;
-        self.soil.energy(configuration, v, &options.gravity)
+        self.description.energy(configuration, v, &options.gravity)
     }
 
     fn fingerprint(&self) -> u64 {
-        self.soil.fingerprint()
+        self.description.fingerprint()
     }
 
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool {
         let GrainScene {
             grains, machine, ..
-        } = &*self.soil;
+        } = &*self.description;
         let (torques, pull) = (&snapshot.command.torques, &snapshot.command.pull);
         let expected = machine
             .as_ref()
@@ -232,7 +232,7 @@ where
         let moments = &snapshot.memory.moments;
         let keys = snapshot.active.iter().map(|a| a.contact.key);
         let mut keys = keys.chain(moments.iter().map(|(key, _)| *key));
-        snapshot.state.configuration.len() == self.soil.nq()
+        snapshot.state.configuration.len() == self.description.nq()
             && torques.len() == expected[0]
             && snapshot.memory.count <= MAX_STEPS
             && snapshot.memory.elapsed.is_finite()
@@ -252,30 +252,30 @@ where
     /// # Errors
     /// An invalid description or configuration: see [`GrainScene::check_configuration`].
     pub fn new(
-        soil: Arc<GrainScene<D>>,
+        description: Arc<GrainScene<D>>,
         options: StepOptions,
         sleep: Option<SleepOptions>,
         q: Vec<f64>,
-    ) -> Result<Self, SoilSetupError> {
+    ) -> Result<Self, GrainSetupError> {
         options.check()?;
         for (field, value) in [("theta", options.theta), ("forecast", options.forecast)] {
             if value < 1.0 {
-                return Err(SoilSetupError::Options(OptionsError::OutOfRange {
+                return Err(GrainSetupError::Options(OptionsError::OutOfRange {
                     field,
-                    range: "1 in a soil",
+                    range: "1 in a bed of grains",
                     value,
                 }));
             }
         }
-        soil.check()?;
-        soil.check_configuration(&q)?;
-        Ok(Self::of(GrainBed { soil, sleep }, q, options)?)
+        description.check()?;
+        description.check_configuration(&q)?;
+        Ok(Self::of(GrainBed { description, sleep }, q, options)?)
     }
 
-    /// The description.
+    /// The grains, their ground and their machine.
     #[must_use]
-    pub fn soil(&self) -> &Arc<GrainScene<D>> {
-        &self.scene.soil
+    pub fn description(&self) -> &Arc<GrainScene<D>> {
+        &self.scene.description
     }
 
     /// Which grains sleep (n); kinematic ones always do.
@@ -290,17 +290,17 @@ where
     /// # Errors
     /// As [`Self::new`]; nothing is changed then.
     pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), GrainError> {
-        self.soil().check_configuration(q)?;
-        if v.len() != self.soil().nv() {
+        self.description().check_configuration(q)?;
+        if v.len() != self.description().nv() {
             return Err(GrainError::Length {
                 field: "velocity",
-                expected: self.soil().nv(),
+                expected: self.description().nv(),
                 count: v.len(),
             });
         }
         let width = body_velocities(D);
-        let soil = self.soil();
-        soil.check_finite("velocity", "machine_rate", v, width)?;
+        let description = self.description();
+        description.check_finite("velocity", "machine_rate", v, width)?;
         self.place(q.to_vec(), v.to_vec());
         Ok(())
     }
@@ -313,7 +313,7 @@ where
     /// # Errors
     /// A wrong number of marks, or no grain left. Nothing is changed then.
     pub fn remove(&mut self, marked: &[bool]) -> Result<(), GrainError> {
-        let n = self.soil().grains.len();
+        let n = self.description().grains.len();
         if marked.len() != n {
             return Err(GrainError::Length {
                 field: "which",
@@ -322,7 +322,7 @@ where
             });
         }
         let renumbering = Renumbering::without(marked);
-        let grains = self.soil().grains.without(&renumbering)?;
+        let grains = self.description().grains.without(&renumbering)?;
         let q = renumbering.keep(&self.state.configuration, COORDINATES);
         let v = renumbering.keep(&self.state.v, body_velocities(D));
         self.memory.sleep = self.memory.sleep.without(&renumbering);
@@ -371,29 +371,29 @@ where
                 finite(&format!("{field}[{}]", k / width), *value)?;
             }
         }
-        let soil = self.soil().clone();
-        let renumbering = Renumbering::of(before, soil.grains.len())?;
-        let grains = match soil.grains.cohesion() {
+        let now = self.description().clone();
+        let renumbering = Renumbering::of(before, now.grains.len())?;
+        let grains = match now.grains.cohesion() {
             Some(cohesion) => grains.with_cohesion(*cohesion),
             None => grains,
         };
         self.memory.sleep = self.memory.sleep.exchanged(
             &renumbering,
             before,
-            soil.grains.kinematic(),
+            now.grains.kinematic(),
             grains.kinematic(),
         );
-        let q = [q, soil.machine_coordinates(self.q())].concat();
-        let v = [v, soil.machine_velocities(self.v())].concat();
+        let q = [q, now.machine_coordinates(self.q())].concat();
+        let v = [v, now.machine_velocities(self.v())].concat();
         self.take(grains, q, v, &renumbering);
         Ok(())
     }
 
     /// Continues with other grains, whose sleep is set: impulses of contacts follow their bodies.
     fn take(&mut self, grains: Grains<D>, q: Vec<f64>, v: Vec<f64>, renumbering: &Renumbering) {
-        self.scene.soil = Arc::new(GrainScene {
+        self.scene.description = Arc::new(GrainScene {
             grains,
-            ..(**self.soil()).clone()
+            ..(**self.description()).clone()
         });
         self.state.configuration = q;
         self.state.v = v;
@@ -436,7 +436,7 @@ where
     /// # Errors
     /// No machine, or an entry that is not finite; nothing is changed then.
     pub fn set_pull(&mut self, pull: [f64; D]) -> Result<(), GrainError> {
-        if self.soil().machine.is_none() {
+        if self.description().machine.is_none() {
             return Err(GrainError::NoMachine);
         }
         for (k, value) in pull.iter().enumerate() {
@@ -449,7 +449,7 @@ where
     /// Impulse of the last step's contacts on the machine's wheels, N s.
     #[must_use]
     pub fn impulse_on_wheels(&self) -> [f64; D] {
-        let n = self.soil().grains.len();
+        let n = self.description().grains.len();
         let wheels = self.active.iter().filter(|c| c.contact.key.a as usize >= n);
         let mut sum = SVector::<f64, D>::zeros();
         for active in wheels {
@@ -467,12 +467,20 @@ where
     /// other and with walls do not count.
     #[must_use]
     pub fn penetration(&self) -> f64 {
-        self.soil().penetration(self.q(), self.memory.elapsed)
+        self.description()
+            .penetration(self.q(), self.memory.elapsed)
+    }
+
+    /// Momentum of the grains that are not kinematic, kg m/s, and their moment of momentum about
+    /// the origin, kg m²/s; in the plane the moment is its z component.
+    #[must_use]
+    pub fn momentum(&self) -> (SVector<f64, D>, Vector3<f64>) {
+        self.description().momentum(self.q(), self.v())
     }
 
     /// Wakes all grains.
     pub fn wake(&mut self) {
-        let kinematic = self.scene.soil.grains.kinematic();
+        let kinematic = self.scene.description.grains.kinematic();
         self.memory.sleep.wake_all(kinematic, &mut self.warm_start);
     }
 }
@@ -485,28 +493,18 @@ where
     /// N m s.
     #[must_use]
     pub fn moment(&self, contact: &GrainContact<D>) -> [f64; 3] {
-        let radius = self.scene.soil.grains.radius();
+        let radius = self.scene.description.grains.radius();
         grains::moment_of(radius, &self.memory.moments, contact.key)
     }
 }
 
-impl SoilSimulation {
-    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and
-    /// their moment of momentum about the origin, kg m²/s.
-    #[must_use]
-    pub fn momentum(&self) -> [f64; 3] {
-        let (linear, moment) = self.soil().momentum(self.q(), self.v());
-        [linear.x, linear.y, moment.z]
-    }
-}
-
-/// Errors in the description of a soil simulation.
+/// Errors in the description of a bed.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
-pub enum SoilSetupError {
+pub enum GrainSetupError {
     /// An option.
     #[error(transparent)]
     Options(#[from] OptionsError),
     /// The scene or its configuration.
     #[error(transparent)]
-    Soil(#[from] GrainError),
+    Grains(#[from] GrainError),
 }

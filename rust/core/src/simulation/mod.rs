@@ -77,7 +77,8 @@ pub use differentiator::{
 };
 pub use error::{BatchError, CommandError, LinearisationError, SnapshotError};
 pub use grains::{
-    BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
+    BedCommand, BedMemory, DiskSimulation, GrainBed, GrainSetupError, GrainSimulation,
+    grain_options,
 };
 pub use linearisation::{ColumnCheck, Linearisation};
 pub use planar::{PlanarScene, PlanarSimulation};

@@ -76,7 +76,7 @@ impl RoverInGrains {
     ) -> Result<Self, TogetherError> {
         grains::GrainFriction {
             wheels: friction,
-            ..bed.soil().friction
+            ..bed.description().friction
         }
         .check()
         .map_err(GrainError::from)?;
@@ -253,7 +253,7 @@ impl RoverInGrains {
     /// The impulses of both and of the touches, in the order of the keys.
     fn join_warm_starts(&mut self, rover: &RoverSimulation, bed: &GrainSimulation<3>) {
         #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
-        let n = bed.soil().grains.len() as u32;
+        let n = bed.description().grains.len() as u32;
         let all = &mut self.warm_start.impulses;
         all.clear();
         let of_bed = &bed.warm_start.impulses;
@@ -327,7 +327,7 @@ impl RoverInGrains {
         };
         let movers: Vec<_> = Part::all(rover.model()).map(mover).collect();
         let step = grains::StepTaken {
-            scene: &bed.scene.soil,
+            scene: &bed.scene.description,
             weight_impulse: options.gravity.norm() * options.time_step,
             q: &bed.state.configuration,
             v: &mut bed.state.v,
@@ -378,7 +378,7 @@ fn visit_near(
     reach: f64,
     mut visit: impl FnMut(Part, usize, f64),
 ) {
-    let (model, grains) = (rover.model(), &bed.soil().grains);
+    let (model, grains) = (rover.model(), &bed.description().grains);
     let kinematics = Kinematics::of(model, rover.q());
     let mut grid = Grid::<3>::default();
     grid.fill(bed.q(), grains.radius(), 2.0 * grains.largest());
@@ -415,7 +415,7 @@ fn gaps_to_grains(rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Vec<f64>
 
 /// Checks that no part of the rover is in a grain.
 fn check_apart(rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Result<(), TogetherError> {
-    let (model, grains) = (rover.model(), &bed.soil().grains);
+    let (model, grains) = (rover.model(), &bed.description().grains);
     let mut deepest: Option<(Part, usize, f64)> = None;
     visit_near(rover, bed, Part::all(model), 0.0, |part, grain, gap| {
         if gap < deepest.map_or(-OVERLAP * grains.smallest(), |d| d.2) {

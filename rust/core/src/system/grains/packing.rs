@@ -31,7 +31,7 @@ pub struct Packing<const D: usize> {
 }
 
 impl Default for Packing<2> {
-    /// The original's soil: 222 disks of 1.60 to 1.65 cm and 0.7 kg, three layers of 74.
+    /// The original's bed: 222 disks of 1.60 to 1.65 cm and 0.7 kg, three layers of 74.
     fn default() -> Self {
         Self {
             count: 222,

@@ -143,6 +143,7 @@ impl<const D: usize> GrainScene<D> {
         let numbers = grains.radius().iter().chain(grains.mass()).copied();
         let kinematic = grains.kinematic().iter().map(|k| f64::from(u8::from(*k)));
         let machine = self.machine.as_ref().map_or(0, |m| m.fingerprint());
+        // The word that snapshots written so far carry.
         let kind = if D == 2 { "soil" } else { "balls" };
         let numbers = numbers
             .chain(kinematic)

@@ -1,7 +1,7 @@
-"""Trials on granular soil over several beds: rover travel against torque, and drawbar pull against slip.
+"""Trials on several beds of disks: rover travel against torque, and drawbar pull against slip.
 
->>> from rover_gym.soil import drawbar_pull, settled_bed
->>> bed = settled_bed(300, 4, radius_min=0.013, radius_max=0.0195)
+>>> from rover_gym.grains import drawbar_pull, settled_disks
+>>> bed = settled_disks(300, 4, radius_min=0.013, radius_max=0.0195)
 >>> drawbar_pull(bed, 0.5, run_in=0.1, distance=0.1).slip
 0.5
 
@@ -9,7 +9,7 @@
 
 with the pull `P`, load `W` and slip `s` of a trial, the limit `A` of `P / W`, the slip `s₀` of zero pull, and the slip
 scale `K` over which the distance from the limit falls by a factor e. Janosi and Hanamoto (1961) proposed the form for
-the shear stress under a track against the shear displacement of the soil, which grows with the slip.
+the shear stress under a track against the shear displacement of the ground, which grows with the slip.
 """
 
 from __future__ import annotations
@@ -24,11 +24,20 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import OptionError, SoilSimulation
-from rover_gym.soil.bed import WHEEL_RADIUS, Bed, rover_on_soil, step_count
+from rover_gym.grains.disk_bed import WHEEL_RADIUS, DiskBed, rover_on_disks, step_count
+from rover_gym.mechanics import DiskSimulation, OptionError
 from rover_gym.validation import number, refuse
 
-__all__ = ["BedEstimate", "Pull", "SoilDrive", "Traction", "drawbar_pull", "drive_on_soil", "fit_traction", "over_beds"]
+__all__ = [
+    "BedEstimate",
+    "DiskDrive",
+    "Pull",
+    "Traction",
+    "drawbar_pull",
+    "drive_on_disks",
+    "fit_traction",
+    "over_beds",
+]
 
 #: Distance of a trial wheel's centre from the walls, radii: nearer, the walls carry load.
 CLEAR_OF_WALLS = 2.0
@@ -40,7 +49,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class SoilDrive:
+class DiskDrive:
     """Result of a drive at one torque.
 
     Attributes:
@@ -65,8 +74,8 @@ class Pull:
     Attributes:
         slip: 1 - speed / (radius x turning rate).
         speed: Mean travel speed over the measurement, m/s.
-        pull: Mean horizontal force of the soil on the wheel, N: positive if the wheel can pull a load.
-        weight: Mean vertical force of the soil on the wheel, N.
+        pull: Mean horizontal force of the disks on the wheel, N: positive if the wheel can pull a load.
+        weight: Mean vertical force of the disks on the wheel, N.
         sinkage: Mean depth of the wheel's lowest point below the bed's mean surface, m.
     """
 
@@ -77,21 +86,23 @@ class Pull:
     sinkage: float
 
 
-def drive_on_soil(bed: Bed, torque: float, *, run_in: float = 0.5, duration: float = 2.0, **options: Any) -> SoilDrive:
+def drive_on_disks(
+    bed: DiskBed, torque: float, *, run_in: float = 0.5, duration: float = 2.0, **options: Any
+) -> DiskDrive:
     """Drives the rover from rest with the same torque at both wheels.
 
     Args:
-        bed: The soil.
+        bed: The disks.
         torque: Torque of each wheel, N m, positive forward.
         run_in: Time before the measurement begins, s.
         duration: Time of the measurement, s; it ends early if the front wheel nears the end of the bed.
-        **options: Options of `rover_on_soil`.
+        **options: Options of `rover_on_disks`.
 
     Raises:
         OptionError: A time is out of range, or the rover reached the end of the bed before the measurement began.
     """
     run_in, duration = number("run_in", run_in, at_least=0.0), number("duration", duration, above=0.0)
-    sim = rover_on_soil(bed, **options)
+    sim = rover_on_disks(bed, **options)
     step_count("duration", run_in + duration, sim.time_step)  # without a torque nothing else ends the run
     sim.set_torques([torque, torque])
     surface = bed.surface
@@ -111,7 +122,7 @@ def drive_on_soil(bed: Bed, torque: float, *, run_in: float = 0.5, duration: flo
     moved = sim.machine - start
     rims = -float((sim.wheels[:, 2] * moved[3:]).mean())
     distance = float(moved[0])
-    return SoilDrive(
+    return DiskDrive(
         torque=torque,
         distance=distance,
         speed=distance / (sim.time - begin),
@@ -120,14 +131,14 @@ def drive_on_soil(bed: Bed, torque: float, *, run_in: float = 0.5, duration: flo
     )
 
 
-def _is_at_the_end(sim: SoilSimulation, bed: Bed) -> bool:
+def _is_at_the_end(sim: DiskSimulation, bed: DiskBed) -> bool:
     """Whether the front wheel is near the wall in front of it."""
     x, _, radius = sim.wheels[-1]
     return bool(x + CLEAR_OF_WALLS * radius > bed.width)
 
 
 def drawbar_pull(
-    bed: Bed,
+    bed: DiskBed,
     slip: float,
     *,
     load: float = 10.0,
@@ -139,12 +150,12 @@ def drawbar_pull(
 ) -> Pull:
     """Drawbar pull of one wheel on a single-wheel test rig: its slip is prescribed, and it sinks freely.
 
-    The rim speed is the same at every slip, so that a large slip throws no soil; the wheel travels at 1 - slip times
+    The rim speed is the same at every slip, so that a large slip throws no disks; the wheel travels at 1 - slip times
     the rim speed. Run-in and measurement cover the same stretches of the bed at every slip, because a wheel reaches a
     steady state only after it leaves its initial hole; they take 1 / (1 - slip) times as long.
 
     Args:
-        bed: The soil.
+        bed: The disks.
         slip: Below 1; negative for a braked wheel. At 1 the wheel stands and digs itself in without reaching a steady
             state.
         load: Mass that the wheel carries, kg.
@@ -152,7 +163,7 @@ def drawbar_pull(
         run_in: Travel before the measurement begins, m, over which the wheel sinks in.
         distance: Travel during the measurement, m.
         radius: Wheel radius, m.
-        **options: Options of `SoilSimulation`.
+        **options: Options of `DiskSimulation`.
 
     Raises:
         OptionError: A number is out of range, or the bed is too short for the travel.
@@ -168,7 +179,7 @@ def drawbar_pull(
     if needed > bed.width:
         refuse(OptionError, "distance", distance, f"needs a bed of {needed:.2f} m, this one has {bed.width:.2f} m")
     height = bed.clear_height(start, radius)
-    sim = SoilSimulation(
+    sim = DiskSimulation(
         bed.radius,
         bed.mass,
         bed.position,
@@ -194,9 +205,9 @@ def drawbar_pull(
 
 
 def over_beds(
-    trial: Callable[[Bed, float], T],
+    trial: Callable[[DiskBed, float], T],
     values: Sequence[float],
-    beds: Sequence[Bed],
+    beds: Sequence[DiskBed],
     *,
     workers: int | None = None,
     progress: Callable[[int], None] = lambda _: None,

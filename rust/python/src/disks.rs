@@ -1,35 +1,27 @@
-//! `SoilSimulation` and `soil_packing`: granular soil of disks.
+//! `DiskSimulation` and `disk_packing`: grains in the plane.
+
+use std::sync::{Arc, MutexGuard};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::Support;
-use rover_core::planar::{PlanarGround, PlanarTree, WheelRig};
-use rover_core::simulation::SoilSimulation as Core;
-use rover_core::system::grains::{GrainScene, Packing};
-use std::sync::{Arc, MutexGuard};
+use rover_core::planar::{PlanarTree, WheelRig};
+use rover_core::simulation::DiskSimulation as Core;
+use rover_core::system::grains::Packing;
 
-use crate::arguments::{Given, Named, flags, refused};
-use crate::arrays::{Array, array, fresh, fresh_rows, vector};
-use crate::balls::{self, Packed};
-use crate::bed_arguments::{self, Usual, check_rows, grain_error, grains, rows, setup_error};
-use crate::contacts::GrainContacts;
-use crate::errors::{BorderError, Kind, Result, Value};
+use crate::arguments::{Given, Named, refused};
+use crate::arrays::{Array, fresh, fresh_rows, vector};
+use crate::bed_arguments::{Described, Packed, coordinates, grain_error, packed};
+use crate::beds::{Bed, BedSimulation};
+use crate::errors::{Kind, Result, Value};
 use crate::planar::pair;
 use crate::planar_ground::{border, parse};
 use crate::planar_machines::two_wheel_rover;
-use crate::shared::{Open, Shared};
-use crate::stepping::AnySimulation;
+use crate::shared::Open;
 
-/// Usual step options of a soil: velocities are right to ten times the tolerance, m/s.
-const USUAL: Usual = Usual {
-    time_step: 1e-3,
-    tolerance: 1e-4,
-    speed: 10.0,
-};
-
-/// A planar granular soil of disks, with an optional machine that drives on it.
+/// Grains in the plane: free disks with friction, contained by walls or on a ground.
 ///
-/// The disks move freely and touch with friction. Walls or a ground contain them.
+/// A machine may drive on them.
 ///
 /// Args:
 ///     radius: Radii of the disks, (n,), m.
@@ -74,40 +66,16 @@ const USUAL: Usual = Usual {
 ///         wheels overlap.
 ///     TerrainError: A wall has no direction, or `ground` is not a ground.
 ///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
-#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
-pub struct SoilSimulation {
-    inner: Arc<Shared<Core>>,
-}
+#[pyclass(module = "rover_gym.mechanics", extends = BedSimulation, frozen)]
+pub struct DiskSimulation(Arc<Bed<2>>);
 
-impl SoilSimulation {
-    fn open(&self) -> Result<MutexGuard<'_, Core>, BorderError> {
-        self.inner.open()
-    }
-
-    /// A row (x, y, angle) of each disk.
-    fn disks(values: &[f64], n: usize) -> Array {
-        Array::shaped(values[..3 * n].to_vec(), &[n, 3])
+impl DiskSimulation {
+    fn open(&self) -> Result<MutexGuard<'_, Core>> {
+        self.0.open()
     }
 }
 
-fn n_disks(inner: &Core) -> usize {
-    inner.soil().grains.len()
-}
-
-/// Positions with an angle where none was given.
-fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
-    let given = array(value, Kind::State, field)?;
-    if given.as_array().shape().get(1) != Some(&2) {
-        return Ok(rows(value, Kind::State, field, 3)?);
-    }
-    let flat = rows(value, Kind::State, field, 2)?;
-    Ok(flat
-        .chunks_exact(2)
-        .flat_map(|r| [r[0], r[1], 0.0])
-        .collect())
-}
-
-/// The machine on the soil, if there is one.
+/// The machine on the disks, if there is one.
 fn machine(given: &Named<'_>) -> Result<Option<PlanarTree>> {
     let rover = given.of(Kind::Model).read("rover", |rover, kind, field| {
         let wrong = |_| refused(rover, kind, field, "a dict");
@@ -123,14 +91,14 @@ fn machine(given: &Named<'_>) -> Result<Option<PlanarTree>> {
             .into())
     })?;
     if rover.is_some() && rig.is_some() {
-        let message = "rig: a soil has a rover or a rig, not both".to_owned();
+        let message = "rig: disks carry a rover or a rig, not both".to_owned();
         return Err(Kind::Option.error("rig", message, Value::Nothing));
     }
     Ok(rover.or(rig))
 }
 
 #[pymethods]
-impl SoilSimulation {
+impl DiskSimulation {
     #[new]
     #[pyo3(signature = (radius, mass, position, **options),
         text_signature = "(radius, mass, position, *, kinematic=None, walls=None, ground=None, rover=None, rig=None, machine=None, friction=0.5, wall_friction=0.5, wheel_friction=0.9, rolling_friction=0.0, restitution=0.0, gravity=None, time_step=0.001, tolerance=0.0001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
@@ -141,102 +109,40 @@ impl SoilSimulation {
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<PyClassInitializer<Self>> {
         let given = Named::keywords(radius.py(), options)?;
-        let disks = grains::<2>(radius, mass, given.get("kinematic")?)?;
-        let mut q = with_angles(position, "position")?;
-        check_rows("disks", disks.len(), &q)?;
-        let gravity = given.read("gravity", pair)?.map(|g| g.push(0.0));
-        let options = bed_arguments::step_options(&given, &disks, (gravity, false), USUAL)?;
-        let walls = bed_arguments::walls(given.some("walls")?.as_ref())?;
-        let ground: Option<Arc<dyn PlanarGround>> =
-            given.some("ground")?.as_ref().map(parse).transpose()?;
-        let machine = self::machine(&given)?;
+        let ground = given.some("ground")?.as_ref().map(parse).transpose()?;
+        let ground = ground.map(|ground| ground as Arc<dyn Support<2>>);
+        let mut bed = Described::read([radius, mass, position], &given, (ground, false))?;
+        bed.scene.machine = machine(&given)?.map(Arc::new);
         if let Some(machine) = given.of(Kind::State).read("machine", vector)? {
-            q.extend(machine);
+            bed.q.extend(machine);
         }
-        let scene = GrainScene {
-            grains: disks,
-            walls,
-            ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
-            machine: machine.map(Arc::new),
-            friction: bed_arguments::friction(&given, true, true)?,
-        };
-        let sleep = balls::sleep(&given)?;
         given.finish()?;
-        let inner = Core::new(Arc::new(scene), options, sleep, q).map_err(setup_error)?;
-        let inner = Arc::new(Shared::new(inner));
-        Ok(AnySimulation::base(inner.clone()).add_subclass(Self { inner }))
-    }
-
-    /// Radii of the disks, (n,), m.
-    #[getter]
-    fn radius(&self) -> Result<Array> {
-        Ok(fresh(self.open()?.soil().grains.radius()))
-    }
-
-    /// Masses of the disks, (n,), kg.
-    #[getter]
-    fn mass(&self) -> Result<Array> {
-        Ok(fresh(self.open()?.soil().grains.mass()))
-    }
-
-    /// Centres and angles of the disks, (n, 3), m and rad.
-    #[getter]
-    fn position(&self) -> Result<Array> {
-        let inner = self.open()?;
-        Ok(Self::disks(inner.q(), n_disks(&inner)))
-    }
-
-    /// Rates of `position`, (n, 3), m/s and rad/s.
-    #[getter]
-    fn velocity(&self) -> Result<Array> {
-        let inner = self.open()?;
-        Ok(Self::disks(inner.v(), n_disks(&inner)))
-    }
-
-    /// Which disks have a prescribed velocity, (n,).
-    #[getter]
-    fn kinematic(&self) -> Result<Array<bool>> {
-        Ok(fresh(self.open()?.soil().grains.kinematic()))
-    }
-
-    /// Which disks sleep, (n,); True for disks with a prescribed velocity.
-    #[getter]
-    fn asleep(&self) -> Result<Array<bool>> {
-        Ok(fresh(self.open()?.asleep()))
+        let (base, inner) = BedSimulation::build(bed)?;
+        Ok(base.add_subclass(Self(inner)))
     }
 
     /// Coordinates of the machine, (5,), m and rad; empty without one.
     #[getter]
     fn machine(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(fresh(&inner.q()[3 * n_disks(&inner)..]))
+        Ok(fresh(inner.description().machine_coordinates(inner.q())))
     }
 
     /// Rates of the machine's coordinates, (5,), m/s and rad/s; empty without one.
     #[getter]
     fn machine_rate(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(fresh(&inner.v()[3 * n_disks(&inner)..]))
+        Ok(fresh(inner.description().machine_velocities(inner.v())))
     }
 
     /// Centre and radius of each wheel, (n_wheels, 3), m.
     #[getter]
-    fn wheels(&self, _py: Python<'_>) -> Result<Array> {
+    fn wheels(&self) -> Result<Array> {
         let inner = self.open()?;
-        let wheels = inner.soil().wheels(inner.q()).into_iter();
+        let wheels = inner.description().wheels(inner.q()).into_iter();
         Ok(fresh_rows(
             wheels.map(|(centre, radius)| [centre.x, centre.y, radius]),
         ))
-    }
-
-    /// A point of each wall and the normal to its free side, (m, 4), m.
-    #[getter]
-    fn walls(&self) -> Result<Array> {
-        let inner = self.open()?;
-        Ok(fresh_rows(inner.soil().walls.iter().map(|wall| {
-            let (n, point) = (wall.n(), wall.n() * wall.offset());
-            [point.x, point.y, n.x, n.y]
-        })))
     }
 
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.
@@ -251,17 +157,6 @@ impl SoilSimulation {
         let inner = self.open()?;
         let pull = inner.command().pull;
         Ok((pull.x, pull.y))
-    }
-
-    /// Options of contacts, gravity and solver, as keyword arguments.
-    #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        let inner = self.open()?;
-        let (o, friction) = (inner.options(), &inner.soil().friction);
-        let settings = bed_arguments::settings(py, o, friction)?;
-        settings.set_item("wheel_friction", friction.wheels)?;
-        settings.set_item("gravity", (o.gravity.x, o.gravity.y))?;
-        Ok(settings)
     }
 
     /// Sets positions and rates; time starts at 0.
@@ -285,35 +180,21 @@ impl SoilSimulation {
         machine_rate: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         let mut inner = self.open()?;
-        let n = n_disks(&inner);
-        let mut q = with_angles(position, "position")?;
+        let mut q = coordinates::<2>(position, "position")?;
         let mut v = match velocity {
-            Some(velocity) => with_angles(velocity, "velocity")?,
+            Some(velocity) => coordinates::<2>(velocity, "velocity")?,
             None => vec![0.0; q.len()],
         };
+        let present = inner.description().machine_coordinates(inner.q());
         match machine {
             Some(machine) => q.extend(vector(machine, Kind::State, "machine")?),
-            None => q.extend(&inner.q()[3 * n..]),
+            None => q.extend(present),
         }
         match machine_rate {
             Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
-            None => v.resize(v.len() + inner.v().len() - 3 * n, 0.0),
+            None => v.resize(v.len() + present.len(), 0.0),
         }
         inner.set_state(&q, &v).map_err(|e| grain_error(&e))
-    }
-
-    /// Removes disks. The others keep their order.
-    ///
-    /// Args:
-    ///     which: Which disks to remove, (n,) booleans.
-    ///
-    /// Raises:
-    ///     ModelError: The number of booleans differs from that of the disks, or no disk would be
-    ///         left. Nothing has changed.
-    fn remove(&self, which: &Bound<'_, PyAny>) -> Result<()> {
-        let mut inner = self.open()?;
-        let which = flags(which, Kind::Model, "which")?;
-        inner.remove(&which).map_err(|e| grain_error(&e))
     }
 
     /// Sets the torques of the rover's wheels.
@@ -344,44 +225,15 @@ impl SoilSimulation {
             .map_err(|e| grain_error(&e))
     }
 
-    /// The contacts of the last step.
-    #[getter]
-    fn contacts(&self) -> Result<GrainContacts> {
-        Ok(GrainContacts::of(&*self.open()?))
-    }
-
-    /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
-    ///
-    /// Disks with prescribed velocity are not included.
-    fn momentum(&self) -> Result<Array> {
-        Ok(fresh(&self.open()?.momentum()))
-    }
-
     /// Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s.
     fn impulse_on_wheels(&self) -> Result<Array> {
         Ok(fresh(&self.open()?.impulse_on_wheels()))
     }
-
-    /// Deepest overlap now, m.
-    fn penetration(&self) -> Result<f64> {
-        Ok(self.open()?.penetration())
-    }
-
-    /// Wakes all disks.
-    fn wake(&self) -> Result<()> {
-        self.open()?.wake();
-        Ok(())
-    }
-
-    fn __repr__(slf: PyRef<'_, Self>) -> String {
-        let what = slf.open().map(|inner| format!("{} disks", n_disks(&inner)));
-        slf.as_super().shown("SoilSimulation", what)
-    }
 }
 
-/// Initial state for a soil: disks in loose rows, without overlap.
+/// Initial state for a bed: disks in loose rows, without overlap.
 ///
-/// The radii are drawn uniformly from their range. The defaults give the soil of the 2010 report:
+/// The radii are drawn uniformly from their range. The defaults give the bed of the 2010 report:
 /// three layers of 74 disks.
 ///
 /// Args:
@@ -403,7 +255,7 @@ impl SoilSimulation {
 #[pyfunction]
 #[pyo3(signature = (count = Given::MISSING, **options),
     text_signature = "(count=222, *, radius_min=0.016, radius_max=0.0165, mass=0.7, left=0.0, width=2.4494, bottom=0.0, seed=0)")]
-pub fn soil_packing(
+pub fn disk_packing(
     py: Python<'_>,
     count: Given<'_>,
     options: Option<&Bound<'_, PyDict>>,
@@ -419,12 +271,12 @@ pub fn soil_packing(
         seed: given.whole("seed", 0)?,
     };
     given.finish()?;
-    balls::packed::<2>(py, &packing)
+    packed::<2>(py, &packing)
 }
 
-/// Adds the soil's classes to the module.
+/// Adds the class of grains in the plane to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> Result<()> {
-    module.add_class::<SoilSimulation>()?;
-    module.add_function(wrap_pyfunction!(soil_packing, module)?)?;
+    module.add_class::<DiskSimulation>()?;
+    module.add_function(wrap_pyfunction!(disk_packing, module)?)?;
     Ok(())
 }

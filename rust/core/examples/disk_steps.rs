@@ -1,4 +1,4 @@
-//! A bed of soil, for counting instructions: `valgrind --tool=callgrind soil_steps 200 [rover]`.
+//! A bed of disks, for counting instructions: `valgrind --tool=callgrind disk_steps 200 [rover]`.
 //!
 //! Arguments: number of 1 ms steps (after 100 of run-in), and `rover` for a two-wheel rover that
 //! drives over the bed; without it the bed flows under tilted gravity. Prints a digest of all bits
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::{PlanarWheel, TwoWheelRover};
-use rover_core::simulation::{SoilSimulation, soil_options};
+use rover_core::simulation::{DiskSimulation, grain_options};
 use rover_core::system::grains::{GrainFriction, GrainScene, Packing, SleepOptions, Wall};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let drives = arguments.get(2).is_some_and(|word| word == "rover");
     let packing = Packing::default();
     let (disks, mut q) = packing.build()?;
-    let mut options = soil_options(&disks);
+    let mut options = grain_options(&disks);
     if !drives {
         options.gravity = Vector3::new(4.0, -9.0, 0.0);
     }
@@ -43,13 +43,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         q.extend([0.7, 0.32, 0.0, 0.0, 0.0]);
     }
     let sleep = drives.then(SleepOptions::default);
-    let mut soil = SoilSimulation::new(Arc::new(scene), options, sleep, q)?;
+    let mut sim = DiskSimulation::new(Arc::new(scene), options, sleep, q)?;
     if drives {
-        soil.set_inputs(&[50.0, 50.0])?;
+        sim.set_inputs(&[50.0, 50.0])?;
     }
-    soil.step(100)?;
-    soil.step(steps)?;
-    let all = soil.q().iter().chain(soil.v());
+    sim.step(100)?;
+    sim.step(steps)?;
+    let all = sim.q().iter().chain(sim.v());
     let digest = all.fold(0_u64, |hash, x| {
         (hash.rotate_left(5) ^ x.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15)
     });

@@ -1,4 +1,4 @@
-"""Curves over time of a recorded soil run: speed, slip and sinkage, wheel forces, energy and contacts.
+"""Curves over time of a recorded run of disks: speed, slip and sinkage, wheel forces, energy and contacts.
 
 Signals that jump from row to row are drawn twice: every sample as a light line, and the smoothed curve as a bold one.
 """
@@ -23,18 +23,18 @@ from rover_gym.figures.style import (
     title,
 )
 from rover_gym.files import written_whole
+from rover_gym.grains.disk_trials import DiskDrive, Pull
 from rover_gym.rendering.appearance import PLANAR_WHEEL_COLOURS
-from rover_gym.soil.soil_trials import Pull, SoilDrive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from rover_gym.figures.style import Sheet
-    from rover_gym.soil.soil_run import SoilRun
-    from rover_gym.soil.soil_trials import Traction
+    from rover_gym.grains.disk_run import DiskRun
+    from rover_gym.grains.disk_trials import Traction
 
 
-def driving(figure: Sheet, run: SoilRun) -> None:
+def driving(figure: Sheet, run: DiskRun) -> None:
     """Speed of rover and rims, wheel slip and sinkage."""
     speed, slip, depth = figure.subplots(3, 1, sharex=True)
     rates = run.trajectory["machine_rate"]
@@ -55,8 +55,8 @@ def driving(figure: Sheet, run: SoilRun) -> None:
     _finish(figure, (speed, slip, depth), "Speed, slip and sinkage", run)
 
 
-def wheel_forces(figure: Sheet, run: SoilRun) -> None:
-    """Vertical and horizontal force of the soil on each wheel."""
+def wheel_forces(figure: Sheet, run: DiskRun) -> None:
+    """Vertical and horizontal force of the disks on each wheel."""
     load, thrust = figure.subplots(2, 1, sharex=True)
     forces = np.array(run.wheel_forces)
     forces[0] = np.nan  # no step had been taken
@@ -66,10 +66,10 @@ def wheel_forces(figure: Sheet, run: SoilRun) -> None:
     load.set(ylabel="vertical force (N)")
     thrust.axhline(0.0, color=DARK, linewidth=0.6)
     thrust.set(ylabel="horizontal force,\npositive forward (N)", xlabel="time (s)")
-    _finish(figure, (load, thrust), "Force of the soil on the wheels, mean since the row before", run)
+    _finish(figure, (load, thrust), "Force of the disks on the wheels, mean since the row before", run)
 
 
-def disks_and_contacts(figure: Sheet, run: SoilRun) -> None:
+def disks_and_contacts(figure: Sheet, run: DiskRun) -> None:
     """Energy of disks and rover, number of contacts, deepest overlap."""
     energy, contacts, overlap = figure.subplots(3, 1, sharex=True)
     data = run.trajectory
@@ -89,27 +89,27 @@ def disks_and_contacts(figure: Sheet, run: SoilRun) -> None:
 
 
 #: By file name.
-SOIL_DRAWINGS = {
+DISK_DRAWINGS = {
     "driving": Drawing(driving, fits=lambda run: run.wheels.shape[1] > 0),
     "wheel-forces": Drawing(wheel_forces, fits=lambda run: run.wheels.shape[1] > 0),
     "disks-and-contacts": Drawing(disks_and_contacts),
 }
 
 
-def _wheels(run: SoilRun) -> list[tuple[str, str]]:
+def _wheels(run: DiskRun) -> list[tuple[str, str]]:
     """Name and colour of each wheel."""
     n = run.wheels.shape[1]
     names = ("back wheel", "front wheel") if n == 2 else tuple(f"wheel {i + 1}" for i in range(n))
     return [(name, PLANAR_WHEEL_COLOURS[i % len(PLANAR_WHEEL_COLOURS)]) for i, name in enumerate(names)]
 
 
-def _raw_and_smooth(axes: Axes, run: SoilRun, values: Array, colour: str, name: str) -> None:
+def _raw_and_smooth(axes: Axes, run: DiskRun, values: Array, colour: str, name: str) -> None:
     """Draws every sample as a light line, and the smoothed curve; values (n,)."""
     axes.plot(run.time, values, color=colour, linewidth=0.5, alpha=0.35, label=f"_{name} samples")
     axes.plot(run.time, smooth(run.time, values, WINDOW), color=colour, label=f"{name}, mean over {WINDOW:g} s")
 
 
-def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: SoilRun) -> None:
+def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: DiskRun) -> None:
     """Adds legends, and a title naming the figure and the run."""
     for axes in panels:
         panel_legend(axes)
@@ -121,7 +121,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 
 
 def draw_curves(
-    drives: Sequence[Sequence[SoilDrive]],
+    drives: Sequence[Sequence[DiskDrive]],
     pulls: Mapping[float, Sequence[Sequence[Pull]]],
     fits: Mapping[float, Traction],
     path: str | Path,

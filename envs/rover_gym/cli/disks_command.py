@@ -1,4 +1,4 @@
-"""`rover planar soil`: the two-wheel rover on granular soil, a crossing or a sweep of trials."""
+"""`rover planar disks`: the two-wheel rover on grains in the plane, a crossing or a sweep of trials."""
 
 import json
 import math
@@ -26,8 +26,8 @@ from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
-    from rover_gym.mechanics import SoilSimulation
-    from rover_gym.soil.soil_trials import Traction
+    from rover_gym.grains.disk_trials import Traction
+    from rover_gym.mechanics import DiskSimulation
 
 EARTH = 9.81  # m/s^2
 FRAMES = 25.0  # of the film, a second at EARTH
@@ -46,7 +46,7 @@ UNEQUAL = {"radius_min": 0.013, "radius_max": 0.0195}
 
 
 @plain_errors
-def soil(
+def disks(
     *,
     disks: Annotated[
         int | None, typer.Option(min=30, max=20_000, help="Number of disks. Default: 222; in a sweep, 444.")
@@ -68,14 +68,14 @@ def soil(
             min=0.01,
             max=1000.0,
             help="Time to simulate, s. Default: 4 s at 9.81 m/s^2, longer under weaker gravity. "
-            "The run ends early where the soil ends.",
+            "The run ends early where the disks end.",
         ),
     ] = None,
     seed: Annotated[
         int,
         typer.Option(min=0, help="Seed of the disks' radii and positions; in a sweep, the first seed."),
     ] = 0,
-    film: Annotated[bool, typer.Option("--film/--no-film", help="Write a film, soil.mp4.")] = True,
+    film: Annotated[bool, typer.Option("--film/--no-film", help="Write a film, disks.mp4.")] = True,
     sweep: Annotated[
         bool,
         typer.Option(
@@ -91,8 +91,8 @@ def soil(
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
     as_json: AsJson = False,
 ) -> None:
-    """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
-    names = ("soil-curves.json", "soil-curves.png") if sweep else ("soil.h5", "soil.png", "soil.mp4")
+    """Drive the two-wheel rover over a bed of disks; record, draw and film it."""
+    names = ("disk-curves.json", "disk-curves.png") if sweep else ("disks.h5", "disks.png", "disks.mp4")
     check_paths(output=Into(output, names))
     slowness = float(np.sqrt(EARTH / gravity))
     options: dict[str, Any] = {
@@ -122,25 +122,25 @@ def _cross(
     *,
     film: bool,
 ) -> None:
-    from rover_gym.figures.grain_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.soil.bed import (  # noqa: PLC0415
-        rover_on_soil,
-        settled_bed,
+    from rover_gym.figures.grain_frames import draw_disks, film_disks  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.grains.disk_bed import (  # noqa: PLC0415
+        rover_on_disks,
+        settled_disks,
     )
-    from rover_gym.soil.soil_run import SoilRun  # noqa: PLC0415 - as above
+    from rover_gym.grains.disk_run import DiskRun  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)
-    bed = settled_bed(disks, layers, seed=seed, **options)
-    sim = rover_on_soil(bed, wheel_friction=wheel_friction, **options)
+    bed = settled_disks(disks, layers, seed=seed, **options)
+    sim = rover_on_disks(bed, wheel_friction=wheel_friction, **options)
     sim.set_torques([torque, torque])
-    title = f"the two-wheel rover on a soil of {disks} disks"
-    path = output / "soil.h5"
+    title = f"the two-wheel rover on {disks} disks"
+    path = output / "disks.h5"
     rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
 
-    def is_across(now: "SoilSimulation") -> bool:
+    def is_across(now: "DiskSimulation") -> bool:
         return bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END)
 
-    run = results.record(sim, duration, path, SoilRun, 2.0 * rate, title=title, until=is_across)
+    run = results.record(sim, duration, path, DiskRun, 2.0 * rate, title=title, until=is_across)
     rows = int(run.trajectory.attributes["unconverged_rows"])
     machine = run.trajectory["machine"]
     distance = float(machine[-1, 0] - machine[0, 0])
@@ -161,16 +161,16 @@ def _cross(
         ],
     )
     results.path("trajectory", path)
-    results.path("figure", draw_soil(run, output / "soil.png", row=run.n_frames // 2))
+    results.path("figure", draw_disks(run, output / "disks.png", row=run.n_frames // 2))
     if film:
         with status("drawing the film"):
-            written = film_soil(run.resample(rate), output / "soil.mp4", frames_per_second=round(FRAMES))
+            written = film_disks(run.resample(rate), output / "disks.mp4", frames_per_second=round(FRAMES))
         results.path("film", written)
 
 
 def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:
     """Refuses a bed that is too narrow (m) before settling it."""
-    from rover_gym.soil.bed import bed_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.disk_bed import bed_width  # noqa: PLC0415 - h5py is slow to load
 
     width = bed_width(disks, layers, radius_max)
     if width < needed:
@@ -190,11 +190,11 @@ def _sweep(
     options: dict[str, Any],
     output: Path,
 ) -> None:
-    from rover_gym.figures.soil_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.soil.bed import settled_bed  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.soil.soil_trials import (  # noqa: PLC0415 - as above
+    from rover_gym.figures.disk_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.grains.disk_bed import settled_disks  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.grains.disk_trials import (  # noqa: PLC0415 - as above
         drawbar_pull,
-        drive_on_soil,
+        drive_on_disks,
         fit_traction,
         over_beds,
     )
@@ -206,7 +206,7 @@ def _sweep(
     # Means over seconds and beds need no tighter tolerance, and most of a bed is at rest.
     cheap = {"tolerance": 1e-3, "sleep": True, "sleep_speed": 5e-4 / slowness}
     rest = {**options, **cheap, "wheel_friction": wheel_friction}
-    drive = partial(drive_on_soil, run_in=0.5 * slowness, duration=2.0 * slowness, **rest)
+    drive = partial(drive_on_disks, run_in=0.5 * slowness, duration=2.0 * slowness, **rest)
     with progress_bar() as bar:
         total = len(seeds) * (2 + len(TORQUES) + len(LOADS) * len(SLIPS))
         task = bar.add_task("trials", total=total, state="")
@@ -219,9 +219,9 @@ def _sweep(
 
         beds, pull_beds = [], []
         for seed in seeds:
-            beds.append(settled_bed(disks, layers, seed=seed, **options))
+            beds.append(settled_disks(disks, layers, seed=seed, **options))
             advance(1)
-            pull_beds.append(settled_bed(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
+            pull_beds.append(settled_disks(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
             advance(1)
         pulls, drives, interrupted = {}, [], False
         try:
@@ -241,7 +241,7 @@ def _sweep(
         "pulls": {str(load): [[asdict(pull) for pull in row] for row in rows] for load, rows in pulls.items()},
         "fits": {str(load): asdict(fit) for load, fit in fits.items()},
     }
-    path = output / "soil-curves.json"
+    path = output / "disk-curves.json"
     # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
     write_whole(path, json.dumps(numbers, indent=1).replace("NaN", "null") + "\n")
     results.add(**numbers)
@@ -249,7 +249,7 @@ def _sweep(
     if interrupted:
         typer.echo("interrupted: the pulls are done, the drives are not", err=True)
         raise typer.Exit(INTERRUPTED)
-    results.path("curves", draw_curves(drives, pulls, fits, output / "soil-curves.png"))
+    results.path("curves", draw_curves(drives, pulls, fits, output / "disk-curves.png"))
 
 
 def _fits(fits: dict[float, "Traction"]) -> Table:

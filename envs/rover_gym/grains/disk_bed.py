@@ -1,4 +1,4 @@
-"""Beds of granular soil: disks that settled in a box under gravity."""
+"""Beds of disks that settled in a box under gravity, and the two-wheel rover on them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import OptionError, SoilSimulation, soil_packing
+from rover_gym.mechanics import DiskSimulation, OptionError, disk_packing
 from rover_gym.validation import number, refuse, vector
 
 #: Reference disk: mean radius (m) and mass (kg). Other disks take its density.
@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Bed:
+class DiskBed:
     """Disks at rest between two walls.
 
     Attributes:
@@ -73,7 +73,7 @@ def surface_height(radius: Array, position: Array) -> float:
     return float(np.mean(heights))
 
 
-def settled_bed(
+def settled_disks(
     count: int = 222,
     layers: int = 3,
     *,
@@ -83,7 +83,7 @@ def settled_bed(
     seed: int = 0,
     settle: float | None = None,
     **options: Any,
-) -> Bed:
+) -> DiskBed:
     """Settles disks in a box under gravity.
 
     Nearly monodisperse disks, the default, settle in rows; radii from 13 to 19.5 mm do not.
@@ -96,7 +96,7 @@ def settled_bed(
         mass: Mass of a disk of mean radius, kg; by default the density is that of a 0.7 kg disk of 16.25 mm.
         seed: Seed of the radii and initial positions.
         settle: Settling time, s; by default half a second at 9.81 m/s^2, and longer under weaker gravity.
-        **options: Options of `SoilSimulation`.
+        **options: Options of `DiskSimulation`.
 
     Raises:
         OptionError: `count` or `layers` is not a positive integer or exceeds a million, a radius is not positive,
@@ -109,18 +109,18 @@ def settled_bed(
     if mass is None:
         mass = DISK_MASS * (0.5 * (radius_min + radius_max) / DISK_RADIUS) ** 2
     width = bed_width(count, layers, radius_max)
-    radius, masses, centres = soil_packing(
+    radius, masses, centres = disk_packing(
         count, radius_min=radius_min, radius_max=radius_max, mass=mass, width=width, seed=seed
     )
     walls = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [width, 0.0, -1.0, 0.0]])
-    sim = SoilSimulation(radius, masses, centres, walls=walls, **options)
+    sim = DiskSimulation(radius, masses, centres, walls=walls, **options)
     duration = 0.5 * slowness(sim) if settle is None else number("settle", settle, at_least=0.0)
     sim.step(step_count("settle", duration, sim.time_step))
-    return Bed(radius, masses, sim.position, walls, width)
+    return DiskBed(radius, masses, sim.position, walls, width)
 
 
 def bed_width(count: int, layers: int, radius_max: float) -> float:
-    """Width of the box that `settled_bed` uses for this many disks, m."""
+    """Width of the box that `settled_disks` uses for this many disks, m."""
     return -(-count // layers) * 2.0 * radius_max * 1.004
 
 
@@ -139,7 +139,7 @@ def _whole(field: str, value: object) -> int:
     return round(result)
 
 
-def slowness(sim: SoilSimulation) -> float:
+def slowness(sim: DiskSimulation) -> float:
     """Ratio of the fall time to that at 9.81 m/s^2."""
     gravity = float(np.hypot(*sim.settings["gravity"]))
     return float(np.sqrt(EARTH / gravity)) if gravity > 0.0 else 1.0
@@ -151,8 +151,8 @@ WHEEL_RADIUS, HALF_LENGTH = 0.2, 0.4
 SETTLING = 0.2  # s, settling time of the rover at 9.81 m/s^2
 
 
-def rover_on_soil(
-    bed: Bed | None = None,
+def rover_on_disks(
+    bed: DiskBed | None = None,
     *,
     count: int = 222,
     layers: int = 3,
@@ -160,19 +160,19 @@ def rover_on_soil(
     start: float = 0.7,
     rover: Mapping[str, Any] | None = None,
     **options: Any,
-) -> SoilSimulation:
+) -> DiskSimulation:
     """The two-wheel rover, at rest at the left end of a settled bed.
 
     The rover starts just above the disks and settles for 0.2 s (at 9.81 m/s^2) before time 0.
 
     Args:
-        bed: The soil; by default `settled_bed` makes one from `count`, `layers` and `seed`.
+        bed: The disks; by default `settled_disks` makes one from `count`, `layers` and `seed`.
         count: Number of disks of the default bed.
         layers: Number of layers of the default bed.
         seed: Seed of the default bed.
         start: x of the rover's centre, m.
         rover: Keyword arguments of `TwoWheelRoverSimulation` that describe another rover: `mass`, `wheel_mass`, ...
-        **options: Options of `SoilSimulation`.
+        **options: Options of `DiskSimulation`.
 
     Raises:
         OptionError: The rover would overlap a wall, or an option is out of range.
@@ -180,7 +180,7 @@ def rover_on_soil(
     """
     if bed is None:
         shared = {name: options[name] for name in ("gravity", "friction", "time_step") if name in options}
-        bed = settled_bed(count, layers, seed=seed, **shared)
+        bed = settled_disks(count, layers, seed=seed, **shared)
     start = number("start", start)
     rover = {} if rover is None else rover
     if not isinstance(rover, Mapping):
@@ -199,7 +199,7 @@ def rover_on_soil(
         reason = f"puts a wheel out of the bed, which is {bed.width:.2f} m wide"
         refuse(OptionError, "start", start, reason)
     height = max(bed.clear_height(x, r) - y for x, r, y in zip(places, radii, axles[:, 1], strict=True))
-    sim = SoilSimulation(
+    sim = DiskSimulation(
         bed.radius,
         bed.mass,
         bed.position,
