@@ -129,7 +129,7 @@ bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's b
 	$(COMPARE).rollout
 	$(COMPARE).exploring_bench
 	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver disks)
-	cargo run --locked --quiet --profile bench -p rover-core --example sand_steps
+	cargo run --locked --quiet --profile bench -p rover-comparison --example sand_steps
 	-$(COMPARE).instructions
 
 train: $(STAMPS)/test $(STAMPS)/release ## train a network for the rocks (minutes) and compare it with the baseline, under runs/
@@ -142,8 +142,9 @@ train-rllib: $(STAMPS)/release ray ## train Rover-v0 on a local Ray with 2 worke
 ray: ## make the virtual environment of Ray, which pins other versions: .venv-rllib
 	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
 
-# One thread for every engine, and the package of comparisons on the path.
-COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
+# Programs of benchmarks/, some of which use scenes and files of the tests; in a comparison every engine has one thread.
+MEASURE := PYTHONPATH="benchmarks$(if $(filter Windows_NT,$(OS)),;,:)tests" $(BIN)/python -m
+COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(MEASURE) comparison
 
 chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/, docs/tables/ (40 minutes; CHART=--quick is shorter and goes to runs/)
 	$(COMPARE).chart $(CHART)
@@ -154,18 +155,18 @@ chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against
 	$(if $(filter --quick,$(CHART)),,$(COMPARE).headlines)
 
 policies: $(STAMPS)/release ## success, time and energy of the package's policies: docs/comparison/policies.json, docs/policy-results.md (an hour)
-	PYTHONPATH=tests $(BIN)/python -m comparison.policies
+	$(MEASURE) comparison.policies
 	$(COMPARE).headlines
 
 chart-gpu: $(STAMPS)/test $(MODULE) ## rovers a second and error on a graphics card, where there is one: docs/comparison/gpu.json, docs/many-rovers.md
-	PYTHONPATH=tests $(BIN)/python -m comparison.gpu_chart
+	$(MEASURE) comparison.gpu_chart
 	$(COMPARE).headlines
 
 stability: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/tables/stability.md (5 minutes)
 	$(COMPARE).stability
 
 torture: $(STAMPS)/test $(MODULE) ## tries to break everything: docs/tables/torture.md (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
-	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
+	$(MEASURE) torture $(TORTURE)
 
 film: $(STAMPS)/test $(MODULE) ## the moving picture at the head of the manual, from a page in a browser: docs/pictures/rover.webp (some minutes)
 	rm -rf runs/film
@@ -186,14 +187,14 @@ profiles: $(STAMPS)/test $(STAMPS)/release ## performance profiles of the contac
 	$(COMPARE).solver_profiles
 
 validate: $(STAMPS)/release ## grains beside papers and closed forms: docs/tables/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
-	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
+	$(MEASURE) validation $(VALIDATE)
 
 validate-sand: $(STAMPS)/test $(STAMPS)/core ## sand beside measurements: docs/validation/sand.md (a minute; the folder of the data in DATA or ROVER_GYM_SOIL_DATA)
-	PYTHONPATH=tests $(BIN)/python -m validation.sand $(if $(DATA),--data $(DATA))
+	$(MEASURE) validation.sand $(if $(DATA),--data $(DATA))
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
 	cargo run --release --locked --quiet -p rover-comparison --bin orders -- runs/orders.json
-	$(BIN)/python tests/comparison/draw_orders.py runs/orders.json docs/comparison/orders.png
+	$(BIN)/python benchmarks/comparison/draw_orders.py runs/orders.json docs/comparison/orders.png
 
 pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build

@@ -337,7 +337,7 @@ def test_a_field_without_ground_is_no_ground() -> None:
         RoverEnv(terrain=one_sphere(3.0), slope_deg=5.0)
 
 
-@pytest.mark.nightly("tests/torture/test_torture.py::test_a_short_round_of_every_regime_holds")
+@pytest.mark.nightly("tests/benchmarks/test_torture.py::test_a_short_round_of_every_regime_holds")
 def test_ten_minutes_of_driving_over_rocks() -> None:
     env = RoverEnv(terrain="rocks", difficulty=(0.0, 1.0))
     policy = PDPolicy(env)

@@ -32,7 +32,7 @@ def test_a_number_is_in_the_text_and_on_its_page_and_its_command_exists(numbers:
         case ["rover", name]:
             assert CliRunner().invoke(app, [name, "--help"]).exit_code == 0
         case ["python", "-m", module]:
-            assert (ROOT / "tests" / f"{module.replace('.', '/')}.py").is_file()
+            assert (ROOT / "benchmarks" / f"{module.replace('.', '/')}.py").is_file()
         case other:
             pytest.fail(f"what is {other}?")
 

@@ -46,7 +46,7 @@ def citations(text: str) -> set[str]:
 
 
 def readable() -> list[Path]:
-    rooms = ("rust", "envs", "training", "docs", "tests/solver", "tests/physics", "tests/task", "tests/validation")
+    rooms = ("rust", "envs", "training", "docs", "tests/solver", "tests/physics", "tests/task", "benchmarks/validation")
     inside = [path for path in tracked_files() if path.relative_to(ROOT).as_posix().startswith(rooms)]
     return [path for path in inside if path.suffix in (".rs", ".py", ".pyi", ".md") and path != NOTATION]
 

@@ -1,7 +1,7 @@
-//! Drives of random policies: the record in `tests/comparison/exploring.json`, ready to be played.
+//! Drives of random policies: the record in `benchmarks/comparison/exploring.json`, ready to be played.
 //!
 //! Torques and steering set-points change every 50 ms. One record serves every torque, which scales
-//! it. `tests/comparison/exploring.py` says how the drives were recorded, and plays them in Python.
+//! it. `benchmarks/comparison/exploring.py` says how the drives were recorded, and plays them in Python.
 
 #![allow(dead_code, clippy::unwrap_used)] // each program uses some of them; the record is ours
 
@@ -211,7 +211,7 @@ impl Drive {
 
 /// All recorded drives on a ground, with torques of up to `torque`, N m.
 pub fn drives(ground: Ground, torque: f64, options: &StepOptions) -> Vec<Drive> {
-    let record = include_str!("../comparison/exploring.json");
+    let record = include_str!("../../benchmarks/comparison/exploring.json");
     let record: Value = serde_json::from_str(record).unwrap();
     let drives = record["drives"].as_array().unwrap().iter();
     drives.map(|d| drive(d, ground, torque, options)).collect()

@@ -1,4 +1,4 @@
-"""Prints the table of README.md: ``PYTHONPATH=tests python -m shelf.describe [part of a name]`` (some minutes)."""
+"""Prints the table of README.md (some minutes): ``PYTHONPATH=benchmarks:tests python -m shelf.describe [NAME]``."""
 
 import sys
 

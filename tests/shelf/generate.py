@@ -1,4 +1,4 @@
-"""Makes the shelf's data: ``PYTHONPATH=tests python -m shelf.generate [part of a name]`` (some ten minutes for all).
+"""Makes the shelf's data: ``PYTHONPATH=benchmarks:tests python -m shelf.generate [NAME]`` (ten minutes for all).
 
 An answer's velocities are kept where they are unique as far as can be seen: every method from several starts comes to
 the same ones. The judge of an answer is `comparison.problems.residual`, which shares no code with the solvers.

@@ -6,8 +6,8 @@
 use std::fs;
 use std::path::Path;
 
+use friction_contact::nalgebra::{Matrix3, Vector3};
 use friction_contact::problem::Dimension;
-use nalgebra::{Matrix3, Vector3};
 
 /// A problem read from a file, owning its arrays.
 pub struct Recorded {

@@ -14,7 +14,9 @@
 //!   [`slab`] among them; [`sphere_simulation`]; [`sphere_scenes`]: heaps, bounces and rolling;
 //!   [`projected_to_convergence`]: no penetration at the end of any step.
 //!
-//! `make orders` writes the figures of `docs/integrators.md`.
+//! `make orders` writes the figures of `docs/integrators.md`. The programs in `examples/` measure
+//! steps of the rover and solves of its contact problems; `make instructions` and `make bench` run
+//! some of them.
 #![forbid(unsafe_code)]
 
 mod acceleration;
