@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym import RoverEnv
-from rover_gym.policy import CommandController
+from rover_gym.drive import CommandController
 
 
 def pursuit(rover: RoverEnv, controller: CommandController, seen: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

@@ -15,8 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from rover_gym import Plane, SphereField
-from rover_gym.mechanics import SimulationBatch
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.core import SimulationBatch
+from rover_gym.envs.vector import RoverVectorEnv
 
 N_ROVERS = 64
 #: Control periods of a round, and rounds.

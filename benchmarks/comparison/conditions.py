@@ -16,7 +16,7 @@ from rich.console import Console
 
 from comparison.rollout import STEPS_A_COMMAND, TIME_STEP, Player, one_by_one, together
 from rover_gym import Plane, RoverModel, Simulation
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.core import SimulationBatch
 
 TOGETHER, ALONE, COMMANDS, ROUNDS = 64, 4, 8, 7
 TORQUE, STEERING, FASTEST = 8.0, 0.3, 25.0  # N m, rad, rad/s

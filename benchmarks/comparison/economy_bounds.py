@@ -12,7 +12,7 @@ import numpy.typing as npt
 from rich.console import Console
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.economy import Scene, measure_economies, plan
+from rover_gym.scenes import Scene, measure_economies, plan
 
 Array = npt.NDArray[np.float64]
 SLOPES = (0.0, 5.0, -10.0, -20.0)  # degrees, along the heading

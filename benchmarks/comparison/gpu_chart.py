@@ -39,7 +39,7 @@ def measure(hardware: str) -> list[dict[str, Any]]:
     from comparison import warp_peer  # noqa: PLC0415 - only where it is installed
     from comparison.peers import Variant  # noqa: PLC0415 - loads the engines
     from comparison.references import load  # noqa: PLC0415
-    from rover_gym.vector.throughput import measure_exploring  # noqa: PLC0415
+    from rover_gym.envs.vector.throughput import measure_exploring  # noqa: PLC0415
 
     scene, path, rows = flat_drive.scene(), load("flat_drive"), []
     source = f"make chart-gpu, {datetime.now(tz=UTC).date().isoformat()}"

@@ -2,7 +2,7 @@
 
 from importlib import metadata
 
-from rover_gym.vector.throughput import processor
+from rover_gym.envs.vector.throughput import processor
 
 __all__ = ["PACKAGES", "processor", "versions"]
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, Terrain
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.core import SimulationBatch
 
 #: Rovers one after the other, and in a batch; steps of a round, and rounds.
 FEW, MANY, STEPS, ROUNDS = 8, 64, 40, 5

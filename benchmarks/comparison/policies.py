@@ -19,8 +19,8 @@ from rich.console import Console
 
 from comparison.machine import versions
 from comparison.output import CHART, ROOT
-from rover_gym.policy.comparison import Contender, drive_or_reuse, named_contender
-from rover_gym.policy.evaluation import SUCCESSES, EvaluatedEpisode, summarise
+from rover_gym.drive.comparison import Contender, drive_or_reuse, named_contender
+from rover_gym.drive.evaluation import SUCCESSES, EvaluatedEpisode, summarise
 from rover_gym.record.channels import outcome_words
 
 EPISODES = ROOT / "runs" / "policies"

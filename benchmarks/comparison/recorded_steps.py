@@ -27,10 +27,10 @@ from rich.console import Console
 from torture.joined import _scene as joined_scene
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, TriangleMesh
-from rover_gym.env.sand_ground import sand_rover
-from rover_gym.mechanics import DiskSimulation, GrainSimulation, RoverGrainSimulation, ball_packing, disk_packing
-from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Sine, TwoWheelRoverSimulation
-from rover_gym.sand import SoftGround, named_soil
+from rover_gym.envs.sand_ground import sand_rover
+from rover_gym.core import DiskSimulation, GrainSimulation, RoverGrainSimulation, ball_packing, disk_packing
+from rover_gym.core import BallSimulation, Line, MirroredRoverSimulation, Sine, TwoWheelRoverSimulation
+from rover_gym.ground.sand import SoftGround, named_soil
 
 Arrays = tuple[npt.NDArray[np.float64], ...]
 #: Time between two states that are recorded, s, and how many there are of each drive.

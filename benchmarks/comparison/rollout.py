@@ -34,7 +34,7 @@ from comparison.mujoco_rover import HALF_WIDTH
 from comparison.output import CHART
 from comparison.scene import Array
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.core import SimulationBatch
 
 TIME_STEP = 0.005  # s
 #: Steps from one command to the next, commands of a round, rounds, and the first rounds, which are not counted.

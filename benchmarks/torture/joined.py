@@ -7,7 +7,7 @@ import numpy as np
 from machines import machine
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, StepError
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.core import SimulationBatch
 from torture.drives import log_uniform
 from torture.ledger import Bounds, Ledger, Regime
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env import RoverEnv
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.envs import RoverEnv
+from rover_gym.envs.vector import RoverVectorEnv
 from torture.audit import Audit
 from torture.drives import log_uniform
 from torture.ledger import Bounds, Ledger, Regime

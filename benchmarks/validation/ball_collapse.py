@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.mechanics import Silo
+from rover_gym.core import Silo
 from validation.balls import DIAMETER, Balls, free, glued_disc, loose, settle
 from validation.watch import GRAVITY, Ledger
 

@@ -6,7 +6,7 @@ tube is wide, m = 1 / (4 f K), f the wall's friction over its pressure and K the
 
 import numpy as np
 
-from rover_gym.mechanics import Silo
+from rover_gym.core import Silo
 from validation.ball_silo import filled
 from validation.balls import DENSITY, DIAMETER, Array
 from validation.janssen import determination, law, saturation

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from rover_gym.grains import surface_map
+from rover_gym.ground.grains import surface_map
 from validation.balls import DIAMETER, RADIUS, Array, Balls, free, loose, settle, slow
 from validation.repose import angle
 from validation.watch import Ledger, means_by

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.grains.ball_bed import settled_balls
-from rover_gym.grains.lab import fit_pressure, plate_test
+from rover_gym.ground.grains.ball_bed import settled_balls
+from rover_gym.ground.grains.lab import fit_pressure, plate_test
 from validation.watch import Ledger
 
 #: Mean radius of the balls, m, number of them, which fill the box to 0.1 m, and seeds of the beds.

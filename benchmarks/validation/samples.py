@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import DiskSimulation, disk_packing
+from rover_gym.core import DiskSimulation, disk_packing
 from validation.watch import GRAVITY, Watched
 
 Array = npt.NDArray[np.float64]

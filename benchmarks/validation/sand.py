@@ -16,7 +16,7 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.sand import (
+from rover_gym.ground.sand import (
     FittedSoil,
     Runs,
     SingleWheel,

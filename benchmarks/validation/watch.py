@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.mechanics import DiskSimulation, GrainSimulation
+from rover_gym.core import DiskSimulation, GrainSimulation
 
 GRAVITY = 9.81
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.grains.ball_bed import BallBed, settled_balls
-from rover_gym.grains.lab import wheel_test
+from rover_gym.ground.grains.ball_bed import BallBed, settled_balls
+from rover_gym.ground.grains.lab import wheel_test
 from validation.watch import Ledger
 
 #: Mean radius of the balls, m, number of them, and seeds of the beds.

@@ -9,9 +9,9 @@ import gymnasium as gym
 
 import rover_gym  # noqa: F401 - registers the environments
 from rover_gym import RoverEnv
-from rover_gym.env import RoverGrainsEnv
-from rover_gym.policy import RoverArcsEnv, RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
-from rover_gym.registration import ENVIRONMENTS
+from rover_gym.envs import RoverGrainsEnv
+from rover_gym.envs.tasks import RoverArcsEnv, RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
+from rover_gym.envs.registration import ENVIRONMENTS
 
 #: Environments whose docstring is a card, by name.
 CARDS = {

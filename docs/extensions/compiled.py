@@ -33,7 +33,7 @@ def in_print(text: str) -> str:
 
 
 def use_stub() -> None:
-    """Puts the stub's classes where Sphinx looks for the compiled ones, in `rover_gym.mechanics`."""
+    """Puts the stub's classes where Sphinx looks for the compiled ones, in `rover_gym.core`."""
     name = mechanics.__name__
     stub = ModuleType(name, mechanics.__doc__)
     source = Path(mechanics.__file__).with_name("_core.pyi")
@@ -44,7 +44,7 @@ def use_stub() -> None:
     # A stub may name a class before it is there, so its annotations stay unevaluated.
     code = compile(run, source, "exec", __future__.annotations.compiler_flag)
     exec(code, stub.__dict__)  # noqa: S102 - our own stub
-    sys.modules[name] = rover_gym.mechanics = stub
+    sys.modules[name] = rover_gym.core = stub
     ModuleAnalyzer.cache["module", name] = ModuleAnalyzer.for_string(text, name, str(source))
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import disjoint_base
 
-from rover_gym.maps import terrain_files
-from rover_gym.maps.fractal import fractal_map
+from rover_gym.ground.maps import terrain_files
+from rover_gym.ground.maps.fractal import fractal_map
 from rover_gym.models import file_writing, model_files
 
 _Array: TypeAlias = npt.NDArray[np.float64]
@@ -702,7 +702,7 @@ class SoftGround(Terrain):
 
     Args:
         surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
-        soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+        soil: A `rover_gym.ground.sand.Soil`, or a mapping of its numbers.
         rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
 
     Raises:
@@ -727,7 +727,7 @@ class WheelBed:
     """A single wheel on a bed of soil, with prescribed speeds and vertical load.
 
     Args:
-        soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+        soil: A `rover_gym.ground.sand.Soil`, or a mapping of its numbers.
         radius: Radius of the wheel without grousers, m.
         width: Its width, m.
         rounding: Radius of its edges, m.
@@ -1209,7 +1209,7 @@ class Contacts:
 class PathSearch:
     """Beam search for the cheapest path of a rover over a height scan.
 
-    `rover_gym.policy.ScanPolicy` uses it; `rover_gym.policy.PathCosts` defines the cost of a path.
+    `rover_gym.drive.ScanPolicy` uses it; `rover_gym.drive.PathCosts` defines the cost of a path.
     A pose consists of the distance ahead, the distance to the right, m, and the turn to the left,
     rad.
 

@@ -11,7 +11,7 @@ from machines.test_several import cart, on_slope
 
 from rover_gym import Plane, RoverModel, Simulation, StateError
 from rover_gym.derivatives import rollout
-from rover_gym.mechanics import Linearisation
+from rover_gym.core import Linearisation
 
 from .test_derivatives import best_difference, relative, state_of
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation
-from rover_gym.mechanics import StepReport
+from rover_gym.core import StepReport
 
 Variant = Literal["linearised", "newton"]
 BALL = {"kind": "sphere", "radius": 0.1}

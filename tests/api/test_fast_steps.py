@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.core import SimulationBatch
 
 LANES = {"AVX-512": 8, "AVX2": 4, "baseline": 1}
 

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from rover_gym.env.arguments import check_terrain
-from rover_gym.maps import read_map
-from rover_gym.mechanics import (
+from rover_gym.envs.arguments import check_terrain
+from rover_gym.ground.maps import read_map
+from rover_gym.core import (
     HeightField,
     OptionError,
     Plane,

@@ -5,7 +5,7 @@ import pytest
 from refusals import refused
 
 from rover_gym import OptionError, RoverModel, Simulation, StateError
-from rover_gym.mechanics import HeightField, Linearisation, SphereField
+from rover_gym.core import HeightField, Linearisation, SphereField
 
 NV = 21
 

@@ -7,7 +7,7 @@ import pytest
 from refusals import refused
 
 import rover_gym
-from rover_gym.mechanics import Plane, RoverModel
+from rover_gym.core import Plane, RoverModel
 
 
 def close(actual, expected):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rover_gym.mechanics import HeightField, Plane, RoverModel, Simulation
+from rover_gym.core import HeightField, Plane, RoverModel, Simulation
 
 RADIUS = 0.1
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rover_gym import OptionError
-from rover_gym.sand import SingleWheel, Soil, named_soil
+from rover_gym.ground.sand import SingleWheel, Soil, named_soil
 
 WHEEL = SingleWheel(0.1, 0.08)
 LOAD = 40.0  # N

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from rover_gym.mechanics import (
+from rover_gym.core import (
     HeightField,
     OptionError,
     Plane,

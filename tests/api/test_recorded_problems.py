@@ -9,7 +9,7 @@ import pytest
 from comparison.problems import SETTING, Problem, problem_folder, recorded, residual
 
 import rover_gym
-from rover_gym.mechanics import FrictionContactSolution
+from rover_gym.core import FrictionContactSolution
 
 pytestmark = pytest.mark.skipif(
     problem_folder() is None, reason=f"{SETTING} is not set: the recorded problems are no part of the repository"

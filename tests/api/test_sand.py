@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rover_gym.mechanics import (
+from rover_gym.core import (
     HeightField,
     OptionError,
     Plane,
@@ -18,7 +18,7 @@ from rover_gym.mechanics import (
     TerrainError,
     Union,
 )
-from rover_gym.sand import (
+from rover_gym.ground.sand import (
     Runs,
     SingleWheel,
     SoftGround,
@@ -32,8 +32,8 @@ from rover_gym.sand import (
     soil_names,
     with_wide_wheels,
 )
-from rover_gym.sand.convert import convert_runs
-from rover_gym.sand.trials import read_trial
+from rover_gym.ground.sand.convert import convert_runs
+from rover_gym.ground.sand.trials import read_trial
 
 WHEEL = SingleWheel(0.058, 0.05)
 
@@ -54,7 +54,7 @@ def test_every_soil_bears_a_wheel_and_says_where_it_is_from(name: str) -> None:
 
 
 def test_the_points_follow_the_accuracy() -> None:
-    from rover_gym.sand import WheelBed  # noqa: PLC0415 - beside its use
+    from rover_gym.ground.sand import WheelBed  # noqa: PLC0415 - beside its use
 
     coarse, fine = (WheelBed(named_soil("cmu-sand"), 0.058, 0.05, accuracy=a) for a in (0.05, 0.002))
     assert coarse.n_points < fine.n_points

@@ -30,16 +30,8 @@ from rover_gym import (
     mechanics,
     solve_friction_contact,
 )
-from rover_gym.mechanics import DiskSimulation, disk_packing
-from rover_gym.planar import (
-    BallSimulation,
-    Line,
-    MirroredRoverSimulation,
-    Polyline,
-    Sine,
-    Spline,
-    TwoWheelRoverSimulation,
-)
+from rover_gym.core import DiskSimulation, disk_packing
+from rover_gym.core import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, Spline, TwoWheelRoverSimulation
 
 rocks = (0.1, (-5.0, -5.0, 5.0, 5.0), 0)
 
@@ -398,10 +390,10 @@ def test_it_offers_all_that_is_compiled() -> None:
 @pytest.mark.parametrize("name", [name for name in mechanics.__all__ if isinstance(getattr(mechanics, name), type)])
 def test_a_class_says_where_it_is_found(name: str) -> None:
     found = getattr(mechanics, name)
-    assert (found.__module__, found.__qualname__) == ("rover_gym.mechanics", name)
+    assert (found.__module__, found.__qualname__) == ("rover_gym.core", name)
     assert pickle.loads(pickle.dumps(found)) is found  # noqa: S301 - our own
     title = pydoc.plain(pydoc.render_doc(found)).splitlines()[0]
-    assert title == f"Python Library Documentation: class {name} in module rover_gym.mechanics"
+    assert title == f"Python Library Documentation: class {name} in module rover_gym.core"
 
 
 def test_what_most_programs_need_is_in_the_package_itself() -> None:

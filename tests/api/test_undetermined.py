@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import minimize
 
-from rover_gym.mechanics import HeightField, Plane, RoverModel, Simulation
+from rover_gym.core import HeightField, Plane, RoverModel, Simulation
 
 Array = npt.NDArray[np.float64]
 

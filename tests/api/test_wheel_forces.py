@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym.mechanics import HeightField, Plane, RoverModel, Simulation, SphereField
+from rover_gym.core import HeightField, Plane, RoverModel, Simulation, SphereField
 
 RADIUS = 0.1
 

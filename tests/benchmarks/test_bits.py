@@ -11,7 +11,7 @@ import pytest
 from comparison import bits
 
 from rover_gym import RoverModel
-from rover_gym.mechanics import Plane, Simulation, SimulationBatch
+from rover_gym.core import Plane, Simulation, SimulationBatch
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 

@@ -16,10 +16,10 @@ from PIL import Image
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
-from rover_gym.rendering import FrameRenderer
-from rover_gym.rendering.frames import VIEW_ANGLE
-from rover_gym.replay import rover_scene, write_page
-from rover_gym.replay.scenery import View
+from rover_gym.show.frames import FrameRenderer
+from rover_gym.show.frames.frame_renderer import VIEW_ANGLE
+from rover_gym.show.replay import rover_scene, write_page
+from rover_gym.show.replay.scenery import View
 
 Picture = npt.NDArray[np.float64]
 

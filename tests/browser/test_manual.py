@@ -18,7 +18,7 @@ from selenium import webdriver
 
 import rover_gym
 from rover_gym import _core, mechanics
-from rover_gym.registration import ENVIRONMENTS
+from rover_gym.envs.registration import ENVIRONMENTS
 
 pytestmark = pytest.mark.timeout(1200)
 
@@ -81,7 +81,7 @@ def public_names() -> Iterator[tuple[str, Any]]:
                 continue
             full = f"{room.__name__}.{name}"
             yield full, thing
-            if isinstance(thing, type) and full != "rover_gym.env.RoverArguments":  # its card has its table
+            if isinstance(thing, type) and full != "rover_gym.envs.RoverArguments":  # its card has its table
                 bases = thing.__mro__[1:]
                 inherited = {one for base in bases for one in {**vars(base), **vars(base).get("__annotations__", {})}}
                 for member in {**vars(thing), **vars(thing).get("__annotations__", {})}:
@@ -120,7 +120,7 @@ def test_every_public_name_is_printed_with_its_docstring(texts: dict[str, str]) 
 def test_every_argument_of_a_constructor_is_printed(texts: dict[str, str]) -> None:
     missing = []
     for name, thing in public_names():
-        if isinstance(thing, type) and name.startswith("rover_gym.mechanics."):
+        if isinstance(thing, type) and name.startswith("rover_gym.core."):
             try:
                 arguments = inspect.signature(thing).parameters
             except ValueError:

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from rover_gym.cli import app
 from rover_gym.record import RoverRun, read_run
-from rover_gym.replay import write_page
-from rover_gym.replay.page import player_file
+from rover_gym.show.replay import write_page
+from rover_gym.show.replay.page import player_file
 
 KEYS = {
     "trails": "v",

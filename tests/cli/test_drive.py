@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from commands import error_of, output_of, rover
 
-from rover_gym.policy.comparison import ENDING
+from rover_gym.drive.comparison import ENDING
 from rover_gym.record import read_run, read_trajectory
 
 

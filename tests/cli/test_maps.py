@@ -11,9 +11,9 @@ from commands import error_of, output_of, rover
 from forged import without_checksum
 
 from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh, Union
-from rover_gym.ground import parts_of, surfaces_of, triangles_of
+from rover_gym.ground.terrain_parts import parts_of, surfaces_of, triangles_of
 from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
-from rover_gym.replay.scenery import first_view, goal_parts, spheres, surfaces
+from rover_gym.show.replay.scenery import first_view, goal_parts, spheres, surfaces
 
 
 @pytest.fixture(scope="module")

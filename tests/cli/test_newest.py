@@ -10,7 +10,7 @@ import pytest
 from commands import error_of, output_of, rover
 
 from rover_gym.cli.newest import newest_run
-from rover_gym.mechanics import OptionError
+from rover_gym.core import OptionError
 
 DRIVE = ("drive", "--time-limit", "0.2")
 
@@ -32,7 +32,7 @@ def test_a_drive_is_recorded_and_the_next_two_commands_need_no_name(place: Path)
 def test_the_command_starts_without_any_extra() -> None:
     """The replay page took the rover's colours from a module that imports VTK, so `rover` failed without VTK."""
     extras = ("vtkmodules", "h5py", "matplotlib", "websockets", "pygltflib", "trimesh", "scipy", "PIL")
-    code = f"import sys; sys.modules.update(dict.fromkeys({extras!r})); import rover_gym.cli, rover_gym.live"
+    code = f"import sys; sys.modules.update(dict.fromkeys({extras!r})); import rover_gym.cli, rover_gym.show.live"
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ})
 
 

@@ -24,10 +24,10 @@ from rover_gym import (
     StateError,
     TerrainError,
 )
-from rover_gym.env import episode_scene
-from rover_gym.mechanics import EpisodeRun
-from rover_gym.vector import RoverVectorEnv
-from rover_gym.vector.sb3 import RoverVecEnv
+from rover_gym.envs import episode_scene
+from rover_gym.core import EpisodeRun
+from rover_gym.envs.vector import RoverVectorEnv
+from rover_gym.envs.vector.sb3 import RoverVecEnv
 
 FORWARD = np.concatenate((np.full(6, 0.2), np.zeros(6))).astype(np.float32)
 

@@ -9,9 +9,9 @@ from pursuit import pursuit
 from refusals import refused
 
 from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel, StateError
-from rover_gym.policy import CommandController, ScanPolicy
-from rover_gym.policy.pd_policy import Turning
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.drive import CommandController, ScanPolicy
+from rover_gym.drive.pd_policy import Turning
+from rover_gym.envs.vector import RoverVectorEnv
 
 NAMES = sorted(MACHINES)
 

@@ -20,7 +20,7 @@ def test_gymnasium_finds_the_environment_by_module_name() -> None:
 
 
 def test_registering_twice_changes_nothing() -> None:
-    rover_gym.registration.register_environments()
+    rover_gym.envs.registration.register_environments()
 
 
 def test_step_and_snapshot_before_reset_are_refused() -> None:

@@ -31,22 +31,15 @@ from rover_gym import (
     StateError,
     TerrainError,
 )
-from rover_gym.economy import Scene, plan
-from rover_gym.env import ARGUMENTS as LIMITS
-from rover_gym.env.arguments import SOLVER_OPTIONS, Number, NumberOrRange
-from rover_gym.env.episode_scene import RESET_OPTIONS
-from rover_gym.env.reward_terms import WEIGHTS
-from rover_gym.policy import (
-    CommandController,
-    CommandLimits,
-    DriveByCommand,
-    Features,
-    PDGains,
-    RoverCommandEnv,
-    RoverCommandVectorEnv,
-)
-from rover_gym.validation import number, span
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.scenes import Scene, plan
+from rover_gym.envs import ARGUMENTS as LIMITS
+from rover_gym.envs.arguments import SOLVER_OPTIONS, Number, NumberOrRange
+from rover_gym.envs.episode_scene import RESET_OPTIONS
+from rover_gym.envs.reward_terms import WEIGHTS
+from rover_gym.drive import CommandController, CommandLimits, Features, PDGains
+from rover_gym.envs.tasks import DriveByCommand, RoverCommandEnv, RoverCommandVectorEnv
+from rover_gym.core.validation import number, span
+from rover_gym.envs.vector import RoverVectorEnv
 
 NAN, INF = float("nan"), float("inf")
 
@@ -298,7 +291,7 @@ def test_arguments_of_the_vector_environment(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["n_envs", "threads", "max_episode_steps", "friction"])
 def test_arguments_of_the_stable_baselines_environment(name: str) -> None:
-    sb3 = pytest.importorskip("rover_gym.vector.sb3")
+    sb3 = pytest.importorskip("rover_gym.envs.vector.sb3")
     arguments, fields = {"n_envs": 1, "threads": 1}, (name, *OTHER_FIELDS.get(name, ()))
     assert throw(lambda value: sb3.RoverVecEnv(**{**arguments, name: value}), *fields, error=OptionError) > 50
 
@@ -415,7 +408,7 @@ def test_difficulties_and_snapshots() -> None:
 
 
 def test_stable_baselines_seeds_options_and_actions() -> None:
-    sb3 = pytest.importorskip("rover_gym.vector.sb3")
+    sb3 = pytest.importorskip("rover_gym.envs.vector.sb3")
     venv, twin = sb3.RoverVecEnv(2, threads=1), sb3.RoverVecEnv(2, threads=1)
     for one in (venv, twin):
         one.seed(2)

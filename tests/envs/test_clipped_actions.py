@@ -7,8 +7,8 @@ from gymnasium.vector import SyncVectorEnv
 from refusals import refused
 
 from rover_gym import RoverEnv
-from rover_gym.mechanics import CommandError
-from rover_gym.vector.sb3 import RoverVecEnv
+from rover_gym.core import CommandError
+from rover_gym.envs.vector.sb3 import RoverVecEnv
 
 BEYOND = np.linspace(-1.5, 1.5, 12, dtype=np.float32)
 OUTSIDE = int((np.abs(BEYOND) > 1.0).sum())

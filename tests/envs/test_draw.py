@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, Plane, RoverEnv
-from rover_gym.env.generators import fresh_seed, generator_at, row_of
-from rover_gym.mechanics import (
+from rover_gym.envs.generators import fresh_seed, generator_at, row_of
+from rover_gym.core import (
     EpisodeBatch,
     EpisodeDistribution,
     Simulation,
     seed_generators,
     standard_normals,
 )
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.envs.vector import RoverVectorEnv
 
 #: Everything that can be drawn is drawn.
 ALL_DRAWN: dict[str, Any] = {

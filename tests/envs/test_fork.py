@@ -13,7 +13,7 @@ import warnings
 # Python warns of forks in processes with threads; the pool's are the very threads in question.
 warnings.simplefilter("ignore", DeprecationWarning)
 import numpy as np
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.envs.vector import RoverVectorEnv
 
 env = RoverVectorEnv(4, threads=2)
 env.reset(seed=0)

@@ -10,15 +10,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rover_gym.env.batch import RoverBatch
-from rover_gym.mechanics import EpisodeBatch, OptionError, Plane
+from rover_gym.envs.batch import RoverBatch
+from rover_gym.core import EpisodeBatch, OptionError, Plane
 
 #: Bytes that a rover adds to the process, after steps and a second reset of all; the batch is larger than any noise.
 GROWTH = """
 import json, sys
 from pathlib import Path
 import numpy as np
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.envs.vector import RoverVectorEnv
 
 def resident():
     return 4096 * int(Path("/proc/self/statm").read_text().split()[1])

@@ -7,8 +7,8 @@ import numpy.typing as npt
 import pytest
 
 from rover_gym import RoverEnv
-from rover_gym.env import drive_signs
-from rover_gym.env.reward_terms import WEIGHTS
+from rover_gym.envs import drive_signs
+from rover_gym.envs.reward_terms import WEIGHTS
 
 Array = npt.NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import pytest
 from pursuit import pursuit
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
-from rover_gym.env.rover_env import RoverEnv
-from rover_gym.planning import FieldPlan, PlannerOptions, PlannerPolicy, Rollouts
-from rover_gym.planning.planner_policy import ScannedGround
-from rover_gym.policy import CommandController, ScanPolicy
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.drive import FieldPlan, PlannerOptions, PlannerPolicy, Rollouts
+from rover_gym.drive.planner_policy import ScannedGround
+from rover_gym.drive import CommandController, ScanPolicy
 
 ROVER = RoverModel()
 

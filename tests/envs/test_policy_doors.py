@@ -10,21 +10,13 @@ import pytest
 from refusals import refused
 
 from rover_gym import HeightField, ModelError, OptionError, PDPolicy, Plane, RoverEnv, RoverModel, TerrainError, Union
-from rover_gym.economy import Scene
-from rover_gym.planning import PlannerPolicy
-from rover_gym.planning.rollouts import Rollouts
-from rover_gym.policy import (
-    ArcNetworkPolicy,
-    GuidedPolicy,
-    PolicyError,
-    SandPolicy,
-    ScanPolicy,
-    drive_all,
-    named_policy,
-)
-from rover_gym.policy.evaluation import run_episode
-from rover_gym.policy.network_files import ANYWHERE, FOLDER
-from rover_gym.sensors import WheelEncoders
+from rover_gym.scenes import Scene
+from rover_gym.drive import PlannerPolicy
+from rover_gym.drive.rollouts import Rollouts
+from rover_gym.drive import ArcNetworkPolicy, GuidedPolicy, PolicyError, SandPolicy, ScanPolicy, drive_all, named_policy
+from rover_gym.drive.evaluation import run_episode
+from rover_gym.drive.network_files import ANYWHERE, FOLDER
+from rover_gym.envs.sensors import WheelEncoders
 
 SEEN = ScanPolicy.arguments()
 POLICIES: dict[str, Callable[[Any], Any]] = {

@@ -6,10 +6,10 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from rover_gym.env import PushOptions, RandomPushes
-from rover_gym.mechanics import OptionError
-from rover_gym.policy import CommandVectorEnv, DriveByCommand
-from rover_gym.vector import RandomPushesVector
+from rover_gym.envs import PushOptions, RandomPushes
+from rover_gym.core import OptionError
+from rover_gym.envs.tasks import CommandVectorEnv, DriveByCommand
+from rover_gym.envs.vector import RandomPushesVector
 
 OPTIONS = {"force": (300.0, 900.0), "interval": (0.5, 1.0), "duration": (0.1, 0.3)}
 

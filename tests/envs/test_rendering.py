@@ -21,17 +21,17 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import HeightField, OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
-from rover_gym.env.sand_ground import sand_rover
-from rover_gym.extras import MissingExtraError
-from rover_gym.mechanics import ModelError
-from rover_gym.rendering import FrameRenderer
-from rover_gym.rendering import appearance as look
-from rover_gym.rendering.appearance import Part, part_mesh, rover_parts
-from rover_gym.rendering.frames import contact_forces
-from rover_gym.rendering.rut_actor import rut_mesh
-from rover_gym.rendering.scenery_actors import BallsActor
-from rover_gym.replay.page import player_file
-from rover_gym.sand import SoftGround, named_soil
+from rover_gym.envs.sand_ground import sand_rover
+from rover_gym.core.extras import MissingExtraError
+from rover_gym.core import ModelError
+from rover_gym.show.frames import FrameRenderer
+from rover_gym.show.frames import appearance as look
+from rover_gym.show.frames.appearance import Part, part_mesh, rover_parts
+from rover_gym.show.frames.frame_renderer import contact_forces
+from rover_gym.show.frames.rut_actor import rut_mesh
+from rover_gym.show.frames.scenery_actors import BallsActor
+from rover_gym.show.replay.page import player_file
+from rover_gym.ground.sand import SoftGround, named_soil
 
 Frame = npt.NDArray[np.uint8]
 
@@ -607,7 +607,7 @@ def test_a_window_shows_the_frames(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rover_gym.rendering.frames._has_osmesa", lambda: False)
+    monkeypatch.setattr("rover_gym.show.frames.frame_renderer._has_osmesa", lambda: False)
     monkeypatch.setitem(os.environ, "VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
     with pytest.raises(OSError, match="apt-get install libegl1"):
         FrameRenderer(RoverModel(), Plane())
@@ -630,7 +630,7 @@ def test_an_optimizer_can_be_made_after_a_frame() -> None:
 
 
 def test_every_rover_of_a_batch_is_drawn_as_it_would_be_alone() -> None:
-    from rover_gym.vector.sb3 import RoverVecEnv  # noqa: PLC0415 - after the warning filters of this file
+    from rover_gym.envs.vector.sb3 import RoverVecEnv  # noqa: PLC0415 - after the warning filters of this file
 
     options = {"render_mode": "rgb_array", "render_options": {"width": 160, "height": 120}}
     alone = gym.make("Rover-v0", **options)

@@ -12,11 +12,11 @@ from gymnasium.utils.env_checker import data_equivalence
 from refusals import refused
 
 from rover_gym import CommandError, OptionError, RoverEnv
-from rover_gym.env.reward_terms import WEIGHTS
-from rover_gym.mechanics import EpisodeBatch, EpisodeRules, EpisodeRun, seed_generators
-from rover_gym.policy import CommandVectorEnv, DriveByCommand
-from rover_gym.vector import RoverVectorEnv
-from rover_gym.vector.sb3 import RoverVecEnv
+from rover_gym.envs.reward_terms import WEIGHTS
+from rover_gym.core import EpisodeBatch, EpisodeRules, EpisodeRun, seed_generators
+from rover_gym.envs.tasks import CommandVectorEnv, DriveByCommand
+from rover_gym.envs.vector import RoverVectorEnv
+from rover_gym.envs.vector.sb3 import RoverVecEnv
 
 LIMIT = 7
 
@@ -108,7 +108,7 @@ def test_commands_sum_them() -> None:
 
 
 def test_the_vector_of_stable_baselines3_tells_them_at_the_end() -> None:
-    sb3 = pytest.importorskip("rover_gym.vector.sb3", reason="the extra train is not installed")
+    sb3 = pytest.importorskip("rover_gym.envs.vector.sb3", reason="the extra train is not installed")
     venv = sb3.RoverVecEnv(2, max_episode_steps=LIMIT, **ARGUMENTS)
     plain = sb3.RoverVecEnv(2, max_episode_steps=LIMIT, **(ARGUMENTS | {"reward_terms": None}))
     for envs in (venv, plain):

@@ -17,9 +17,9 @@ import numpy as np
 import numpy._core._multiarray_umath as numpy_core
 import pytest
 
-from rover_gym.mechanics import Plane, SphereField
-from rover_gym.policy.command_env import DriveByCommand
-from rover_gym.policy.pd_policy import PDPolicy, find_rover_env
+from rover_gym.core import Plane, SphereField
+from rover_gym.envs.tasks.command_env import DriveByCommand
+from rover_gym.drive.pd_policy import PDPolicy, find_rover_env
 
 SEEDS = (3, 4)
 N_STEPS = 30

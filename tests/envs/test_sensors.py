@@ -14,9 +14,9 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField, StateError
-from rover_gym.rendering import appearance as look
-from rover_gym.rotations import rotation_matrix, rotation_vector
-from rover_gym.sensors import (
+from rover_gym.show.frames import appearance as look
+from rover_gym.core.rotations import rotation_matrix, rotation_vector
+from rover_gym.envs.sensors import (
     ColourCamera,
     DepthCamera,
     HeadingSensor,
@@ -28,8 +28,8 @@ from rover_gym.sensors import (
     SensorObservation,
     WheelEncoders,
 )
-from rover_gym.sensors.sensor import Moment
-from rover_gym.vector import SensorVectorObservation
+from rover_gym.envs.sensors.sensor import Moment
+from rover_gym.envs.vector import SensorVectorObservation
 
 NOISY: list[Sensor] = [
     WheelEncoders(gain=(0.98, 1.02)),
@@ -128,7 +128,7 @@ def test_snapshots_carry_the_sensors() -> None:
         same(env.step(action)[0], expected)
     same(env.readings(), {k: x for k, x in later[-1].items() if k != "state"})
 
-    envs = SensorVectorObservation(rover_gym.vector.RoverVectorEnv(2), NOISY)
+    envs = SensorVectorObservation(rover_gym.envs.vector.RoverVectorEnv(2), NOISY)
     envs.reset(seed=2)
     envs.step(actions(1, (2, 12))[0])
     kept = pickle.loads(pickle.dumps(envs.snapshot()))  # noqa: S301 - our own

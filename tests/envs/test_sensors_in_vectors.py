@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from refusals import refused
 
-import rover_gym.sensors
-import rover_gym.vector
+import rover_gym.envs.sensors
+import rover_gym.envs.vector
 from rover_gym import OptionError, StateError
-from rover_gym.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner, SensorObservation
+from rover_gym.envs.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner, SensorObservation
 
 SENSORS = [
     DepthCamera(width=6, height=4, noise=0.01, latency=(0.0, 0.1)),
@@ -61,7 +61,7 @@ def test_same_step_autoreset_was_refused_with_sensors(name: str) -> None:
 
 def test_the_vector_of_stable_baselines_had_no_sensors() -> None:
     """`RoverVecEnv(sensors=...)` was a TypeError; it reads what a `DummyVecEnv` reads."""
-    sb3 = pytest.importorskip("rover_gym.vector.sb3")
+    sb3 = pytest.importorskip("rover_gym.envs.vector.sb3")
     common = pytest.importorskip("stable_baselines3.common.vec_env")
 
     def one() -> Any:
@@ -111,7 +111,7 @@ def test_depth_is_an_image_if_asked_for(kind: str) -> None:
 @pytest.mark.parametrize("camera", [pytest.param(DepthCamera, marks=OTHER_CAMERA), ColourCamera])
 def test_a_convolutional_network_of_stable_baselines_takes_the_image(camera: Any, kind: str) -> None:
     """`MultiInputPolicy` flattened depth in metres, and `NatureCNN` refused it."""
-    sb3 = pytest.importorskip("rover_gym.vector.sb3")
+    sb3 = pytest.importorskip("rover_gym.envs.vector.sb3")
     learners = pytest.importorskip("stable_baselines3")
     layers = pytest.importorskip("stable_baselines3.common.torch_layers")
 
@@ -152,8 +152,8 @@ def test_an_unknown_kind_of_image_is_refused() -> None:
 
 def test_the_vectors_with_sensors_have_moved() -> None:
     with pytest.warns(DeprecationWarning, match=r"rover_gym\.vector\.SensorVectorObservation"):
-        moved = rover_gym.sensors.SensorVectorObservation
-    assert moved is rover_gym.vector.SensorVectorObservation
+        moved = rover_gym.envs.sensors.SensorVectorObservation
+    assert moved is rover_gym.envs.vector.SensorVectorObservation
     with pytest.raises(AttributeError, match="Nothing"):
-        rover_gym.sensors.Nothing  # noqa: B018 - what is not there
-    assert SensorObservation.__name__ in rover_gym.sensors.__all__
+        rover_gym.envs.sensors.Nothing  # noqa: B018 - what is not there
+    assert SensorObservation.__name__ in rover_gym.envs.sensors.__all__

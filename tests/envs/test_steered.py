@@ -8,7 +8,7 @@ import pytest
 from refusals import refused
 
 from rover_gym import CommandError, OptionError, RoverEnv, RoverModel
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.envs.vector import RoverVectorEnv
 
 ROCKS: dict[str, Any] = {"terrain": "rocks", "height_scan": (5, 3, 0.4), "difficulty": 0.8}
 

@@ -12,9 +12,9 @@ from gymnasium.error import ResetNeeded
 from refusals import refused
 
 from rover_gym import OptionError, RoverEnv, StateError
-from rover_gym.mechanics import EpisodeRun
-from rover_gym.policy import CommandVectorEnv
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.core import EpisodeRun
+from rover_gym.envs.tasks import CommandVectorEnv
+from rover_gym.envs.vector import RoverVectorEnv
 
 # A time limit so short that each test passes several.
 LIMIT = 12
@@ -362,9 +362,9 @@ def test_commands_go_on_alike() -> None:
 
 def test_the_vector_of_stable_baselines3_goes_on_alike() -> None:
     pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
-    from rover_gym.learning.command_vec_env import CommandVecEnv  # noqa: PLC0415 - needs the extra
-    from rover_gym.policy import CommandController, Features  # noqa: PLC0415
-    from rover_gym.vector.sb3 import RoverVecEnv  # noqa: PLC0415
+    from rover_gym.learn.command_vec_env import CommandVecEnv  # noqa: PLC0415 - needs the extra
+    from rover_gym.drive import CommandController, Features  # noqa: PLC0415
+    from rover_gym.envs.vector.sb3 import RoverVecEnv  # noqa: PLC0415
 
     def made() -> CommandVecEnv:
         rovers = RoverVecEnv(3, **HARD)

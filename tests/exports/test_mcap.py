@@ -26,7 +26,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from mcap_ros2.decoder import DecoderFactory as CdrFactory
 
 from rover_gym.exports import McapWriter, write_mcap
-from rover_gym.replay.overlays import sensor_of
+from rover_gym.show.replay.overlays import sensor_of
 
 GROUND = SphereField([[1.0, 0.1, -0.5], [2.0, 0.0, 0.7]], [0.2, 0.3], Plane((-0.1, 1.0, 0.05), 0.0))
 PICTURE = np.zeros((32, 48, 3), np.uint8)

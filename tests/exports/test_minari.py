@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, PDPolicy
-from rover_gym.registration import ENVIRONMENTS
+from rover_gym.envs.registration import ENVIRONMENTS
 
 pytest.importorskip("minari")
 

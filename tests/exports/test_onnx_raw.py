@@ -18,8 +18,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from rover_gym.exports import onnx_policy
 from rover_gym.exports.onnx_raw import raw_network
-from rover_gym.learning.raw_policy import RawPolicy
-from rover_gym.policy import PolicyError
+from rover_gym.learn.raw_policy import RawPolicy
+from rover_gym.drive import PolicyError
 
 
 class Plain(gym.Env[Any, Any]):

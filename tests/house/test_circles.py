@@ -186,9 +186,9 @@ def test_the_border_imports_no_module_of_the_package() -> None:
 
 def test_the_reading_finds_all_imports_of_python() -> None:
     text = """
-    #[pyclass(module = "rover_gym.mechanics")]
-    body.set_item("__module__", "rover_gym.mechanics")?; // "rover_gym.cli"
+    #[pyclass(module = "rover_gym.core")]
+    body.set_item("__module__", "rover_gym.core")?; // "rover_gym.cli"
     const ROOM: &str = "rover_gym.models";
-    PyModule::import(py, "rover_gym")?; py.import("rover_gym.maps")?; py.import("numpy")?;
+    PyModule::import(py, "rover_gym")?; py.import("rover_gym.ground.maps")?; py.import("numpy")?;
     """
-    assert python_imports(text) == {"rover_gym", "rover_gym.models", "rover_gym.maps"}
+    assert python_imports(text) == {"rover_gym", "rover_gym.models", "rover_gym.ground.maps"}

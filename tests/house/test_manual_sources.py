@@ -13,7 +13,7 @@ import typer
 
 import rover_gym
 from rover_gym.cli import app
-from rover_gym.registration import ENVIRONMENTS
+from rover_gym.envs.registration import ENVIRONMENTS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -36,9 +36,9 @@ def test_a_room_without_a_chapter_is_documented(
     extension: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rooms = extension("rooms")
-    assert "rover_gym.policy" not in rooms.without_chapter()
+    assert "rover_gym.drive" not in rooms.without_chapter()
     monkeypatch.setattr(rooms, "CHAPTERS", tmp_path)
-    assert ".. automodule:: rover_gym.policy\n" in rooms.sections()
+    assert ".. automodule:: rover_gym.drive\n" in rooms.sections()
 
 
 def test_a_page_that_no_list_names_is_listed(extension: Callable[[str], ModuleType]) -> None:

@@ -73,13 +73,13 @@ def test_the_modules_of_a_room_import_one_another_one_way() -> None:
 
 def test_the_reading_finds_all_forms_of_an_import() -> None:
     text = """
-from rover_gym.env.task import Task
+from rover_gym.envs.task import Task
 from rover_gym import RoverEnv
-import rover_gym.vector.sb3
+import rover_gym.envs.vector.sb3
 import numpy
 
 def draw():
-    from rover_gym.figures import draw_run
+    from rover_gym.show.figures import draw_run
 """
     assert used_modules(text) == {"env.task.Task", "RoverEnv", "vector.sb3", "figures.draw_run"}
     assert used_rooms(text) == {"env", "RoverEnv", "vector", "figures"}
@@ -91,7 +91,7 @@ def test_a_public_class_has_a_name_of_its_own() -> None:
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 classes[node.name].append(str(path.relative_to(PACKAGE)))
-    for name in rover_gym.mechanics.__all__:
+    for name in rover_gym.core.__all__:
         classes[name].append("mechanics.py")
     assert not {name: places for name, places in classes.items() if len(places) > 1}
 

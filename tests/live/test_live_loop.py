@@ -12,7 +12,7 @@ import pytest
 from mcap.reader import make_reader
 
 from rover_gym.exports import McapWriter
-from rover_gym.live import (
+from rover_gym.show.live import (
     Change,
     Drive,
     LiveLoop,
@@ -25,14 +25,14 @@ from rover_gym.live import (
     SingleStep,
     ThrowRock,
 )
-from rover_gym.live.live_commands import command_of, read_message
-from rover_gym.live.live_loop import HOLD, MOST_WAITING
-from rover_gym.live.live_view import HEAD, LiveView
-from rover_gym.mechanics import CommandError, OptionError
+from rover_gym.show.live.live_commands import command_of, read_message
+from rover_gym.show.live.live_loop import HOLD, MOST_WAITING
+from rover_gym.show.live.live_view import HEAD, LiveView
+from rover_gym.core import CommandError, OptionError
 from rover_gym.record import RecordingError, read_run
 from rover_gym.record.steady_file import SteadyFile
-from rover_gym.replay import write_vrml
-from rover_gym.replay.rover_scene import rover_scene
+from rover_gym.show.replay import write_vrml
+from rover_gym.show.replay.rover_scene import rover_scene
 
 
 class Clock:

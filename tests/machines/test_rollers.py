@@ -8,7 +8,7 @@ import pytest
 
 from machines import FOUR, RADIUS, machine
 from rover_gym import Plane, RoverModel, Simulation
-from rover_gym.mechanics import ModelError
+from rover_gym.core import ModelError
 
 #: Angles of the rollers FL, FR, BL, BR, from the axle.
 ANGLES = np.radians([45.0, -45.0, -45.0, 45.0])

@@ -9,10 +9,10 @@ import pytest
 
 from machines import FOUR, RADIUS, machine
 from rover_gym import Plane, RoverModel, Simulation
-from rover_gym.mechanics import ModelError, OptionError
+from rover_gym.core import ModelError, OptionError
 from rover_gym.record import Recorder, RoverSampler, describe, read_run
-from rover_gym.replay import write_page
-from rover_gym.replay.rover_scene import bare_scene
+from rover_gym.show.replay import write_page
+from rover_gym.show.replay.rover_scene import bare_scene
 
 GRAVITY = 9.81
 #: Height of a cart's chassis over the ground, m.

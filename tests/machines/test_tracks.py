@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from rover_gym import PDPolicy, Plane, RoverModel, Simulation, SphereField, TriangleMesh
-from rover_gym.mechanics import ModelError
+from rover_gym.core import ModelError
 
 HULL, BELT = 200.0, 20.0
 LENGTH, TRACK, RADIUS = 1.2, 0.8, 0.15

@@ -6,9 +6,9 @@ from models.robot_files import rover, write
 from models.test_writers import assert_same_machine, written_and_read
 
 from rover_gym import ModelError, RoverModel, Simulation, SphereField
-from rover_gym.mechanics import Plane
-from rover_gym.polytopes import hull_faces, hull_mesh, hull_properties
-from rover_gym.rendering.appearance import part_mesh, rover_parts
+from rover_gym.core import Plane
+from rover_gym.core.polytopes import hull_faces, hull_mesh, hull_properties
+from rover_gym.show.frames.appearance import part_mesh, rover_parts
 
 TEXT = """
 <mujoco model="stone">

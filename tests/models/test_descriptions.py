@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from refusals import refused
 
-from rover_gym.mechanics import ModelError, RoverModel
+from rover_gym.core import ModelError, RoverModel
 
 NAN, INFINITE = float("nan"), float("inf")
 

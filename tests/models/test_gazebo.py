@@ -5,7 +5,7 @@ import pytest
 from models.robot_files import rover, write
 
 from rover_gym import ModelError, Plane, RoverModel, Simulation
-from rover_gym.mechanics import SimulationBatch
+from rover_gym.core import SimulationBatch
 from rover_gym.models import RobotFileWarning
 
 pytest.importorskip("yourdfpy")

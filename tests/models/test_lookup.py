@@ -6,7 +6,7 @@ import pytest
 from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, TriangleMesh, Union
-from rover_gym.mechanics import Line, MirroredRoverSimulation, ModelError, TerrainError
+from rover_gym.core import Line, MirroredRoverSimulation, ModelError, TerrainError
 
 MESH = "v -9 0 -9\nv 9 0 -9\nv 9 0.5 9\nv -9 0.5 9\nf 3 2 1\nf 4 3 1\n"
 

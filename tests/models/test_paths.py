@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rover_gym import HeightField, RoverGymError, RoverModel, SphereField, TriangleMesh
-from rover_gym.mechanics import ModelError, TerrainError
+from rover_gym.core import ModelError, TerrainError
 from rover_gym.models.lookup import open_model, read_robot
 from rover_gym.record import RecordingError, read_trajectory
 

@@ -14,7 +14,7 @@ from commands import error_of
 from scripts_run import note
 
 from rover_gym.cli.train_command import NEEDED
-from rover_gym.extras import PROJECTS
+from rover_gym.core.extras import PROJECTS
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "training" / "examples" / "rllib.py"

@@ -9,13 +9,8 @@ import pytest
 from refusals import refused
 
 from rover_gym import CommandError, OptionError, PDPolicy, Plane, RoverEnv, SphereField
-from rover_gym.policy import (
-    CommandController,
-    CommandLimits,
-    CommandVectorEnv,
-    DriveByCommand,
-    Features,
-)
+from rover_gym.drive import CommandController, CommandLimits, Features
+from rover_gym.envs.tasks import CommandVectorEnv, DriveByCommand
 
 ROVER = RoverEnv()
 RNG = np.random.default_rng(0)

@@ -12,8 +12,8 @@ import pytest
 from refusals import refused
 
 from rover_gym import RoverEnv
-from rover_gym.policy import FORECAST_FILE, Network, PolicyError, ScanPolicy, named_policy
-from rover_gym.policy.network_files import FOLDER
+from rover_gym.drive import FORECAST_FILE, Network, PolicyError, ScanPolicy, named_policy
+from rover_gym.drive.network_files import FOLDER
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import gymnasium as gym
 import pytest
 
 import rover_gym  # noqa: F401 - registers the environments
-from rover_gym.registration import ENVIRONMENTS
-from rover_gym.vector import RoverVectorEnv
+from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.envs.vector import RoverVectorEnv
 
 
 @pytest.mark.parametrize("name", [name for name, known in ENVIRONMENTS.items() if known.vector_entry_point])

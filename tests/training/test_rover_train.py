@@ -10,9 +10,9 @@ import pytest
 from commands import error_of, output_of, rover
 
 from rover_gym import PDPolicy
-from rover_gym.policy import ArcNetwork
-from rover_gym.policy.comparison import ENDING, film_episode
-from rover_gym.policy.network_files import FOLDER
+from rover_gym.drive import ArcNetwork
+from rover_gym.drive.comparison import ENDING, film_episode
+from rover_gym.drive.network_files import FOLDER
 
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
@@ -132,7 +132,7 @@ def test_a_run_without_a_round_cannot_be_resumed_and_the_error_says_what_to_do(c
 
 def test_a_long_training_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between two evaluations, for minutes, a training printed nothing."""
-    monkeypatch.setattr("rover_gym.learning.arc_recipe.SILENCE", 0.0)
+    monkeypatch.setattr("rover_gym.learn.arc_recipe.SILENCE", 0.0)
     ppo = {"decisions": 32, "n_steps": 4, "batch_size": 16, "n_epochs": 1, "every": 1000}
     changed = tmp_path / "ppo.yaml"
     changed.write_text(yaml.safe_dump({**TINY, "imitation": {"rounds": 0}, "ppo": ppo}), encoding="utf-8")

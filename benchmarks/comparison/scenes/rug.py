@@ -9,8 +9,8 @@ import numpy as np
 
 from comparison.scene import Array, Phase, RoverScene, Trace
 from rover_gym import SphereField
-from rover_gym.reproduction import sphere_rug
-from rover_gym.reproduction.scene_runs import FRONT_STEERING, GRAVITY, report_model
+from rover_gym.scenes import sphere_rug
+from rover_gym.scenes.report_scenes import FRONT_STEERING, GRAVITY, report_model
 
 
 def scene() -> RoverScene:

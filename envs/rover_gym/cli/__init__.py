@@ -22,7 +22,7 @@ from rover_gym.cli.scene_command import scene
 from rover_gym.cli.speed_command import speed
 from rover_gym.cli.train_command import ManySeeds, train
 from rover_gym.cli.usage import PlainUsage
-from rover_gym.mechanics import __version__
+from rover_gym.core import __version__
 
 app = typer.Typer(
     rich_markup_mode=None,

@@ -25,11 +25,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from typer.models import ArgumentInfo
 
-from rover_gym.extras import MissingExtraError
-from rover_gym.mechanics import OptionError, RoverGymError, __version__
+from rover_gym.core.extras import MissingExtraError
+from rover_gym.core import OptionError, RoverGymError, __version__
 from rover_gym.models import RobotFileWarning
 from rover_gym.record.steady_file import ENDING
-from rover_gym.validation import refuse
+from rover_gym.core.validation import refuse
 
 P = ParamSpec("P")
 
@@ -347,7 +347,7 @@ class Results:
         self, sim: Any, duration: float, path: Path, kind: type[RecordedRun], fps: float | None = None, **options: Any
     ) -> RecordedRun:
         """Records a run as `record_run` does, under a progress bar, and reads it back."""
-        from rover_gym.runs import open_run, record_run  # noqa: PLC0415 - h5py is slow to load
+        from rover_gym.record.saved_runs import open_run, record_run  # noqa: PLC0415 - h5py is slow to load
 
         with self.keeping("trajectory", path), progress_bar() as bar:
             task = bar.add_task(path.stem, total=duration, state="")

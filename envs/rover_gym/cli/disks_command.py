@@ -21,13 +21,13 @@ from rover_gym.cli.console import (
     status,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.files import write_whole
-from rover_gym.mechanics import OptionError
-from rover_gym.validation import refuse
+from rover_gym.core.files import write_whole
+from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
 
 if TYPE_CHECKING:
-    from rover_gym.grains.disk_trials import Traction
-    from rover_gym.mechanics import DiskSimulation
+    from rover_gym.ground.grains.disk_trials import Traction
+    from rover_gym.core import DiskSimulation
 
 EARTH = 9.81  # m/s^2
 FRAMES = 25.0  # of the film, a second at EARTH
@@ -122,12 +122,12 @@ def _cross(
     *,
     film: bool,
 ) -> None:
-    from rover_gym.figures.grain_frames import draw_disks, film_disks  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.grains.disk_bed import (  # noqa: PLC0415
+    from rover_gym.show.figures.grain_frames import draw_disks, film_disks  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.ground.grains.disk_bed import (  # noqa: PLC0415
         rover_on_disks,
         settled_disks,
     )
-    from rover_gym.grains.disk_run import DiskRun  # noqa: PLC0415 - as above
+    from rover_gym.record.disk_run import DiskRun  # noqa: PLC0415 - as above
 
     _check_width("disks", disks, layers, CROSSING)
     bed = settled_disks(disks, layers, seed=seed, **options)
@@ -170,7 +170,7 @@ def _cross(
 
 def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:
     """Refuses a bed that is too narrow (m) before settling it."""
-    from rover_gym.grains.disk_bed import bed_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.disk_bed import bed_width  # noqa: PLC0415 - h5py is slow to load
 
     width = bed_width(disks, layers, radius_max)
     if width < needed:
@@ -190,9 +190,9 @@ def _sweep(
     options: dict[str, Any],
     output: Path,
 ) -> None:
-    from rover_gym.figures.disk_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.grains.disk_bed import settled_disks  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.disk_trials import (  # noqa: PLC0415 - as above
+    from rover_gym.show.figures.disk_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.ground.grains.disk_bed import settled_disks  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.disk_trials import (  # noqa: PLC0415 - as above
         drawbar_pull,
         drive_on_disks,
         fit_traction,

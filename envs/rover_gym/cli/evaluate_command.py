@@ -36,13 +36,13 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.env.arguments import MAX_SLOPE_DEG, terrain_name
-from rover_gym.env.start import DEFAULT_DIFFICULTY, MAX_DIFFICULTY
-from rover_gym.extras import MissingExtraError, require
-from rover_gym.figures.policy_figure import draw_policies
-from rover_gym.files import write_whole
-from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.policy.comparison import (
+from rover_gym.envs.arguments import MAX_SLOPE_DEG, terrain_name
+from rover_gym.envs.start import DEFAULT_DIFFICULTY, MAX_DIFFICULTY
+from rover_gym.core.extras import MissingExtraError, require
+from rover_gym.show.figures.policy_figure import draw_policies
+from rover_gym.core.files import write_whole
+from rover_gym.core import OptionError, RoverModel
+from rover_gym.drive.comparison import (
     ComparedScene,
     Contender,
     comparison_report,
@@ -54,9 +54,9 @@ from rover_gym.policy.comparison import (
     other_ends,
     short_tables,
 )
-from rover_gym.policy.evaluation import EvaluatedEpisode, PolicySummary, drive_all, summarise
-from rover_gym.policy.named_policy import NAMES, NAMES_HELP
-from rover_gym.validation import number, refuse
+from rover_gym.drive.evaluation import EvaluatedEpisode, PolicySummary, drive_all, summarise
+from rover_gym.drive.named_policy import NAMES, NAMES_HELP
+from rover_gym.core.validation import number, refuse
 
 
 @plain_errors
@@ -228,7 +228,7 @@ def _driver(ray: str | None, threads: int) -> Callable[..., list[EvaluatedEpisod
     if ray is None:
         return partial(drive_all, threads=threads)
     require("ray", "rllib")
-    from rover_gym.learning.cluster import connect, drive_on_cluster  # noqa: PLC0415 - needs the extra
+    from rover_gym.learn.cluster import connect, drive_on_cluster  # noqa: PLC0415 - needs the extra
 
     connect(ray)
     return partial(drive_on_cluster, ray)

@@ -10,12 +10,12 @@ from rover_gym.cli.console import Results, Row, plain_errors, row, status
 from rover_gym.cli.grains_options import MARS, Balls, BallScene, Radius, radii, recorded, say
 from rover_gym.cli.options import ModelName, named_model, takes
 from rover_gym.cli.usage import WholeHelp
-from rover_gym.mechanics import Motor, OptionError, RoverModel
-from rover_gym.validation import number, refuse
+from rover_gym.core import Motor, OptionError, RoverModel
+from rover_gym.core.validation import number, refuse
 
 if TYPE_CHECKING:
-    from rover_gym.grains.grain_run import GrainRun
-    from rover_gym.mechanics import RoverGrainSimulation
+    from rover_gym.record.grain_run import GrainRun
+    from rover_gym.core import RoverGrainSimulation
 
 
 grains = typer.Typer(
@@ -37,7 +37,7 @@ def collapse(
     tube: Annotated[float, typer.Option(help="Radius of the column, m.")] = 0.06,
 ) -> None:
     """Let a round column of balls collapse on a floor; record it and say how far it spreads."""
-    from rover_gym.grains.bed_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
 
     given.check("collapse")
     options = given.options
@@ -66,8 +66,8 @@ def silo(
     hole: Annotated[float, typer.Option(help="Radius of the hole in its floor, m.")] = 0.03,
 ) -> None:
     """Empty a silo of balls through a round hole; record it and say how fast they leave."""
-    from rover_gym.grains.bed_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.bed_scenes import silo as scene  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.bed_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import silo as scene  # noqa: PLC0415 - as above
 
     given.check("silo")
     options = given.options
@@ -100,8 +100,8 @@ def drum(
     rate: Annotated[float, typer.Option(help="Angular velocity, rad/s.")] = 0.6,
 ) -> None:
     """Turn a drum with balls; record it and say how steep they lie."""
-    from rover_gym.grains.bed_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.bed_scenes import slopes  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.bed_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import slopes  # noqa: PLC0415 - as above
 
     given.check("drum")
     options = given.options
@@ -130,8 +130,8 @@ def sphere(
     drop: Annotated[float, typer.Option(help="Height from which the sphere fell, m.")] = 0.3,
 ) -> None:
     """Let a sphere strike a bed of balls; record it and say how deep it goes."""
-    from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.bed_scenes import penetration_depths, striking_sphere  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import penetration_depths, striking_sphere  # noqa: PLC0415 - as above
 
     given.check("sphere")
     options = given.options
@@ -181,8 +181,8 @@ def rover(
     wheel_friction: WheelFriction = 0.9,
 ) -> None:
     """Drive a rover over a bed of balls; record forces, sinkage and ruts. It ends where the bed ends."""
-    from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - as above
 
     given.check("rover", model)
     chosen = _on_wheels(model, wheel_width)
@@ -223,9 +223,9 @@ def track(
     wheel_friction: WheelFriction = 0.9,
 ) -> None:
     """Drive a rover along a long bed, of which only the balls about its wheels are simulated. It ends with the bed."""
-    from rover_gym.grains.ball_bed import settled_track  # noqa: PLC0415 - as above
-    from rover_gym.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.ball_bed import settled_track  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.bed_scenes import rover_on_bed  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.moving_window import MovingWindow  # noqa: PLC0415 - as above
 
     given.check("track", model)
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
@@ -275,8 +275,8 @@ def pit(
     threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads that solve the contact problem.")] = 1,
 ) -> None:
     """Drive a rover into a pit of balls, across, and out of it; record forces, sinkage and ruts."""
-    from rover_gym.grains.bed_scenes import rover_before_pit  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.grains.pit import Pit  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.bed_scenes import rover_before_pit  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.pit import Pit  # noqa: PLC0415 - as above
 
     given.check("pit", model)
     chosen = _on_wheels(model, wheel_width, wheel_radius, _motor(torque, speed, wheel_radius))
@@ -313,7 +313,7 @@ def _on_wheels(
     name: str, wheel_width: float | None, wheel_radius: float | None = None, motor: Motor | None = None
 ) -> RoverModel:
     """The rover of this name, with these wheels (m) and motors where they are given."""
-    from rover_gym.grains.bed_scenes import with_wheel_width  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import with_wheel_width  # noqa: PLC0415 - h5py is slow to load
 
     model = named_model(name) or RoverModel()
     if wheel_radius is not None:

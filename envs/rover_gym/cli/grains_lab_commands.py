@@ -19,11 +19,11 @@ from rover_gym.cli.console import (
 from rover_gym.cli.grains_options import EARTH, FOLDER, Balls, Friction, Gravity, Output, Seed, TimeStep, Tolerance
 from rover_gym.cli.options import takes
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.validation import number
+from rover_gym.core.validation import number
 
 if TYPE_CHECKING:
-    from rover_gym.grains.ball_bed import BallBed
-    from rover_gym.grains.lab.fits import ShearLaw
+    from rover_gym.ground.grains.ball_bed import BallBed
+    from rover_gym.ground.grains.lab.fits import ShearLaw
 
 
 Samples = Annotated[int, typer.Option(min=4, max=10_000, help="Rows of the table.")]
@@ -60,7 +60,7 @@ class Bench:
 
     def bed(self) -> "BallBed":
         """The settled bed."""
-        from rover_gym.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
+        from rover_gym.ground.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
 
         with status("settling the bed"):
             return settled_balls(
@@ -85,7 +85,7 @@ def plate(
     samples: Samples = 25,
 ) -> None:
     """Push a round plate into a bed of balls; write pressure against depth and fit k zⁿ."""
-    from rover_gym.grains.lab import fit_pressure, plate_test, write_table  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.lab import fit_pressure, plate_test, write_table  # noqa: PLC0415 - h5py is slow to load
 
     options = given.options
     number("sinkage", sinkage, above=0.0)
@@ -128,7 +128,7 @@ def shear(
     samples: Samples = 25,
 ) -> None:
     """Turn a loaded disc with vanes on a bed of balls; write shear stress against displacement and fit its laws."""
-    from rover_gym.grains.lab import fit_shear, fit_strength, shear_test, write_table  # noqa: PLC0415 - h5py is slow
+    from rover_gym.ground.grains.lab import fit_shear, fit_strength, shear_test, write_table  # noqa: PLC0415 - h5py is slow
 
     options = given.options
     bed = given.bed()
@@ -186,7 +186,7 @@ def wheel(
     distance: Annotated[float, typer.Option(help="Travel that is measured, m.")] = 0.1,
 ) -> None:
     """Drive a wheel over a bed of balls; write pull, lateral force, torque and sinkage against slip."""
-    from rover_gym.grains.lab import fit_pull, wheel_test, write_table  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.lab import fit_pull, wheel_test, write_table  # noqa: PLC0415 - h5py is slow to load
 
     options = given.options
     number("slip_angle", slip_angle, at_least=-90.0, at_most=90.0)

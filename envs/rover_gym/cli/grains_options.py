@@ -11,7 +11,7 @@ from rover_gym.cli.console import AsJson, Results, Row, row, status
 from rover_gym.cli.paths import Into, check_paths
 
 if TYPE_CHECKING:
-    from rover_gym.grains.grain_run import GrainRun, Recordable
+    from rover_gym.record.grain_run import GrainRun, Recordable
 
 EARTH, MARS = 9.81, 3.71  # m/s^2
 FOLDER = Path("runs/grains")
@@ -59,7 +59,7 @@ class BallScene:
 
 def radii(radius: float) -> dict[str, float]:
     """The range of radii about a mean radius, m."""
-    from rover_gym.grains.bed_scenes import SPREAD  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import SPREAD  # noqa: PLC0415 - h5py is slow to load
 
     return {"radius_min": (1.0 - SPREAD) * radius, "radius_max": (1.0 + SPREAD) * radius}
 
@@ -75,14 +75,14 @@ def recorded(
     until: Callable[[Any], bool] = lambda _: False,
 ) -> "GrainRun":
     """Records a run, films it if wanted, says where both are, and reads it back."""
-    from rover_gym.grains.grain_run import GrainRun  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.record.grain_run import GrainRun  # noqa: PLC0415 - h5py is slow to load
 
     path = given.output / f"{name}.h5"
     facts = {"title": title, "scene": scene, "seed": given.seed}
     run = results.record(sim, given.duration, path, GrainRun, given.fps, until=until, **facts)
     results.path("trajectory", path)
     if given.film:
-        from rover_gym.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
+        from rover_gym.show.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
 
         with status("drawing the film"):
             results.path("film", film_run(run, path.with_suffix(".mp4")))

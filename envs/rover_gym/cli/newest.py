@@ -7,8 +7,8 @@ from pathlib import Path
 import typer
 
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.mechanics import OptionError
-from rover_gym.validation import refuse
+from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
 
 RUNS = Path("runs")
 

@@ -12,18 +12,18 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from rover_gym.env.arguments import ARGUMENTS, TERRAINS, terrain_name
-from rover_gym.env.episode_scene import map_place
-from rover_gym.extras import require
-from rover_gym.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
-from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
+from rover_gym.envs.arguments import ARGUMENTS, TERRAINS, terrain_name
+from rover_gym.envs.episode_scene import map_place
+from rover_gym.core.extras import require
+from rover_gym.ground.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
+from rover_gym.core import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
 from rover_gym.models.lookup import KINDS
-from rover_gym.planning.planner_policy import PlannerPolicy
-from rover_gym.policy.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
-from rover_gym.registration import ENVIRONMENTS as REGISTERED
-from rover_gym.rendering.render_options import CAMERAS, check_render_options
-from rover_gym.validation import refuse
+from rover_gym.drive.planner_policy import PlannerPolicy
+from rover_gym.drive.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
+from rover_gym.envs.registration import ENVIRONMENTS as REGISTERED
+from rover_gym.show.frames.render_options import CAMERAS, check_render_options
+from rover_gym.core.validation import refuse
 
 FilmSize = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the film, pixels, even numbers.")]
 
@@ -284,7 +284,7 @@ def named_driver(name: str, model: RoverModel | None = None) -> NamedPolicy:
     if is_model_file(name):
         for package in ("stable_baselines3", "yaml"):
             require(package, "train")
-        from rover_gym.learning.policy_file import policy_of_file  # noqa: PLC0415 - needs the extra
+        from rover_gym.learn.policy_file import policy_of_file  # noqa: PLC0415 - needs the extra
 
         return policy_of_file(name)
     return NamedPolicy({}, PlannerPolicy) if name == "planner" else named_policy(name, model)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rover_gym.files import regular_place
-from rover_gym.mechanics import OptionError
-from rover_gym.validation import refuse
+from rover_gym.core.files import regular_place
+from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
 
 #: Endings of the files in a policy's folder that are read.
 NETWORKS = (".npz", ".zip", ".pkl", ".pt")

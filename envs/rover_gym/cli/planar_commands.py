@@ -14,7 +14,7 @@ from rover_gym.cli.disks_command import disks
 from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.cli.usage import WholeHelp
-from rover_gym.mechanics import (
+from rover_gym.core import (
     BallSimulation,
     Line,
     OptionError,
@@ -25,9 +25,9 @@ from rover_gym.mechanics import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.planar.incline import Incline, ball_on_slope
-from rover_gym.planar.planar_run import PlanarRun
-from rover_gym.validation import number, refuse
+from rover_gym.scenes.incline import Incline, ball_on_slope
+from rover_gym.record.planar_run import PlanarRun
+from rover_gym.core.validation import number, refuse
 
 planar = typer.Typer(
     cls=WholeHelp,
@@ -163,7 +163,7 @@ def incline(
     with Results(as_json=as_json) as results:
         title = f"a ball on a slope of {slope:g} degrees, friction {friction:g}"
         run = results.record(sim, duration, path, PlanarRun, title=title)
-        from rover_gym.figures.incline_figure import down_slope, draw_incline  # noqa: PLC0415 - matplotlib is slow to load
+        from rover_gym.show.figures.incline_figure import down_slope, draw_incline  # noqa: PLC0415 - matplotlib is slow to load
 
         centre, rim = down_slope(run, case)
         stuck = np.flatnonzero(np.abs(rim - centre) < 1e-6)
@@ -257,6 +257,6 @@ def _run(sim: PlanarSimulation, who: str, given: Course, path: Path) -> None:
             ],
         )
         results.path("trajectory", path)
-        from rover_gym.figures import draw_overview  # noqa: PLC0415 - matplotlib is slow to load
+        from rover_gym.show.figures import draw_overview  # noqa: PLC0415 - matplotlib is slow to load
 
         results.path("figure", draw_overview(run, figure))

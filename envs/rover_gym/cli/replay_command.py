@@ -9,15 +9,15 @@ from rover_gym.cli.console import plain_errors, progress_bar, say_path
 from rover_gym.cli.newest import newest_run, show_in_browser
 from rover_gym.cli.options import OpenIt, complete_recording
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.extras import require
-from rover_gym.grains.disk_run import DiskRun
-from rover_gym.grains.grain_run import GrainRun
-from rover_gym.mechanics import OptionError
-from rover_gym.planar.planar_run import PlanarRun
+from rover_gym.core.extras import require
+from rover_gym.record.disk_run import DiskRun
+from rover_gym.record.grain_run import GrainRun
+from rover_gym.core import OptionError
+from rover_gym.record.planar_run import PlanarRun
 from rover_gym.record.rover_run import RoverRun, read_run
-from rover_gym.replay import write_gltf, write_page, write_vrml
-from rover_gym.runs import open_run
-from rover_gym.validation import refuse
+from rover_gym.show.replay import write_gltf, write_page, write_vrml
+from rover_gym.record.saved_runs import open_run
+from rover_gym.core.validation import refuse
 
 
 @plain_errors
@@ -79,7 +79,7 @@ def replay(
     if gltf is not None and isinstance(frames, RoverRun):
         say_path("glTF", write_gltf(frames, gltf))
     if film is not None and isinstance(frames, (RoverRun, GrainRun)):
-        from rover_gym.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
+        from rover_gym.show.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
 
         with progress_bar() as bar:
             task = bar.add_task("film", total=frames.n_frames, state="")
@@ -126,7 +126,7 @@ def plot(
     recording = newest_run(recording)
     folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
     run = open_run(recording)
-    from rover_gym.figures.drawing import draw_run, drawable  # noqa: PLC0415 - slow, and a bad file is reported at once
+    from rover_gym.show.figures.drawing import draw_run, drawable  # noqa: PLC0415 - slow, and a bad file is reported at once
 
     names = [f"{name}.{file_format}" for name in (*drawable(run), "overview")]
     check_paths({"the run": recording}, output=Into(folder, names))

@@ -9,8 +9,8 @@ import typer
 from rover_gym.cli.console import AsJson, Results, Row, plain_errors, progress_bar, row
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.reproduction import SceneResult, inclined_plane, sphere_rug
-from rover_gym.reproduction.scene_runs import distance_to_siconos
+from rover_gym.scenes import SceneResult, inclined_plane, sphere_rug
+from rover_gym.scenes.report_scenes import distance_to_siconos
 
 
 @plain_errors
@@ -59,8 +59,8 @@ def report(
         results.path("trajectory", result.path)
         results.path("trajectory", rug_result.path)
         if figures:
-            from rover_gym.figures import draw_section_6_1, draw_section_6_2  # noqa: PLC0415 - matplotlib is slow
-            from rover_gym.figures.chapter_3 import draw_chapter_3  # noqa: PLC0415 - as above
+            from rover_gym.show.figures import draw_section_6_1, draw_section_6_2  # noqa: PLC0415 - matplotlib is slow
+            from rover_gym.show.figures.chapter_3 import draw_chapter_3  # noqa: PLC0415 - as above
 
             for path in (
                 *draw_section_6_1(result.path, output),

@@ -13,14 +13,14 @@ from rich.table import Table
 from rover_gym.cli.console import AsJson, Results, figure, plain_errors
 from rover_gym.cli.paths import check_paths
 from rover_gym.cli.usage import WholeHelp
-from rover_gym.mechanics import OptionError
+from rover_gym.core import OptionError
 from rover_gym.models import open_model
-from rover_gym.policy import PDPolicy, Policy, SandGains, SandPolicy, drive_all
-from rover_gym.policy.dug_in import DugIn
-from rover_gym.sand import SingleWheel, Soil, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
-from rover_gym.sand.convert import convert_runs
-from rover_gym.sand.trials import read_trial
-from rover_gym.validation import number, refuse
+from rover_gym.drive import PDPolicy, Policy, SandGains, SandPolicy, drive_all
+from rover_gym.drive.dug_in import DugIn
+from rover_gym.ground.sand import SingleWheel, Soil, climbed_slope, named_soil, slip_on_slope, soil_names, with_wide_wheels
+from rover_gym.ground.sand.convert import convert_runs
+from rover_gym.ground.sand.trials import read_trial
+from rover_gym.core.validation import number, refuse
 
 sand = typer.Typer(
     cls=WholeHelp, rich_markup_mode=None, help="Wheels and rovers on sand, and soils by name.", no_args_is_help=True
@@ -118,7 +118,7 @@ def bed(
     with Results(as_json=as_json) as results:
         _show(results, "runs", runs)
         if plot is not None:
-            from rover_gym.figures.sand_figure import draw_wheel_on_sand  # noqa: PLC0415 - matplotlib is slow to load
+            from rover_gym.show.figures.sand_figure import draw_wheel_on_sand  # noqa: PLC0415 - matplotlib is slow to load
 
             size = f"radius {1e3 * radius:.3g} mm, width {1e3 * width:.3g} mm, load {mass * gravity:.3g} N"
             results.path("figure", draw_wheel_on_sand(runs, f"Drawbar pull of {whose} on {soil} ({size})", plot))

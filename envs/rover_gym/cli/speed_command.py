@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from rover_gym.cli.console import AsJson, Results, plain_errors, progress_bar
-from rover_gym.mechanics import __version__
-from rover_gym.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed, processor
+from rover_gym.core import __version__
+from rover_gym.envs.vector.throughput import ExploringSpeed, VectorSpeed, measure_exploring, measure_speed, processor
 
 #: Steps of an environment for each round of the physics alone, which is as much work as ten.
 _STEPS_A_ROUND = 20

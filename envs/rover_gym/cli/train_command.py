@@ -16,13 +16,13 @@ from typer.core import TyperCommand
 from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table
 from rover_gym.cli.options import RayAddress
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.extras import require
-from rover_gym.mechanics import OptionError
-from rover_gym.policy.arc_network import ArcNetwork
-from rover_gym.policy.arc_network_policy import ARCS_FILE
-from rover_gym.policy.named_policy import network_folder
-from rover_gym.policy.network_files import PolicyError
-from rover_gym.validation import refuse
+from rover_gym.core.extras import require
+from rover_gym.core import OptionError
+from rover_gym.drive.arc_network import ArcNetwork
+from rover_gym.drive.arc_network_policy import ARCS_FILE
+from rover_gym.drive.named_policy import network_folder
+from rover_gym.drive.network_files import PolicyError
+from rover_gym.core.validation import refuse
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
 
@@ -102,9 +102,9 @@ def train(
         require(package, "train" if ray is None else "rllib")
     if ray is not None:
         require("ray", "rllib")
-    from rover_gym.learning.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
-    from rover_gym.learning.arc_recipe import train_arcs  # noqa: PLC0415
-    from rover_gym.learning.configuration import find_configuration  # noqa: PLC0415
+    from rover_gym.learn.arc_config import read_arc_config  # noqa: PLC0415 - needs the extra
+    from rover_gym.learn.arc_recipe import train_arcs  # noqa: PLC0415
+    from rover_gym.learn.configuration import find_configuration  # noqa: PLC0415
 
     path = find_configuration(config)
     settings = read_arc_config(path)
@@ -149,7 +149,7 @@ def _check_unused(folders: Iterable[Path], reads: Mapping[str, object]) -> None:
     Raises:
         OptionError: One has a run, or a file that is read.
     """
-    from rover_gym.learning.arc_recipe import RUN_FILES  # noqa: PLC0415 - needs the extra
+    from rover_gym.learn.arc_recipe import RUN_FILES  # noqa: PLC0415 - needs the extra
 
     for folder in folders:
         if any((folder / name).exists() for name in RUN_FILES):

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_gym.mechanics import OptionError, Simulation, StateError
-from rover_gym.validation import refuse
+from rover_gym.core import OptionError, Simulation, StateError
+from rover_gym.core.validation import refuse
 
 
 class Gradients(NamedTuple):

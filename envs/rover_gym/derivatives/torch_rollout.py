@@ -3,8 +3,8 @@
 from typing import Any
 
 from rover_gym.derivatives.rollout import rollout
-from rover_gym.extras import require
-from rover_gym.mechanics import Simulation
+from rover_gym.core.extras import require
+from rover_gym.core import Simulation
 
 
 def torch_rollout(simulation: Simulation, threads: int | None = None) -> Any:

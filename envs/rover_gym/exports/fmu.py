@@ -15,8 +15,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from rover_gym.exports.axes import AXES, Axes, pitch_sign, vector_components
-from rover_gym.files import check_xml, written_whole
-from rover_gym.mechanics import (
+from rover_gym.core.files import check_xml, written_whole
+from rover_gym.core import (
     HeightField,
     OptionError,
     Plane,
@@ -28,13 +28,13 @@ from rover_gym.mechanics import (
     Union,
     __version__,
 )
-from rover_gym.validation import checked, refuse
+from rover_gym.core.validation import checked, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from rover_gym.exports.axes import Axes
-    from rover_gym.mechanics import Simulation
+    from rover_gym.core import Simulation
 
 
 #: Exponents of the base units.

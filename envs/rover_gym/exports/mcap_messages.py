@@ -20,17 +20,17 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.exports.axes import MAP_FROM_WORLD
-from rover_gym.extras import MissingExtraError, require
+from rover_gym.core.extras import MissingExtraError, require
 from rover_gym.record.channels import RecordingError, file_path
 from rover_gym.record.steady_file import FileInUseError, SteadyFile
-from rover_gym.rotations import quaternions
-from rover_gym.validation import refuse
+from rover_gym.core.rotations import quaternions
+from rover_gym.core.validation import refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from rover_gym.rendering.appearance import Colour
+    from rover_gym.show.frames.appearance import Colour
 
 
 Array = npt.NDArray[np.float64]

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 import numpy as np
 
-from rover_gym.extras import require
-from rover_gym.mechanics import OptionError, __version__
-from rover_gym.registration import ENVIRONMENTS
-from rover_gym.validation import checked, refuse, whole
+from rover_gym.core.extras import require
+from rover_gym.core import OptionError, __version__
+from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.core.validation import checked, refuse, whole
 
 if TYPE_CHECKING:
-    from rover_gym.policy.named_policy import Policy
+    from rover_gym.drive.named_policy import Policy
 
 #: Allowed names of data sets, which Minari takes as they are: a namespace has two characters or more.
 NAME = re.compile(r"(?![A-Za-z]/[^/]*$)(?:[A-Za-z][A-Za-z0-9_-]*/)*[A-Za-z][A-Za-z0-9_-]*-v(?:0|[1-9]\d{0,5})")

@@ -22,8 +22,8 @@ import numpy.typing as npt
 
 from rover_gym.identification.fitting import EXACT, Solution, Window, WindowFit, is_identifiable
 from rover_gym.identification.parameters import Parameter
-from rover_gym.mechanics import OptionError
-from rover_gym.validation import refuse
+from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
 
 Array = npt.NDArray[np.float64]
 

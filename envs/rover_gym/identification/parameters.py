@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.mechanics import Motor, OptionError, RoverModel, Simulation, Terrain
-from rover_gym.validation import number, refuse
+from rover_gym.core import Motor, OptionError, RoverModel, Simulation, Terrain
+from rover_gym.core.validation import number, refuse
 
 
 @dataclass(frozen=True)

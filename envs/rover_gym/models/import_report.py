@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import ModelError, RoverModel
-from rover_gym.validation import refuse
+from rover_gym.core import ModelError, RoverModel
+from rover_gym.core.validation import refuse
 
 
 class RobotFileWarning(UserWarning):

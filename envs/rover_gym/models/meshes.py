@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.extras import MissingExtraError, require
+from rover_gym.core.extras import MissingExtraError, require
 from rover_gym.models.import_report import Array
 
 #: Most vertices of a hull, as in the core.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.extras import require
+from rover_gym.core.extras import require
 from rover_gym.models.import_report import Array, find_file
 from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree, refuse_in
 from rover_gym.models.urdf_extras import UrdfExtras

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rover_gym.extras import require
+from rover_gym.core.extras import require
 from rover_gym.models.robot_tree import MAX_LINKS, check_size, refuse_in, right_angle
 from rover_gym.models.urdf_extras import UrdfExtras, read_extras
 

@@ -1,18 +1,29 @@
-"""Trajectories in HDF5: recording, reading, and rover runs."""
+"""Runs in HDF5: recording and reading, of a rover, a planar machine or grains."""
 
 from rover_gym.record.channels import Channel, RecordingError, RoverSampler, describe, row_count
+from rover_gym.record.disk_run import DiskRun, DiskSampler
+from rover_gym.record.grain_run import GrainRun, GrainSampler
+from rover_gym.record.planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, read_run
 from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory
 
 __all__ = [
     "Channel",
+    "PlanarRun",
+    "PlanarSampler",
+    "DiskRun",
+    "DiskSampler",
+    "GrainRun",
+    "GrainSampler",
     "Recorder",
     "RecordingError",
     "RoverRun",
     "RoverSampler",
     "Trajectory",
     "describe",
+    "is_planar",
+    "planar_run_of",
     "read_frames",
     "read_run",
     "read_trajectory",

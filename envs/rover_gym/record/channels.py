@@ -17,16 +17,16 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground import sand_of
-from rover_gym.mechanics import OptionError, RoverGymError, RoverModel, Simulation, __version__
-from rover_gym.validation import checked, number, refuse
+from rover_gym.ground.terrain_parts import sand_of
+from rover_gym.core import OptionError, RoverGymError, RoverModel, Simulation, __version__
+from rover_gym.core.validation import checked, number, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import h5py
 
-    from rover_gym.mechanics import Terrain
+    from rover_gym.core import Terrain
 
 
 FORMAT = "rover-gym trajectory"

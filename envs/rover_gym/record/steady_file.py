@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from rover_gym.files import regular_place
+from rover_gym.core.files import regular_place
 
 if TYPE_CHECKING:
     from pathlib import Path

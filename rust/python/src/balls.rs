@@ -85,7 +85,7 @@ const VELOCITIES: usize = body_velocities(3);
 ///     TerrainError: A wall has no direction, or `terrain` is not a terrain, or `vessel` is not a
 ///         vessel.
 ///     OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
-#[pyclass(module = "rover_gym.mechanics", extends = BedSimulation, frozen)]
+#[pyclass(module = "rover_gym.core", extends = BedSimulation, frozen)]
 pub struct GrainSimulation {
     pub inner: Arc<Bed<3>>,
     terrain: Option<DrawnGround>,

@@ -28,7 +28,7 @@ use crate::simulation::{Simulation, SimulationInputs};
 /// Raises:
 ///     OptionError: There are no simulations or their models differ in size, `scan` has a wrong
 ///         shape, or `threads` is out of its range.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct SimulationBatch(Shared<Inner>);
 
 struct Inner {

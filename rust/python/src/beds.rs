@@ -24,7 +24,7 @@ pub type Bed<const D: usize> = Shared<GrainSimulation<D>>;
 /// Base class of beds of grains. It cannot be instantiated.
 ///
 /// Its subclasses are `DiskSimulation` and `GrainSimulation`.
-#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, subclass, frozen)]
+#[pyclass(module = "rover_gym.core", extends = AnySimulation, subclass, frozen)]
 pub struct BedSimulation(AnyBed);
 
 /// A bed in the plane or in space.

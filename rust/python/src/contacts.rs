@@ -66,7 +66,7 @@ fn frames<const D: usize>(rows: impl Iterator<Item = [[f64; D]; D]>) -> Array {
 }
 
 /// Contacts of a rover in the last step, as new arrays with one row for each contact.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct Contacts {
     /// Name of the solid in each contact, or of the joint that is at its stop.
     bodies: Vec<String>,
@@ -152,7 +152,7 @@ impl Contacts {
 }
 
 /// Contacts of a planar simulation in the last step, as new arrays with one row for each contact.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct PlanarContacts {
     /// Index of the disc in each contact, (n,); 0 is the ball or wheel A, 1 is wheel B.
     discs: Array<i64>,
@@ -209,7 +209,7 @@ impl PlanarContacts {
 ///
 /// Vectors have D entries: 2 for disks, 3 for balls. Contacts between sleeping grains are not
 /// included.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct GrainContacts {
     /// Indices of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground.
     bodies: Array<i64>,

@@ -66,7 +66,7 @@ use crate::shared::Open;
 ///         wheels overlap.
 ///     TerrainError: A wall has no direction, or `ground` is not a ground.
 ///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
-#[pyclass(module = "rover_gym.mechanics", extends = BedSimulation, frozen)]
+#[pyclass(module = "rover_gym.core", extends = BedSimulation, frozen)]
 pub struct DiskSimulation(Arc<Bed<2>>);
 
 impl DiskSimulation {

@@ -49,7 +49,7 @@ use crate::terrain::{self, Terrain};
 /// Raises:
 ///     OptionError: An argument is missing, not a number, or out of range.
 ///     TerrainError: `ground` is not a terrain.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
     pub words: SolverWords,
@@ -58,7 +58,7 @@ pub struct EpisodeDistribution {
 }
 
 /// Drawn episodes, in the order of the generators.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct DrawnEpisodes {
     pub drawn: Vec<Beginning>,
     pub words: SolverWords,

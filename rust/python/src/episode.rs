@@ -20,7 +20,7 @@ use crate::snapshot::{read_bytes, written_bytes};
 /// State of an episode of a driving task, beside its simulation.
 ///
 /// Create it by `begin` or `from_bytes`.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct EpisodeRun(CoreEpisode);
 
 /// Actions of a shape in row-major order, as float64.

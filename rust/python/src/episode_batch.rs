@@ -44,7 +44,7 @@ type OriginRows = (Vec<f64>, Vec<f64>, u64, Vec<f64>);
 ///
 /// Raises:
 ///     OptionError: An argument is out of its range, or the model does not fit the rules.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct EpisodeBatch(Shared<Inner>);
 
 struct Inner {

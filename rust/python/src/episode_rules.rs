@@ -50,7 +50,7 @@ use crate::reading::scan_points;
 ///     ModelError: `model` is not a RoverModel.
 ///     OptionError: A number is out of range, a list has a wrong length, or the number of weights
 ///         differs from that of the terms.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct EpisodeRules {
     pub inner: Arc<Rules>,
 }

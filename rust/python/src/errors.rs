@@ -104,7 +104,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     let make = |name: &str, bases: Bound<'_, PyTuple>, doc: &str| -> PyResult<Py<PyType>> {
         let body = PyDict::new(py);
-        body.set_item("__module__", "rover_gym.mechanics")?;
+        body.set_item("__module__", "rover_gym.core")?;
         body.set_item("__doc__", doc)?;
         body.set_item("field", py.None())?;
         body.set_item("value", py.None())?;

@@ -15,7 +15,7 @@ use crate::options::solver_options;
 use crate::shared::Release;
 
 /// Result report of the contact solver.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 #[derive(Clone)]
 pub struct SolverReport {
     /// Outcome of the solve, "converged", "relaxed", "not_converged" or "budget_exhausted".
@@ -91,7 +91,7 @@ impl SolverReport {
 }
 
 /// The solution of a friction-contact problem.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct FrictionContactSolution {
     /// Impulses p, (n_c, d), N s, along the normal and the tangents.
     impulses: Array,

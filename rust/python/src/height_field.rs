@@ -35,7 +35,7 @@ use crate::terrain::Terrain;
 /// Raises:
 ///     TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
 ///         has data, the spacing is not positive, or a change per metre is 0.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+#[pyclass(module = "rover_gym.core", frozen, extends = Terrain)]
 pub struct HeightField {
     pub inner: Arc<CoreField>,
     map_frame: Option<[f64; 4]>,

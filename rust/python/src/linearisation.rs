@@ -20,7 +20,7 @@ use crate::errors::{BorderError, Kind, Result, Value, entry};
 /// set-points). On soft ground seven numbers a wheel follow in x: the displacement of its centre
 /// (3) and its rotation (3) that the sand remembers, in units of its memory (1 and 1/m, world
 /// axes), and the energy that the sand may give back, J. All arrays are new.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct Linearisation {
     /// Derivative of the next state by the state, (nx, nx) with nx = 2 nv, or 2 nv + 7 n_wheels.
     a: Array,
@@ -151,7 +151,7 @@ pub fn named_parameters(
 }
 
 /// Steps of trajectories with their derivatives, as `Simulation.differentiate` returns them.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct StepDerivatives {
     /// States, (n, steps + 1, nx).
     states: Array,

@@ -8,7 +8,7 @@ use std::ops::Range;
 use crate::errors::{Kind, Result, Value};
 
 /// A machine of a model, with its slices of the model's arrays.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct Machine {
     /// Name of the machine.
     name: String,

@@ -36,7 +36,7 @@ pub type Pair = (Array, Array);
 /// `Simulation`, "report" for the Cardan angles of the 2010 report and their rates. They raise
 /// StateError if `q` or `qdot` has a wrong length or an entry that is not finite, OptionError if
 /// `coordinates` is neither of the two, and TerrainError if `terrain` is not a terrain.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.core", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct RoverModel {
     pub inner: Arc<Model>,

@@ -29,7 +29,7 @@ const WHAT: &str = "a Motor, a mapping of its fields, or None";
 /// Raises:
 ///     ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` is neither from
 ///         1e-6 to 1e9 rad/s nor infinite.
-#[pyclass(module = "rover_gym.mechanics", frozen, eq, from_py_object)]
+#[pyclass(module = "rover_gym.core", frozen, eq, from_py_object)]
 #[derive(Clone, Copy, PartialEq)]
 pub struct Motor {
     inner: CoreMotor,

@@ -15,7 +15,7 @@ use crate::errors::{Kind, Result};
 
 /// Beam search for the cheapest path of a rover over a height scan.
 ///
-/// `rover_gym.policy.ScanPolicy` uses it; `rover_gym.policy.PathCosts` defines the cost of a path.
+/// `rover_gym.drive.ScanPolicy` uses it; `rover_gym.drive.PathCosts` defines the cost of a path.
 /// A pose consists of the distance ahead, the distance to the right, m, and the turn to the left,
 /// rad.
 ///
@@ -34,7 +34,7 @@ use crate::errors::{Kind, Result};
 ///
 /// Raises:
 ///     OptionError: An argument is missing, not a number, or has a wrong shape.
-#[pyclass(module = "rover_gym.mechanics")]
+#[pyclass(module = "rover_gym.core")]
 pub struct PathSearch {
     inner: Core,
     map: Option<WayMap>,

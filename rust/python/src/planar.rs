@@ -23,7 +23,7 @@ const RULES: [(&str, ContactRule); 2] = [
 ];
 
 /// Base class of planar machines on a ground. It cannot be instantiated.
-#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, subclass, frozen)]
+#[pyclass(module = "rover_gym.core", extends = AnySimulation, subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Arc<Shared<Core>>,
     ground: Py<PyAny>,

@@ -36,7 +36,7 @@ pub fn quantity(kind: Kind, e: &QuantityError) -> BorderError {
 /// Base class of the grounds of planar scenes: x forward, y up. Immutable.
 ///
 /// Its subclasses are `Line`, `Sine`, `Spline` and `Polyline`.
-#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
+#[pyclass(module = "rover_gym.core", subclass, frozen)]
 pub struct PlanarGround(Arc<dyn CoreGround>);
 
 #[pymethods]
@@ -93,7 +93,7 @@ fn points(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> Result<[Vec<f64>; 2]> {
 ///
 /// Raises:
 ///     TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
+#[pyclass(module = "rover_gym.core", frozen, extends = PlanarGround)]
 pub struct Line {
     inner: CoreLine,
 }
@@ -140,7 +140,7 @@ impl Line {
 /// Raises:
 ///     TerrainError: A number is not finite, the wavelength is below 1e-3 m, or the slope 2 pi
 ///         amplitude / wavelength is beyond 1000.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
+#[pyclass(module = "rover_gym.core", frozen, extends = PlanarGround)]
 pub struct Sine {
     inner: CoreSine,
 }
@@ -210,7 +210,7 @@ impl Sine {
 /// Raises:
 ///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
 ///         entry is not finite or beyond 1e6 m, or x does not increase.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
+#[pyclass(module = "rover_gym.core", frozen, extends = PlanarGround)]
 pub struct Spline {
     inner: CoreSpline,
 }
@@ -255,7 +255,7 @@ impl Spline {
 /// Raises:
 ///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
 ///         entry is not finite or beyond 1e6 m, x decreases, or a point is given twice.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = PlanarGround)]
+#[pyclass(module = "rover_gym.core", frozen, extends = PlanarGround)]
 pub struct Polyline {
     inner: CorePolyline,
 }

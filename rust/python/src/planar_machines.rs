@@ -30,7 +30,7 @@ use crate::planar_ground::border;
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.core", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
 #[pymethods]
@@ -83,7 +83,7 @@ impl BallSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.core", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
 #[pymethods]
@@ -168,7 +168,7 @@ pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Res
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen, get_all)]
+#[pyclass(module = "rover_gym.core", extends = PlanarSimulation, frozen, get_all)]
 pub struct MirroredRoverSimulation {
     /// Names of the joints of each coordinate from the fourth on.
     joints: Vec<Vec<String>>,

@@ -22,7 +22,7 @@ use crate::terrain::Terrain;
 /// Raises:
 ///     TerrainError: A number is not finite, the normal has no direction, or the offset is beyond
 ///         1e6 m.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+#[pyclass(module = "rover_gym.core", frozen, extends = Terrain)]
 pub struct Plane {
     pub inner: CorePlane,
 }

@@ -5,7 +5,7 @@ use rover_core::integrator::StepReport as CoreReport;
 use rover_core::multibody::Energy as CoreEnergy;
 
 /// Summary of the time steps of one call: sums or worst values over the steps.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct StepReport {
     inner: CoreReport,
     /// Whether the steps "converged" or "not_converged".
@@ -184,7 +184,7 @@ impl StepReport {
 }
 
 /// Kinetic and potential energy.
-#[pyclass(module = "rover_gym.mechanics", frozen, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, get_all)]
 pub struct Energy {
     /// Kinetic energy, J.
     kinetic: f64,

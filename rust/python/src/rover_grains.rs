@@ -56,7 +56,7 @@ impl From<TogetherError> for BorderError {
 ///     OptionError: The time steps or gravities differ, or the coefficient is negative or not
 ///         finite.
 ///     StateError: A part of the rover penetrates a grain.
-#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
+#[pyclass(module = "rover_gym.core", extends = AnySimulation, frozen)]
 pub struct RoverGrainSimulation {
     pub together: Arc<Together>,
     rover: Py<Simulation>,

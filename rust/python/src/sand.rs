@@ -143,7 +143,7 @@ pub fn sand_to_dict<'py>(
 /// A single wheel on a bed of soil, with prescribed speeds and vertical load.
 ///
 /// Args:
-///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+///     soil: A `rover_gym.ground.sand.Soil`, or a mapping of its numbers.
 ///     radius: Radius of the wheel without grousers, m.
 ///     width: Its width, m.
 ///     rounding: Radius of its edges, m.
@@ -155,7 +155,7 @@ pub fn sand_to_dict<'py>(
 /// Raises:
 ///     TerrainError: A number of the soil is missing or out of its range.
 ///     OptionError: A number of the wheel is out of its range.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct WheelBed {
     bed: TestBed,
 }

@@ -71,7 +71,7 @@ use crate::{terrain, union};
 ///     TerrainError: `terrain` is none of these, or its file is damaged.
 ///     OSError: A file cannot be read.
 ///     OptionError: An option is out of range, or must not be given beside `accuracy`.
-#[pyclass(module = "rover_gym.mechanics", extends = AnySimulation, frozen)]
+#[pyclass(module = "rover_gym.core", extends = AnySimulation, frozen)]
 pub struct Simulation {
     pub inner: Arc<Shared<CoreSimulation>>,
     model: Arc<Model>,

@@ -62,7 +62,7 @@ kept_scene!(GrainBed<2>, Disks);
 kept_scene!(GrainBed<3>, Balls);
 
 /// Complete state of a simulation, from which it continues bit for bit. Picklable.
-#[pyclass(module = "rover_gym.mechanics", frozen)]
+#[pyclass(module = "rover_gym.core", frozen)]
 pub struct Snapshot(pub AnySnapshot);
 
 /// A snapshot of another kind of simulation.

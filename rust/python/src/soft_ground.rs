@@ -21,13 +21,13 @@ use crate::terrain::Terrain;
 ///
 /// Args:
 ///     surface: The undisturbed surface: a `Plane`, `HeightField` or `TriangleMesh`.
-///     soil: A `rover_gym.sand.Soil`, or a mapping of its numbers.
+///     soil: A `rover_gym.ground.sand.Soil`, or a mapping of its numbers.
 ///     rut_cell: Size of a cell of the map of ruts, from 0.001 to 1 m.
 ///
 /// Raises:
 ///     TerrainError: The surface is not a terrain, or a number of the soil is missing or out of
 ///         range.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+#[pyclass(module = "rover_gym.core", frozen, extends = Terrain)]
 pub struct SoftGround {
     inner: Arc<CoreGround>,
     surface: Py<PyAny>,

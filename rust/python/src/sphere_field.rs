@@ -40,7 +40,7 @@ fn plane(given: Option<&Bound<'_, PyAny>>) -> Result<Option<CorePlane>> {
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
 ///         there are no spheres or too many of them.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+#[pyclass(module = "rover_gym.core", frozen, extends = Terrain)]
 pub struct SphereField {
     pub inner: Arc<CoreField>,
 }

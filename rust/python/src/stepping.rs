@@ -21,7 +21,7 @@ use crate::snapshot::{KeptScene, Snapshot, other_kind, snapshot};
 ///
 /// Only one call may run at a time. A second call, from another thread or a signal handler, raises
 /// BusyError.
-#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
+#[pyclass(module = "rover_gym.core", subclass, frozen)]
 pub struct AnySimulation(Arc<dyn Stepped>);
 
 /// What is stepped from Python.

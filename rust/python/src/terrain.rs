@@ -17,7 +17,7 @@ use crate::shared::Release;
 ///
 /// Its subclasses are `Plane`, `SphereField`, `HeightField`, `TriangleMesh`, `SoftGround` and
 /// `Union`.
-#[pyclass(module = "rover_gym.mechanics", frozen, subclass)]
+#[pyclass(module = "rover_gym.core", frozen, subclass)]
 pub struct Terrain {
     pub ground: DrawnGround,
 }

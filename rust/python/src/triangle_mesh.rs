@@ -30,7 +30,7 @@ use crate::terrain::Terrain;
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
 ///         an index out of range, or neighbouring triangles have opposite orientations.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+#[pyclass(module = "rover_gym.core", frozen, extends = Terrain)]
 pub struct TriangleMesh {
     pub inner: Arc<CoreMesh>,
 }

@@ -43,7 +43,7 @@ pub fn object<'py>(py: Python<'py>, ground: &DrawnGround) -> Result<Bound<'py, P
 ///
 /// Raises:
 ///     TerrainError: A part is not a terrain, the list is empty, or two parts contain a plane.
-#[pyclass(module = "rover_gym.mechanics", frozen, extends = Terrain)]
+#[pyclass(module = "rover_gym.core", frozen, extends = Terrain)]
 pub struct Union;
 
 impl Union {

@@ -23,7 +23,7 @@ const KIND: Kind = Kind::Terrain;
 ///
 /// Raises:
 ///     TerrainError: A number is not finite, or the radius or length is not positive.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, from_py_object, get_all)]
 #[derive(Clone)]
 pub struct Drum {
     /// Inner radius, m.
@@ -90,7 +90,7 @@ impl Drum {
 /// Raises:
 ///     TerrainError: A number is not finite, the radius is not positive, or the hole is as wide as
 ///         the tube.
-#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object, get_all)]
+#[pyclass(module = "rover_gym.core", frozen, from_py_object, get_all)]
 #[derive(Clone)]
 pub struct Silo {
     /// Inner radius, m.

@@ -1,0 +1,113 @@
+"""`ArcNetworkPolicy`: a trained network that drives any rover by the planner's arcs, with NumPy alone."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.core import StateError
+from rover_gym.drive.arc_driver import ArcDriver
+from rover_gym.drive.arc_network import ArcNetwork
+from rover_gym.drive.features import check_observed
+from rover_gym.drive.network_files import PolicyError, is_there
+from rover_gym.drive.pd_policy import driven_rover
+from rover_gym.drive.scan_policy import ScanMemory, ScanPolicy
+from rover_gym.core.validation import array, refuse
+
+#: The file of a network in its folder.
+ARCS_FILE = "arcs.npz"
+
+
+class ArcNetworkPolicy:
+    """Drives a rover by a network of `rover train anywhere`; it has stable-baselines3's `predict`.
+
+    Args:
+        env: A rover environment made with `ScanPolicy.arguments(model)`, wrapped or not, or a vector of them. It is
+            read once.
+        network: The network.
+        planner: A planner for the rover, whose limits and memory it shares; a new `ScanPolicy` by default.
+        seed: Of the arcs that are drawn with `deterministic=False`.
+
+    Raises:
+        OptionError: The environment has no height scan.
+    """
+
+    def __init__(self, env: Any, network: ArcNetwork, *, planner: ScanPolicy | None = None, seed: int = 0) -> None:
+        rover = driven_rover(env, type(self).__name__)
+        self._size = rover.observation_layout.size
+        self._driver = ArcDriver(rover, 1, planner)
+        self._network = network
+        self._random = np.random.default_rng(seed)
+
+    @property
+    def hold_periods(self) -> int:
+        """Control periods that an arc is held."""
+        return self._driver.hold
+
+    @classmethod
+    def load(cls, env: Any, folder: str | Path) -> "ArcNetworkPolicy":
+        """Loads the network of a folder.
+
+        Raises:
+            PolicyError: The folder holds no valid network.
+            OSError: A file may not be read.
+        """
+        path = Path(folder) / ARCS_FILE
+        if not is_there(path):
+            refuse(PolicyError, "policy", str(path), "is not there")
+        return cls(env, ArcNetwork.read(path))
+
+    def predict(
+        self,
+        observation: npt.NDArray[np.float32],
+        state: tuple[npt.NDArray[Any], ...] | None = None,
+        episode_start: npt.NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...]]:
+        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
+
+        An arc is held for 0.2 s. The returned state contains it and the memory: pass it with the next observation, and
+        mark the start of episodes by `episode_start` `(n,)`. Without a state every observation counts as a start.
+
+        Raises:
+            StateError: The observation has a wrong shape or an entry that is not finite.
+        """
+        given = array("observation", observation, error=StateError)
+        check_observed(given, self._size)
+        rows = np.atleast_2d(given).astype(np.float32)
+        kept, since = (None, np.zeros(len(rows), np.int64)) if state is None else (state[:-1], state[-1].copy())
+        driver = self._driver
+        driver.memory = memory = ScanMemory.of(kept, len(rows))
+        if episode_start is not None:
+            begins = np.broadcast_to(episode_start, (len(rows),))
+            memory.forget(begins)
+            since[begins] = 0
+        due = since % driver.hold == 0
+        if due.any():
+            driver.notice(rows, due)
+            observed = {name: part[due] for name, part in driver.observe(rows).items()}
+            logits: npt.NDArray[Any] = self._network(observed)
+            if not deterministic:
+                logits = logits + self._random.gumbel(size=logits.shape)
+            arcs = np.zeros(len(rows), np.int64)
+            arcs[due] = self._choice(logits, rows, np.flatnonzero(due))
+            driver.choose(rows, arcs, due)
+        actions = driver.controller.act(rows, memory.command)
+        return (actions[0] if given.ndim == 1 else actions), (*memory.state, since + 1)
+
+    def _choice(
+        self,
+        logits: npt.NDArray[Any],
+        rows: npt.NDArray[np.float32],  # noqa: ARG002 - for policies that plan
+        which: npt.NDArray[np.intp],  # noqa: ARG002
+    ) -> npt.NDArray[np.int64]:
+        """The arcs `(m,)` of some rovers, from the network's outputs for them `(m, 64)`.
+
+        Args:
+            logits: The outputs.
+            rows: Observations of all rovers.
+            which: `(m,)` numbers of the rovers.
+        """
+        best: npt.NDArray[np.int64] = logits.argmax(axis=1)
+        return best

@@ -1,0 +1,130 @@
+"""Drives rovers by three numbers: speed, curvature and sideways direction; vectorised over rovers.
+
+A command sets the motion of the point in the middle of the wheelbase: speed `v` in a direction `beta` off the trunk's
+x axis, while the trunk turns by `kappa` per metre of path; `beta` and `kappa` are positive to the left. The velocity
+of a wheel at `(x, z)` from that point, divided by `v`, is
+
+    ahead    a = cos(beta) + kappa z
+    left     l = sin(beta) + kappa x
+
+The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and its rim speed is
+`v (a cos(delta) + l sin(delta))`. A wheel that does not steer has delta = 0. With beta = 0 these are `PDPolicy`'s
+formulas. The torques come from the same wheel regulator (`policy.regulator`), with a feedforward of the force that
+holds the rover on a slope.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.core import OptionError, atan2, sin_cos
+from rover_gym.drive.pd_policy import SCRUB_RATE, WIDENING, YAW, Turning
+from rover_gym.drive.regulator import WheelRegulator
+from rover_gym.core.validation import number, refuse
+
+Array = npt.NDArray[np.float64]
+
+#: Entries of a command: speed, curvature, sideways.
+N_COMMANDS = 3
+
+
+def command_space() -> "gym.spaces.Box[np.float32]":
+    """The space of the commands of one rover."""
+    return gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
+
+
+@dataclass(frozen=True)
+class CommandLimits:
+    """The values of a command of 1, and the time constant of the wheel regulator.
+
+    Attributes:
+        speed: Speed, m/s.
+        curvature: Curvature of the path, 1/m.
+        sideways_deg: Direction of travel off the trunk's x axis, degrees.
+        response: Time constant of the rover's speed, s; see `WheelRegulator`.
+    """
+
+    speed: float = 1.2
+    curvature: float = 0.75
+    sideways_deg: float = 35.0
+    response: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"command.{name}", value, at_least=1e-3, at_most=180.0 if name == "sideways_deg" else 1e3)
+
+
+class CommandController:
+    """Turns commands `(n, 3)` in [-1, 1] into actions `(n, n_actions)` of `Rover-v0`.
+
+    Args:
+        rover: The environment, read once for the layout and the rover's constants.
+        limits: The values of a command of 1.
+    """
+
+    def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None) -> None:
+        if limits is not None and not isinstance(limits, CommandLimits):
+            refuse(OptionError, "limits", limits, "must be CommandLimits")
+        self.limits = CommandLimits() if limits is None else limits
+        layout, model = rover.observation_layout, rover.model
+        q, velocity = layout["q"].start, layout["velocity"].start
+        self._pitch = q + 5
+        weight = model.mass * math.hypot(*rover.gravity)
+        turning = Turning.of(model, weight)
+        self._entries = np.array(turning.steering.entries)
+        self._steered_wheels = turning.steering.wheels
+        self._steering = np.array([q + i for i in turning.steering.joints], dtype=np.intp)
+        self._skids = turning.skids
+        self._widening = WIDENING if turning.skids else 1.0
+        self.steers_sideways = bool(turning.steering.joints) and min(turning.steering.entries) >= 0
+        self._yaw_rate = velocity + YAW
+        self._yaw_gain, self._scrub = np.array(turning.yaw_gain), np.array(turning.scrub)
+        self._x, self._z = np.array(turning.wheels).T
+        self._max_steering = rover.max_steering
+        self._n_wheels = len(turning.wheels)
+        self._n_actions = rover.task.n_actions
+        self._load = weight / self._n_wheels
+        self._regulator = WheelRegulator(rover, self.limits.response)
+
+    def act(self, observations: npt.NDArray[Any], commands: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+        """The actions `(n, n_actions)` for observations `(n, size)`, scaled as the environment returns them."""
+        seen = observations.astype(np.float64, copy=False)
+        command = np.clip(commands.astype(np.float64, copy=False), -1.0, 1.0)
+        speed = self.limits.speed * command[:, :1]
+        curvature = self.limits.curvature * command[:, 1:2]
+        sideways = math.radians(self.limits.sideways_deg) * command[:, 2:3]
+
+        sine, cosine = sin_cos(sideways)
+        ahead = cosine + self._widening * curvature * self._z
+        left = sine + curvature * self._x
+        set_points = self._set_points(atan2(left, ahead))
+        # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
+        off = np.abs(set_points - seen[:, self._steering]).max(axis=1, keepdims=True, initial=0.0)
+        speed = speed * np.maximum(0.2, 1.0 - 2.0 * off)
+        # A wheel that does not steer takes the zero that follows the set-points.
+        angles = np.concatenate((set_points, np.zeros((len(seen), 1))), axis=1)[:, self._entries]
+        sine, cosine = sin_cos(angles)
+        wanted = speed * (ahead * cosine + left * sine)
+
+        force = self._load * sin_cos(seen[:, self._pitch, None])[0]
+        if self._skids:
+            yaw_rate = speed * curvature
+            missing = yaw_rate - seen[:, self._yaw_rate, None]
+            force = force + self._yaw_gain * missing + self._scrub * np.clip(yaw_rate / SCRUB_RATE, -1.0, 1.0)
+        actions = np.empty((len(seen), self._n_actions), dtype=np.float32)
+        actions[:, : self._n_wheels] = self._regulator.entries(seen, wanted, force)
+        if self._steered_wheels:
+            actions[:, self._n_wheels :] = np.clip(set_points / self._max_steering, -1.0, 1.0)
+        return actions
+
+    def _set_points(self, angles: Array) -> Array:
+        """`(n, joints)` the mean angle of each joint's wheels, rad, within the steering limit; from `(n, n_wheels)`."""
+        means = [angles[:, own].mean(axis=1) for own in self._steered_wheels]
+        stacked = np.stack(means, axis=1) if means else np.zeros((len(angles), 0))
+        within: Array = np.clip(stacked, -self._max_steering, self._max_steering)
+        return within

@@ -1,0 +1,332 @@
+"""The PD baseline, which drives by the observation alone with one turning centre and regulated wheel speeds.
+
+It drives any rover: one whose wheels steer, all or some, and one that turns by skidding (`policy.turning`).
+
+The rover turns about a centre at `(x_c, -1/kappa)` in the trunk's (x, z), where `kappa` is the curvature, positive to
+the left. `x_c` is the x of the wheels without steering, or the middle of the wheelbase if all or none steer. A wheel at
+`(x, z)` then needs
+
+    steering  tan(delta) = kappa (x - x_c) / (1 + kappa z)
+    speed     v_i = v sqrt((1 + kappa z)^2 + (kappa (x - x_c))^2)
+
+where `v` is the speed of the point `(x_c, 0)`. Without steering, the two sides run at different speeds and the wheels
+skid. The rover then turns less than with rolling wheels, about a centre farther out, so the commanded curvature is
+multiplied by `WIDENING` (Mandow et al. 2007). Each wheel also gets the force `SCRUB` times its load against sideways
+friction, and a force that controls the yaw rate.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.start import Steering, wheel_centres
+from rover_gym.core import OptionError, RoverModel, StateError, atan2, sin_cos
+from rover_gym.drive.features import check_observed
+from rover_gym.drive.regulator import Regulator, WheelRegulator
+from rover_gym.core.validation import array, number, refuse
+
+#: Commanded curvature of a skidding rover relative to that of the path.
+WIDENING = 1.5
+
+#: Sideways friction that a rover overcomes when it turns by skidding, over its weight: more than flat ground needs,
+#: since on rough ground two wheels carry most of it.
+SCRUB = 1.2
+
+#: Yaw rate from which on all of this friction is expected, rad/s.
+SCRUB_RATE = 0.2
+
+#: Time constant of the yaw rate of a rover that skids, s.
+YAW_RESPONSE = 0.1
+
+#: Friction that a rover which skids is sure to have: what its wheels may need to start or to stop a turn.
+SURE_FRICTION = 0.5
+
+#: Time within which such a rover shall stop a turn, s.
+YAW_STOP = 0.3
+
+#: Distance below which two lengths of a rover count as equal, m.
+TINY = 1e-6
+
+#: Place of the rate about the trunk's y axis in the velocity.
+YAW = 4
+
+
+@dataclass(frozen=True)
+class Turning:
+    """The wheels about the point that turns on the path.
+
+    Attributes:
+        x_c: x of that point in the trunk's frame, m.
+        wheels: x and z of each wheel from that point, m.
+        steering: The steering entry of an action for each wheel.
+        yaw_gain: Force of each wheel for the yaw rate that is missing, N s/rad: 0 unless the rover skids, positive on
+            the right, negative on the left.
+        scrub: Force of each wheel against the sideways friction of a left turn, N, with the same signs.
+        yaw_acceleration: Largest that the wheels' friction gives a rover that skids, rad/s2; infinite for others.
+    """
+
+    x_c: float
+    wheels: tuple[tuple[float, float], ...]
+    steering: Steering
+    yaw_gain: tuple[float, ...]
+    scrub: tuple[float, ...]
+    yaw_acceleration: float = math.inf
+
+    @classmethod
+    def of(cls, model: RoverModel, weight: float) -> "Turning":
+        """The constants of a model with its joints at zero and a weight, N."""
+        centres, steering = wheel_centres(model), Steering.of(model)
+        fixed = [float(x) for (x, _), entry in zip(centres, steering.entries, strict=True) if entry < 0]
+        if fixed and steering.joints:
+            x_c = sum(fixed) / len(fixed)
+        else:
+            x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
+        wheels = tuple((float(x - x_c), float(z)) for x, z in centres)
+        width = sum(abs(z) for _, z in wheels)
+        gain, scrub, acceleration = 0.0, 0.0, math.inf
+        if not steering.joints and width > TINY:
+            mass_matrix = model.mass_matrix(np.zeros(model.nq), coordinates="state")
+            inertia = float(mass_matrix[YAW, YAW])
+            gain = inertia / YAW_RESPONSE / width
+            acceleration = SURE_FRICTION * weight / len(wheels) * width / inertia
+            scrub = SCRUB * weight / len(wheels) * sum(abs(x) for x, _ in wheels) / width
+        sides = [math.copysign(1.0, z) if abs(z) > TINY else 0.0 for _, z in wheels]
+        yaw_gain, scrubs = (tuple(side * force for side in sides) for force in (gain, scrub))
+        return cls(x_c, wheels, steering, yaw_gain, scrubs, acceleration)
+
+    @property
+    def skids(self) -> bool:
+        """Whether the rover has no steering."""
+        return not self.steering.joints
+
+    def max_curvature_at(self, speed: float) -> float:
+        """The largest curvature at a speed, m/s, out of which friction stops the turn in `YAW_STOP`, 1/m."""
+        return self.yaw_acceleration * YAW_STOP / speed
+
+    def max_curvature(self, max_steering: float) -> float:
+        """The largest curvature that keeps every wheel within the steering limit and rolling forward, 1/m.
+
+        This solves tan(delta) = kappa |x| / (1 - kappa |z|) of the inner wheels for kappa. delta stays below 90
+        degrees, since a wheel beyond the turning centre would have to turn round. A rover that skids turns about a
+        point one track beside its middle, where the inner wheels still run at half the speed.
+        """
+        sine, cosine = sin_cos(min(max_steering, math.radians(89.0)))
+        tangent = sine / cosine
+        limits = [1e3]
+        for (x, z), entry in zip(self.wheels, self.steering.entries, strict=True):
+            if entry >= 0 and abs(x) + abs(z) * tangent > TINY:
+                limits.append(tangent / (abs(x) + abs(z) * tangent))
+            elif entry < 0 and abs(z) > TINY:
+                limits.append(0.5 / abs(z) if self.skids else 1.0 / abs(z))
+        return min(limits)
+
+
+_Row = Sequence[float]
+
+
+@dataclass(frozen=True)
+class PDGains:
+    """The policy's gains.
+
+    Attributes:
+        speed: Speed on a straight path, m/s.
+        lateral_acceleration: Largest lateral acceleration, which limits the speed in turns, m/s2.
+        braking: Deceleration on the approach to the goal, m/s2.
+        final_speed: Speed at the goal, m/s.
+        response: Time constant of the rover's speed, s; see `WheelRegulator`.
+        reverse_cost: Factor on the length of a path driven backward.
+        switch_cost: Path length that a change of direction at `speed` counts as, m.
+    """
+
+    speed: float = 1.2
+    lateral_acceleration: float = 0.5
+    braking: float = 0.4
+    final_speed: float = 0.3
+    response: float = 0.1
+    reverse_cost: float = 1.3
+    switch_cost: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
+
+
+class PDPolicy:
+    """Drives `Rover-v0` to its goal; stateless, with stable-baselines3's `predict`.
+
+    The policy compares four paths and takes the cheapest: forward or backward, with a left or right turn at the largest
+    curvature, then straight. On this path it follows the circle through the goal (pure pursuit), within the largest
+    curvature.
+
+    Args:
+        env: A `Rover-v0`, wrapped or not, or a vector of them. It is read once, for layout and rover constants.
+        gains: The gains.
+        regulator: Converts rim speeds to torques; a `WheelRegulator` by default.
+    """
+
+    def __init__(self, env: Any, gains: PDGains | None = None, regulator: Regulator | None = None) -> None:
+        rover = driven_rover(env, type(self).__name__)
+        if gains is not None and not isinstance(gains, PDGains):
+            refuse(OptionError, "gains", gains, "must be PDGains")
+        self.gains = PDGains() if gains is None else gains
+        layout, model = rover.observation_layout, rover.model
+        self._size = layout.size
+        self._scale = layout.scale
+        self._roll = layout["q"].start + 3
+        self._pitch = layout["q"].start + 5
+        self._forward_speed = layout["velocity"].start
+        self._yaw_rate = layout["velocity"].start + YAW
+        self._goal = layout["goal"].start
+
+        self._weight = model.mass * math.hypot(*rover.gravity)
+        self._turning = Turning.of(model, self._weight)
+        self._steering = [layout["q"].start + i for i in self._turning.steering.joints]
+        self._steered_wheels = self._turning.steering.wheels
+        self._n_wheels = len(model.wheel_names)
+        self._n_actions = rover.task.n_actions
+        self._max_steering = rover.max_steering
+        self._regulator = WheelRegulator(rover, self.gains.response) if regulator is None else regulator
+        self.max_curvature = self._turning.max_curvature(self._max_steering)
+
+    def predict(
+        self,
+        observation: npt.NDArray[np.float32],
+        state: tuple[npt.NDArray[Any], ...] | None = None,
+        episode_start: npt.NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
+        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
+
+        The signature is stable-baselines3's. The policy has no state: it returns `state` unchanged and ignores
+        `episode_start` and `deterministic`.
+
+        Raises:
+            StateError: The observation has a wrong shape or an entry that is not finite.
+        """
+        given = array("observation", observation, error=StateError)
+        check_observed(given, self._size)
+        rows = np.atleast_2d(given).astype(np.float64, copy=False)
+        drives = [self._drive(row) for row in (rows * self._scale).tolist()]
+        shape = (len(rows), self._n_wheels)
+        wanted, force = (np.array([drive[k] for drive in drives]).reshape(shape) for k in (0, 1))
+        actions = np.empty((len(rows), self._n_actions), dtype=np.float32)
+        actions[:, : self._n_wheels] = self._regulator.entries(rows, wanted, force)
+        if self._steered_wheels:
+            angles = np.array([drive[2] for drive in drives]).reshape(len(rows), -1)
+            actions[:, self._n_wheels :] = np.clip(angles / self._max_steering, -1.0, 1.0)
+        return (actions[0] if given.ndim == 1 else actions), state
+
+    def steering_angles(self, curvature: float) -> list[float]:
+        """The angle of each steering joint, rad, at which all axles meet in the turning centre of a curvature, 1/m.
+
+        A joint that steers several wheels takes the mean of their angles.
+        """
+        wheels = self._turning.wheels
+        angles = [atan2(curvature * x, 1.0 + curvature * z) for x, z in wheels]
+        return [sum(angles[i] for i in own) / len(own) for own in self._steered_wheels]
+
+    def _drive(self, row: _Row) -> tuple[list[float], list[float], list[float]]:
+        """Rim speeds, m/s, feedforward forces, N, and steering angles, rad, for one observation in SI units."""
+        gains = self.gains
+        speed_now = row[self._forward_speed]
+        ahead, right = row[self._goal], row[self._goal + 1]
+        direction, curvature = self._way(ahead - self._turning.x_c, -right, speed_now)
+        angles = self.steering_angles(curvature)
+
+        distance = math.hypot(ahead, right)
+        speed = min(
+            gains.speed,
+            math.sqrt(gains.lateral_acceleration / max(abs(curvature), 1e-9)),
+            math.sqrt(gains.final_speed * gains.final_speed + 2.0 * gains.braking * distance),
+        )
+        # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
+        off = max((abs(angle - row[i]) for angle, i in zip(angles, self._steering, strict=True)), default=0.0)
+        speed *= direction * max(0.2, 1.0 - 2.0 * off)
+
+        turning = self._turning
+        hold = self._weight * sin_cos(row[self._pitch])[0] / self._n_wheels  # holds the rover on the slope
+        if not turning.skids:
+            wanted = [speed * math.hypot(1.0 + curvature * z, curvature * x) for x, z in turning.wheels]
+            return wanted, [hold] * self._n_wheels, angles
+        yaw_rate = speed * curvature
+        missing, scrub = yaw_rate - row[self._yaw_rate], min(1.0, max(-1.0, yaw_rate / SCRUB_RATE))
+        wanted = [speed * (1.0 + WIDENING * curvature * z) for _, z in turning.wheels]
+        pushes = zip(turning.yaw_gain, turning.scrub, strict=True)
+        return wanted, [hold + gain * missing + most * scrub for gain, most in pushes], angles
+
+    def _way(self, ahead: float, left: float, speed_now: float) -> tuple[float, float]:
+        """Direction (1 forward, -1 backward) and curvature of the cheapest path."""
+        radius = 1.0 / self.max_curvature
+        best, best_cost = (1.0, 0.0), math.inf
+        for direction in (1.0, -1.0):
+            factor = 1.0 if direction > 0.0 else self.gains.reverse_cost
+            switch = self.gains.switch_cost * max(0.0, -direction * speed_now) / self.gains.speed
+            for side in (1.0, -1.0):
+                length = _turn_and_straight(direction * ahead, side * left, radius)
+                cost = factor * length + switch
+                if cost < best_cost:
+                    best, best_cost = (direction, side), cost
+        direction, side = best
+        if side * left > 0.0 and direction * ahead > 0.0:
+            pursuit = 2.0 * side * left / (ahead * ahead + left * left)
+            return direction, side * min(pursuit, self.max_curvature)
+        return direction, side * self.max_curvature
+
+
+def _turn_and_straight(ahead: float, left: float, radius: float) -> float:
+    """Length of a left turn followed by a straight line to the goal; inf if the goal lies inside the turning circle."""
+    # `reach` is the distance of the goal from the turning centre, which is (0, radius) in (ahead, left).
+    x, y = ahead, left - radius
+    reach = math.hypot(x, y)
+    if reach < radius:
+        return math.inf
+    straight = math.sqrt(reach * reach - radius * radius)
+    # Angle of the goal about the centre, from the start at -90 degrees, minus that of the tangent.
+    turn = (atan2(y, x) + 0.5 * math.pi - atan2(straight, radius)) % math.tau
+    if turn > math.tau - 1e-6:  # a goal straight ahead, within round-off
+        turn = 0.0
+    return radius * turn + straight
+
+
+def driven_rover(env: Any, policy: str) -> RoverEnv:
+    """The `RoverEnv` that a policy of this name drives, whose observations and actions `env` must have unchanged.
+
+    Raises:
+        OptionError: `env` has others: it is another task, or a wrapper changes them.
+    """
+    rover = find_rover_env(env)
+    for what in ("observation", "action"):
+        space = getattr(env, f"single_{what}_space", None) or getattr(env, f"{what}_space", None)
+        own: gym.spaces.Box = getattr(rover, f"{what}_space")
+        if not isinstance(space, gym.spaces.Box) or space.shape != own.shape:
+            given = f"of shape {space.shape}" if isinstance(space, gym.spaces.Box) else f"a {type(space).__name__}"
+        elif not (np.array_equal(space.low, own.low) and np.array_equal(space.high, own.high)):
+            given = "scaled"
+        else:
+            continue
+        refuse(
+            OptionError,
+            "env",
+            env,
+            f"{policy} needs the {what}s of Rover-v0, of shape {own.shape}; here they are {given}. "
+            "Make the policy with env.unwrapped, and drive that",
+        )
+    return rover
+
+
+def find_rover_env(env: Any) -> RoverEnv:
+    """The `RoverEnv` inside wrappers, or the first one inside a vector environment."""
+    inner = getattr(env, "unwrapped", env)
+    within = getattr(inner, "envs", None)
+    if not isinstance(inner, RoverEnv) and isinstance(within, (list, tuple)) and within:
+        inner = getattr(within[0], "unwrapped", within[0])
+    inner = getattr(inner, "prototype", inner)  # a batched vector environment keeps a prototype
+    if not isinstance(inner, RoverEnv):
+        refuse(OptionError, "env", env, "must be a Rover-v0, wrapped or not, or a vector of them")
+    return inner

@@ -1,0 +1,52 @@
+"""Sensors from mappings, as the JSON of an environment's specification has them: `{"LaserScanner": {"rays": 90}}`."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from rover_gym.envs.spec_json import named_object
+from rover_gym.core import OptionError
+from rover_gym.envs.sensors.colour_camera import ColourCamera
+from rover_gym.envs.sensors.depth_camera import DepthCamera, LaserScanner
+from rover_gym.envs.sensors.inertial_unit import InertialUnit
+from rover_gym.envs.sensors.sensor import Mount, Sensor
+from rover_gym.envs.sensors.wheel_encoders import HeadingSensor, MotorSensors, WheelEncoders
+from rover_gym.core.validation import known_keys, mapping, refuse
+
+#: The sensors that a mapping may name.
+SENSORS: Mapping[str, type[Sensor]] = {
+    cls.__name__: cls
+    for cls in (ColourCamera, DepthCamera, HeadingSensor, InertialUnit, LaserScanner, MotorSensors, WheelEncoders)
+}
+
+
+def sensor_of(field: str, value: object) -> Sensor:
+    """The sensor that is given, or that a mapping of its class name to its fields describes.
+
+    Args:
+        field: Name of the argument, for messages.
+        value: A sensor, or such a mapping.
+
+    Raises:
+        OptionError: It is neither, or a field is unknown or out of range.
+    """
+    if isinstance(value, Sensor):
+        return value
+    found = named_object(value)
+    if found is None:
+        refuse(OptionError, field, value, "must be a sensor of rover_gym.envs.sensors, or its class and fields")
+    name, given = found
+    if name not in SENSORS:
+        refuse(OptionError, field, name, f"unknown class of a sensor; known are {', '.join(SENSORS)}")
+    return SENSORS[name](**_arguments(f"{field}.{name}", SENSORS[name], given))
+
+
+def _arguments(field: str, cls: type[Sensor | Mount], value: object) -> dict[str, Any]:
+    """The fields of a mapping, with lists as tuples and mounts as `Mount`."""
+    given = mapping(field, value)
+    known_keys(field, given, [one.name for one in fields(cls)])
+    arguments = {name: tuple(one) if isinstance(one, list) else one for name, one in given.items()}
+    mount = named_object(arguments.get("mount"))
+    if mount is not None and mount[0] == Mount.__name__:
+        arguments["mount"] = Mount(**_arguments(f"{field}.mount.{Mount.__name__}", Mount, mount[1]))
+    return arguments

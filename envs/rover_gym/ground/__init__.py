@@ -1,0 +1,1 @@
+"""What a rover drives on: the parts of a terrain, maps, sand, and beds of grains."""

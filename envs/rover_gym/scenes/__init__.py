@@ -1,0 +1,23 @@
+"""The cheapest simulation that a scene permits: model, ground, time-stepping scheme and step size, each with a reason.
+
+    >>> from rover_gym import Plane
+    >>> from rover_gym.scenes import Scene, plan
+    >>> straight = plan(Scene(Plane(), steered=False, equal_torques=True), accuracy="balanced")
+    >>> straight.kind
+    'planar'
+    >>> rover = straight.rover()
+    >>> rover.set_wheel_torques([15.0] * 6)
+    >>> rover.step(200).is_converged
+    True
+
+A scene states what will never happen in it, and the plan leaves out only what that permits. A command that needs a part
+left out is refused. `docs/economy.md` gives the error and the cost of each economy, and the command that measures them.
+"""
+
+from rover_gym.scenes.economies import Economy, measure_economies
+from rover_gym.scenes.incline import Incline, ball_on_slope
+from rover_gym.scenes.planner import plan
+from rover_gym.scenes.report_scenes import ReportScene, SceneResult, inclined_plane, report_model, sphere_rug
+from rover_gym.scenes.scene_plan import Accuracy, Decision, PlannedRover, Scene, ScenePlan
+
+__all__ = ["Accuracy", "Decision", "Economy", "Incline", "PlannedRover", "ReportScene", "Scene", "ScenePlan", "SceneResult", "ball_on_slope", "inclined_plane", "measure_economies", "plan", "report_model", "sphere_rug"]
