@@ -16,12 +16,12 @@ import typer
 from rich.console import Console
 
 from rover_gym.cli.console import plain_errors, plain_table
-from rover_gym.learn.arc_config import ArcPPOConfig, ImitationConfig
-from rover_gym.learn.arc_learner import ArcVecEnv, imitate, make_model, network_of
 from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
 from rover_gym.drive import ArcNetwork, ArcNetworkPolicy, ScanPolicy
 from rover_gym.drive.evaluation import drive_all
-from rover_gym.core.validation import refuse
+from rover_gym.learn.arc_config import ArcPPOConfig, ImitationConfig
+from rover_gym.learn.arc_learner import ArcVecEnv, imitate, make_model, network_of
 
 #: Parts of the observation that are hidden, by name of the row.
 HIDDEN = {"everything": (), "no clocks": ("clocks",), "no scan": ("scan",), "no command": ("command",)}

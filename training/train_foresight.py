@@ -21,9 +21,9 @@ from rich.progress import Progress, TaskID
 
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
 from rover_gym.cli.options import BUILT_IN, ModelName, named_model
+from rover_gym.drive import FORECAST_FILE, ScanPolicy
 from rover_gym.learn.fit_forecast import ArcOutcomes, fit_forecast, try_arcs
 from rover_gym.learn.provenance import provenance
-from rover_gym.drive import FORECAST_FILE, ScanPolicy
 
 #: What the forecast foretells.
 OUTPUTS = ("way", "stuck", "failed")

@@ -23,9 +23,17 @@ from comparison.peers.ours import OurRunner
 from comparison.scene import Array, RoverScene, steps_in
 from comparison.scenes import flat_drive, parked, rocks, rug
 from rover_gym import PDPolicy
+from rover_gym.core import (
+    BallSimulation,
+    DiskSimulation,
+    Line,
+    Plane,
+    Simulation,
+    SimulationBatch,
+    TwoWheelRoverSimulation,
+    disk_packing,
+)
 from rover_gym.envs.sand_ground import sand_rover
-from rover_gym.core import DiskSimulation, Plane, Simulation, SimulationBatch, disk_packing
-from rover_gym.core import BallSimulation, Line, TwoWheelRoverSimulation
 from rover_gym.ground.sand import SoftGround, named_soil
 
 COMMITTED = Path(__file__).parents[2] / "tests" / "golden" / "bits.json"

@@ -27,9 +27,19 @@ from rich.console import Console
 from torture.joined import _scene as joined_scene
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, TriangleMesh
+from rover_gym.core import (
+    BallSimulation,
+    DiskSimulation,
+    GrainSimulation,
+    Line,
+    MirroredRoverSimulation,
+    RoverGrainSimulation,
+    Sine,
+    TwoWheelRoverSimulation,
+    ball_packing,
+    disk_packing,
+)
 from rover_gym.envs.sand_ground import sand_rover
-from rover_gym.core import DiskSimulation, GrainSimulation, RoverGrainSimulation, ball_packing, disk_packing
-from rover_gym.core import BallSimulation, Line, MirroredRoverSimulation, Sine, TwoWheelRoverSimulation
 from rover_gym.ground.sand import SoftGround, named_soil
 
 Arrays = tuple[npt.NDArray[np.float64], ...]

@@ -23,14 +23,12 @@ from rover_gym import (
     StepError,
     TriangleMesh,
 )
-from rover_gym.record import DiskRun
-from rover_gym.core import DiskSimulation, Snapshot, disk_packing
-from rover_gym.models import RobotFileWarning
-from rover_gym.core import BallSimulation, Sine
+from rover_gym.core import BallSimulation, DiskSimulation, Sine, Snapshot, disk_packing
 from rover_gym.drive import ArcNetworkPolicy, PolicyError, ScanPolicy
 from rover_gym.drive.arc_network_policy import ARCS_FILE
 from rover_gym.drive.network_files import ANYWHERE, FOLDER
-from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
+from rover_gym.models import RobotFileWarning
+from rover_gym.record import DiskRun, Recorder, RecordingError, RoverSampler, describe, read_run
 from rover_gym.record.saved_runs import open_run
 from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import (

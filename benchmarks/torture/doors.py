@@ -15,9 +15,9 @@ import numpy as np
 from rover_gym import RoverModel, Simulation
 from rover_gym.exports import write_fmu
 from rover_gym.exports.fmu import LIBRARIES
+from rover_gym.record.saved_runs import record_run
 from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
 from rover_gym.show.live.live_commands import COMMANDS
-from rover_gym.record.saved_runs import record_run
 from torture.hostile import NUMBERS, TEXTS
 from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import mutate_bytes, mutate_json

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from rover_gym import Simulation, SphereField
-from rover_gym.record import Channel, Recorder, RecordingError, read_trajectory
 from rover_gym.envs.vector import RoverVectorEnv
+from rover_gym.record import Channel, Recorder, RecordingError, read_trajectory
 from torture.ledger import Bounds, Ledger, Regime
 
 Random = np.random.Generator

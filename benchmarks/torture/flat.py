@@ -5,8 +5,19 @@ from typing import Any
 import numpy as np
 
 from rover_gym import StepError
-from rover_gym.core import DiskSimulation, disk_packing
-from rover_gym.core import BallSimulation, Line, MirroredRoverSimulation, PlanarGround, PlanarSimulation, Polyline, Sine, Spline, TwoWheelRoverSimulation
+from rover_gym.core import (
+    BallSimulation,
+    DiskSimulation,
+    Line,
+    MirroredRoverSimulation,
+    PlanarGround,
+    PlanarSimulation,
+    Polyline,
+    Sine,
+    Spline,
+    TwoWheelRoverSimulation,
+    disk_packing,
+)
 from torture.audit import BLOWN_UP, GAIN, Array
 from torture.drives import log_uniform, variant
 from torture.ledger import Bounds, Ledger, Regime

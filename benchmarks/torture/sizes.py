@@ -9,8 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from rover_gym import Plane, RoverEnv, RoverModel, Simulation, SphereField, solve_friction_contact
-from rover_gym.core import DiskSimulation, disk_packing
-from rover_gym.core import BallSimulation, Line, Polyline, Sine
+from rover_gym.core import BallSimulation, DiskSimulation, Line, Polyline, Sine, disk_packing
 from torture.damage import attempt, use
 from torture.ledger import Bounds, Ledger, Regime
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.ground.grains import drum, surface_map
 from rover_gym.core import Drum
+from rover_gym.ground.grains import drum, surface_map
 from validation.balls import DENSITY, DIAMETER, RADIUS, Array, Balls, free
 from validation.watch import Ledger, Watched
 

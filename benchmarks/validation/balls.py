@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import GrainSimulation, arrange_balls
 from rover_gym.ground.grains import even_radii
 from rover_gym.ground.grains.ball_bed import box_walls
-from rover_gym.core import GrainSimulation, arrange_balls
 from validation.watch import GRAVITY, Watched
 
 Array = npt.NDArray[np.float64]

@@ -10,8 +10,8 @@ import gymnasium as gym
 import rover_gym  # noqa: F401 - registers the environments
 from rover_gym import RoverEnv
 from rover_gym.envs import RoverGrainsEnv
-from rover_gym.envs.tasks import RoverArcsEnv, RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.envs.tasks import RoverArcsEnv, RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
 
 #: Environments whose docstring is a card, by name.
 CARDS = {

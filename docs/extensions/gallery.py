@@ -15,12 +15,12 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 import rover_gym
-from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.drive.named_policy import named_policy
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.replay import write_page
 from rover_gym.show.replay.tape import Tape, Watched
-from rover_gym.record.saved_runs import open_run, record_run
 
 #: Width and height of a frame, pixels, and its quality as WebP.
 SIZE, QUALITY = (560, 350), 74

@@ -7,8 +7,8 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
-from rover_gym.show.figures import draw_run
 from rover_gym.record import read_run
+from rover_gym.show.figures import draw_run
 
 HERE = Path(__file__).parent
 WIDTH = 900  # pixels

@@ -13,8 +13,8 @@ import matplotlib.pyplot as plt
 from PIL import Image
 
 import rover_gym
-from rover_gym.show.figures.style import STYLE
 from rover_gym.envs.sensors import ColourCamera, DepthCamera, LaserScanner, Mount
+from rover_gym.show.figures.style import STYLE
 
 PICTURE = Path(__file__).parent / "sensors.png"
 SEED = 4

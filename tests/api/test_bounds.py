@@ -14,8 +14,16 @@ import pytest
 from refusals import refused
 
 from rover_gym import ModelError, RoverModel, SphereField, StepError, TerrainError
-from rover_gym.core import DiskSimulation, disk_packing
-from rover_gym.core import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
+from rover_gym.core import (
+    BallSimulation,
+    DiskSimulation,
+    Line,
+    Polyline,
+    Sine,
+    Spline,
+    TwoWheelRoverSimulation,
+    disk_packing,
+)
 
 
 @contextmanager

@@ -7,8 +7,8 @@ import pytest
 from refusals import refused
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, StateError
-from rover_gym.derivatives import jax_rollout, rollout, torch_rollout
 from rover_gym.core import HeightField, SphereField, Terrain
+from rover_gym.derivatives import jax_rollout, rollout, torch_rollout
 from rover_gym.ground.sand import SoftGround, Soil, named_soil
 
 from .test_derivatives import commands_of, relative, state_of, value_and_gradients

@@ -10,8 +10,8 @@ from machines.test_rollers import platform
 from machines.test_several import cart, on_slope
 
 from rover_gym import Plane, RoverModel, Simulation, StateError
-from rover_gym.derivatives import rollout
 from rover_gym.core import Linearisation
+from rover_gym.derivatives import rollout
 
 from .test_derivatives import best_difference, relative, state_of
 

@@ -16,12 +16,20 @@ from forged import without_checksum
 from refusals import refused
 
 from rover_gym import ModelError, OptionError, RoverModel, StateError
-from rover_gym.ground.grains import BallBed, MovingWindow, SurfaceMap, rover_on_bed, settled_track, surface_map, with_wheel_width
-from rover_gym.ground.grains.grain_surface import Footprint, Parts
 from rover_gym.core import GrainSimulation, Plane, RoverGrainSimulation, Simulation, ball_packing
+from rover_gym.ground.grains import (
+    BallBed,
+    MovingWindow,
+    SurfaceMap,
+    rover_on_bed,
+    settled_track,
+    surface_map,
+    with_wheel_width,
+)
+from rover_gym.ground.grains.grain_surface import Footprint, Parts
 from rover_gym.record import RecordingError, read_frames
-from rover_gym.show.replay.grain_scene import grain_scene
 from rover_gym.record.saved_runs import open_run, record_run
+from rover_gym.show.replay.grain_scene import grain_scene
 
 FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 

@@ -9,8 +9,25 @@ import pytest
 from refusals import refused
 
 from rover_gym import OptionError, Plane, RoverGymError, RoverModel, SphereField
-from rover_gym.ground.grains import BallBed, column, drum, even_radii, lognormal_radii, outflow, penetration_depths, rover_on_bed, run_out, settled_balls, sieved_radii, silo, slopes, striking_sphere, tiled, with_wheel_width
 from rover_gym.core import Drum, GrainSimulation, Silo, Snapshot, arrange_balls, ball_packing
+from rover_gym.ground.grains import (
+    BallBed,
+    column,
+    drum,
+    even_radii,
+    lognormal_radii,
+    outflow,
+    penetration_depths,
+    rover_on_bed,
+    run_out,
+    settled_balls,
+    sieved_radii,
+    silo,
+    slopes,
+    striking_sphere,
+    tiled,
+    with_wheel_width,
+)
 from rover_gym.record.saved_runs import open_run, record_run
 
 G = 9.81

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
+from rover_gym.core import OptionError
 from rover_gym.ground.grains.ball_bed import BallBed, settled_balls
 from rover_gym.ground.grains.lab import (
     PlatePoint,
@@ -24,7 +25,6 @@ from rover_gym.ground.grains.lab import (
     wheel_test,
     write_table,
 )
-from rover_gym.core import OptionError
 
 WHEEL: dict[str, Any] = {"load": 20.0, "run_in": 0.01, "distance": 0.02, "blocks": 2, "speed": 0.1}
 

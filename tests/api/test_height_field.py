@@ -17,8 +17,6 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from rover_gym.envs.arguments import check_terrain
-from rover_gym.ground.maps import read_map
 from rover_gym.core import (
     HeightField,
     OptionError,
@@ -31,6 +29,8 @@ from rover_gym.core import (
     TriangleMesh,
     Union,
 )
+from rover_gym.envs.arguments import check_terrain
+from rover_gym.ground.maps import read_map
 
 #: Corners of a cube and its triangles.
 CUBE = (

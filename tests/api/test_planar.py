@@ -12,14 +12,31 @@ import pytest
 from refusals import refused
 
 from rover_gym import CommandError, ModelError, OptionError, RoverGymError, StateError, TerrainError
+from rover_gym.core import (
+    BallSimulation,
+    DiskSimulation,
+    Line,
+    Polyline,
+    Sine,
+    Snapshot,
+    Spline,
+    TwoWheelRoverSimulation,
+    disk_packing,
+)
+from rover_gym.ground.grains import (
+    DiskBed,
+    Pull,
+    drawbar_pull,
+    drive_on_disks,
+    fit_traction,
+    over_beds,
+    rover_on_disks,
+    settled_disks,
+)
+from rover_gym.record import DiskRun, RecordingError, read_trajectory
+from rover_gym.record.saved_runs import open_run, record_run, saved_run_of
 from rover_gym.show.figures import draw_run
 from rover_gym.show.figures.grain_frames import draw_disks
-from rover_gym.ground.grains import DiskBed, Pull, drawbar_pull, drive_on_disks, fit_traction, over_beds, rover_on_disks, settled_disks
-from rover_gym.record import DiskRun
-from rover_gym.core import DiskSimulation, Snapshot, disk_packing
-from rover_gym.core import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
-from rover_gym.record import RecordingError, read_trajectory
-from rover_gym.record.saved_runs import open_run, record_run, saved_run_of
 
 G = 9.81
 

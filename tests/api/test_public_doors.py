@@ -20,14 +20,13 @@ import pytest
 from torture.hostile import hostile_values
 
 from rover_gym import PDPolicy, Plane, RoverGymError, RoverModel, Simulation
+from rover_gym.core import BallSimulation, DiskSimulation, GrainSimulation, Line, ball_packing, disk_packing
 from rover_gym.core.extras import MissingExtraError
 from rover_gym.ground.grains import settled_balls
 from rover_gym.ground.grains.lab import PlatePoint, ShearLaw, ShearPoint, WheelPoint
-from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover
-from rover_gym.core import DiskSimulation, GrainSimulation, ball_packing, disk_packing
-from rover_gym.core import BallSimulation, Line
 from rover_gym.record import Channel, Recorder, RoverSampler, describe, read_run
 from rover_gym.record.saved_runs import open_run, record_run
+from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover
 
 pytest.importorskip("h5py")
 

@@ -22,8 +22,18 @@ from hypothesis import strategies as st
 from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
-from rover_gym.core import DiskSimulation, Snapshot, disk_packing
-from rover_gym.core import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, Spline, TwoWheelRoverSimulation
+from rover_gym.core import (
+    BallSimulation,
+    DiskSimulation,
+    Line,
+    MirroredRoverSimulation,
+    Polyline,
+    Sine,
+    Snapshot,
+    Spline,
+    TwoWheelRoverSimulation,
+    disk_packing,
+)
 from rover_gym.record import Recorder, RoverSampler, describe, read_run
 
 quick = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -21,10 +21,9 @@ from rover_gym import (
     TerrainError,
     Union,
 )
+from rover_gym.core import MirroredRoverSimulation, SimulationBatch
 from rover_gym.scenes import Scene, ScenePlan, measure_economies, plan
 from rover_gym.scenes.scene_plan import Accuracy
-from rover_gym.core import SimulationBatch
-from rover_gym.core import MirroredRoverSimulation
 
 PARTS = ["ground", "steering", "base", "scheme", "contact solver", "step", "steps", "in a batch"]
 

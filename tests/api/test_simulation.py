@@ -15,8 +15,7 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import BusyError, RoverGymError, Simulation, SphereField
-from rover_gym.core import DiskSimulation, SimulationBatch
-from rover_gym.core import BallSimulation, Line
+from rover_gym.core import BallSimulation, DiskSimulation, Line, SimulationBatch
 
 
 def drive(sim, steps=200):

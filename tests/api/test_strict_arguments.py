@@ -30,8 +30,17 @@ from rover_gym import (
     mechanics,
     solve_friction_contact,
 )
-from rover_gym.core import DiskSimulation, disk_packing
-from rover_gym.core import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, Spline, TwoWheelRoverSimulation
+from rover_gym.core import (
+    BallSimulation,
+    DiskSimulation,
+    Line,
+    MirroredRoverSimulation,
+    Polyline,
+    Sine,
+    Spline,
+    TwoWheelRoverSimulation,
+    disk_packing,
+)
 
 rocks = (0.1, (-5.0, -5.0, 5.0, 5.0), 0)
 

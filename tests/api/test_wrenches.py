@@ -9,8 +9,8 @@ from api.test_derivatives import best_difference
 
 import rover_gym  # noqa: F401 - registers the environments
 from rover_gym import RoverModel, Simulation
-from rover_gym.derivatives import rollout
 from rover_gym.core import CommandError, OptionError
+from rover_gym.derivatives import rollout
 
 
 def parked():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rover_gym.ground.grains import Pit
 from rover_gym.core import OptionError
+from rover_gym.ground.grains import Pit
 
 PIT = Pit(begin=0.0, length=0.8, width=0.6, depth=0.1, bank_deg=45.0, reach=5.0)
 

@@ -21,8 +21,8 @@ from rich.table import Table
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, Terrain
 from rover_gym.record import read_run
-from rover_gym.show.replay import write_page
 from rover_gym.record.saved_runs import open_run, record_run
+from rover_gym.show.replay import write_page
 
 SIZE = 820, 560
 TICKS = os.sysconf("SC_CLK_TCK")

@@ -26,10 +26,10 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from rover_gym.record import GrainRun
+from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.frames.appearance import SAND_COLOUR
 from rover_gym.show.replay import write_page
 from rover_gym.show.replay.charts import LOAD_TIME
-from rover_gym.record.saved_runs import open_run, record_run
 
 # Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card. In
 # units of one addition for each number of the sample, so that the machine and its load count for nothing.

@@ -10,8 +10,8 @@ from browser.test_replay_page import PATIENCE, await_that, frames, messages, pic
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
-from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
 from rover_gym.show.frames.appearance import GROUND_COLOUR
+from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
 
 #: A gamepad of the test's own, as the browser would report one.
 GAMEPAD = """

@@ -20,13 +20,12 @@ from selenium.webdriver.common.by import By
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
 from rover_gym.ground.grains import rover_on_disks, settled_disks
-from rover_gym.record import DiskRun
-from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.record import DiskRun, Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.frames.appearance import GROUND_COLOUR, SKY_COLOUR, TRUNK_COLOUR
 from rover_gym.show.replay import write_page
 from rover_gym.show.replay.charts import LOAD_TIME
 from rover_gym.show.replay.rover_scene import WHEEL_NAMES
-from rover_gym.record.saved_runs import open_run, record_run
 
 R = TypeVar("R")
 

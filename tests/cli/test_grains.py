@@ -11,10 +11,10 @@ from balls import MovingBalls, RoverOnMovingBalls
 from commands import error_of, output_of
 from matplotlib.image import imread
 
+from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.figures.grain_frames import draw_grains
 from rover_gym.show.figures.grain_run_figures import GRAIN_DRAWINGS, slip_of_wheels
 from rover_gym.show.frames.appearance import SAND_COLOUR
-from rover_gym.record.saved_runs import open_run, record_run
 
 ROVER_PLOTTED = pytest.mark.nightly("tests/cli/test_grains.py::test_a_run_is_plotted")
 ROVER_FILMED = pytest.mark.nightly("tests/cli/test_grains.py::test_a_run_is_filmed")

@@ -10,8 +10,8 @@ from typer.testing import CliRunner, Result
 
 from rover_gym import Plane
 from rover_gym.cli import app
-from rover_gym.ground.terrain_parts import heights_of, surfaces_of
 from rover_gym.drive import ScanPolicy
+from rover_gym.ground.terrain_parts import heights_of, surfaces_of
 from rover_gym.record import RoverRun, read_run
 from rover_gym.show.replay.overlays import NO_PLAN, NO_SCAN, sensor_of
 from rover_gym.show.replay.rover_scene import rover_scene

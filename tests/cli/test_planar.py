@@ -14,22 +14,20 @@ from commands import error_of, output_of, rover
 from matplotlib.figure import Figure
 from pages import held
 
+from rover_gym.core import BallSimulation, Line, Polyline, Sine, TwoWheelRoverSimulation
+from rover_gym.record import DiskRun, PlanarRun, RecordingError, read_trajectory
+from rover_gym.record.saved_runs import open_run, record_run
+from rover_gym.scenes.incline import Incline
+from rover_gym.scenes.report_scenes import ball_on_incline, ball_on_sine, published
 from rover_gym.show.figures.chapter_3 import _sine_path, draw_chapter_3
 from rover_gym.show.figures.disk_run_figures import DISK_DRAWINGS
 from rover_gym.show.figures.drawing import KINDS
 from rover_gym.show.figures.incline_figure import fill_incline
 from rover_gym.show.figures.planar_drawing import PLANAR_DRAWINGS, path_over_ground
 from rover_gym.show.figures.style import STYLE
-from rover_gym.record import DiskRun
-from rover_gym.core import BallSimulation, Line, Polyline, Sine, TwoWheelRoverSimulation
-from rover_gym.record import PlanarRun
-from rover_gym.scenes.incline import Incline
-from rover_gym.record import RecordingError, read_trajectory
 from rover_gym.show.replay import write_page
 from rover_gym.show.replay.flat_scene import planar_scene
 from rover_gym.show.replay.page_scene import PageScene
-from rover_gym.scenes.report_scenes import ball_on_incline, ball_on_sine, published
-from rover_gym.record.saved_runs import open_run, record_run
 
 OTHER_BALL = pytest.mark.nightly(
     "tests/cli/test_planar.py::test_a_ball_on_an_incline_slides_and_rolls_as_the_closed_form_says"

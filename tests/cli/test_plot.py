@@ -20,6 +20,9 @@ from matplotlib.figure import Figure
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.core.extras import MissingExtraError
+from rover_gym.drive.evaluation import IntervalEstimate, PolicySummary
+from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.scenes import inclined_plane, sphere_rug
 from rover_gym.show.figures import draw_run
 from rover_gym.show.figures.derived_signals import contact_velocities, motor_work, slip_ratios, smooth
 from rover_gym.show.figures.drawing import KINDS as FIGURES
@@ -28,9 +31,6 @@ from rover_gym.show.figures.policy_figure import fill
 from rover_gym.show.figures.run_figures import DRAWINGS
 from rover_gym.show.figures.style import COLOURS, STYLE, WHEELS, WheelStyle
 from rover_gym.show.figures.wheel_paths import footprints
-from rover_gym.drive.evaluation import IntervalEstimate, PolicySummary
-from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
-from rover_gym.scenes import inclined_plane, sphere_rug
 
 KINDS = ("flat", "rocks", "section_6_1", "rug")
 # "gap, left wheels (mm)"; a pure number has the unit 1.

@@ -16,14 +16,14 @@ from commands import error_of, output_of, rover
 from pages import held
 
 from rover_gym import Plane, RoverModel, SphereField
-from rover_gym.show.figures import draw_run
+from rover_gym.core.rotations import axis_angles, continuous, quaternions
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
 from rover_gym.record.rover_run import moving_mean
+from rover_gym.show.figures import draw_run
 from rover_gym.show.frames.appearance import rover_parts, sphere_mesh
 from rover_gym.show.replay import write_gltf, write_page, write_vrml
 from rover_gym.show.replay.rover_scene import WHEEL_NAMES, facts
 from rover_gym.show.replay.scenery import ground_tiles, identifiers
-from rover_gym.core.rotations import axis_angles, continuous, quaternions
 
 SLOPE = Plane((-0.1, 1.0, 0.05), 0.2)
 FIELD = SphereField([[1.0, 0.1, -0.5], [2.0, 0.0, 0.7]], [0.2, 0.3], SLOPE)

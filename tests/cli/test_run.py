@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.cli import app
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
-from rover_gym.show.replay.rover_scene import rover_curves, rover_scene
+from rover_gym.record.saved_runs import record_run
 from rover_gym.scenes import inclined_plane, sphere_rug
 from rover_gym.scenes.report_scenes import GRAVITY, WHEEL_RADIUS, distance_to_siconos, reference_data
-from rover_gym.record.saved_runs import record_run
+from rover_gym.show.replay.rover_scene import rover_curves, rover_scene
 
 KILLED = """
 import os, signal, sys

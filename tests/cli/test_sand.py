@@ -13,14 +13,14 @@ from typer.testing import CliRunner
 from rover_gym import Plane, RoverModel, Simulation
 from rover_gym.cli import app
 from rover_gym.cli.console import figure, tidy
+from rover_gym.ground.sand import SoftGround, named_soil, with_wide_wheels
+from rover_gym.record import read_run
+from rover_gym.record.saved_runs import record_run
 from rover_gym.show.figures.drawing import drawable
 from rover_gym.show.figures.sand_figure import fill_wheel_on_sand
 from rover_gym.show.figures.style import STYLE
-from rover_gym.record import read_run
 from rover_gym.show.frames.appearance import SAND_GROUND
 from rover_gym.show.replay.rover_scene import rover_curves, rover_scene
-from rover_gym.record.saved_runs import record_run
-from rover_gym.ground.sand import SoftGround, named_soil, with_wide_wheels
 
 RUNNER = CliRunner()
 

@@ -24,8 +24,8 @@ from rover_gym import (
     StateError,
     TerrainError,
 )
-from rover_gym.envs import episode_scene
 from rover_gym.core import EpisodeRun
+from rover_gym.envs import episode_scene
 from rover_gym.envs.vector import RoverVectorEnv
 from rover_gym.envs.vector.sb3 import RoverVecEnv
 

@@ -10,14 +10,21 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from rover_gym import CommandError, OptionError, RoverEnv, RoverModel
-from rover_gym.drive import PlannerOptions, PlannerPolicy
-from rover_gym.drive import ArcNetwork, ArcNetworkPolicy, PolicyError, ScanPolicy, named_policy
-from rover_gym.envs.tasks import RoverArcsEnv, RoverArcsVectorEnv
+from rover_gym.drive import (
+    ArcNetwork,
+    ArcNetworkPolicy,
+    PlannerOptions,
+    PlannerPolicy,
+    PolicyError,
+    ScanPolicy,
+    named_policy,
+)
 from rover_gym.drive.arc_driver import ARCS, N_ARCS, arc_of
 from rover_gym.drive.arc_network import shapes
 from rover_gym.drive.evaluation import drive_all
 from rover_gym.drive.network_files import FOLDER
 from rover_gym.drive.scan_policy import ScanMemory
+from rover_gym.envs.tasks import RoverArcsEnv, RoverArcsVectorEnv
 
 SHIPPED = FOLDER / "anywhere"
 

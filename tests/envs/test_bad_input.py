@@ -31,15 +31,15 @@ from rover_gym import (
     StateError,
     TerrainError,
 )
-from rover_gym.scenes import Scene, plan
+from rover_gym.core.validation import number, span
+from rover_gym.drive import CommandController, CommandLimits, Features, PDGains
 from rover_gym.envs import ARGUMENTS as LIMITS
 from rover_gym.envs.arguments import SOLVER_OPTIONS, Number, NumberOrRange
 from rover_gym.envs.episode_scene import RESET_OPTIONS
 from rover_gym.envs.reward_terms import WEIGHTS
-from rover_gym.drive import CommandController, CommandLimits, Features, PDGains
 from rover_gym.envs.tasks import DriveByCommand, RoverCommandEnv, RoverCommandVectorEnv
-from rover_gym.core.validation import number, span
 from rover_gym.envs.vector import RoverVectorEnv
+from rover_gym.scenes import Scene, plan
 
 NAN, INF = float("nan"), float("inf")
 

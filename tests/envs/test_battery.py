@@ -9,8 +9,7 @@ import pytest
 from refusals import refused
 
 from rover_gym import OptionError, PDPolicy, RoverEnv
-from rover_gym.drive import PlannerOptions, PlannerPolicy
-from rover_gym.drive import drive_all, summarise
+from rover_gym.drive import PlannerOptions, PlannerPolicy, drive_all, summarise
 
 FORWARD = np.array([0.3] * 6 + [0.0] * 6, np.float32)
 

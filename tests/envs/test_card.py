@@ -25,8 +25,8 @@ from rover_gym import HeightField, OptionError, RoverEnv, RoverGymError
 from rover_gym.envs import ARGUMENTS
 from rover_gym.envs.arguments import shortest
 from rover_gym.envs.episode_scene import RESET_OPTIONS
-from rover_gym.envs.reward_terms import WEIGHTS
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.envs.reward_terms import WEIGHTS
 from rover_gym.envs.sensors import HeadingSensor, InertialUnit
 from rover_gym.envs.vector import RoverBatch, RoverVectorEnv
 from rover_gym.envs.vector.sb3 import RoverVecEnv

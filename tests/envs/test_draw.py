@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, Plane, RoverEnv
-from rover_gym.envs.generators import fresh_seed, generator_at, row_of
 from rover_gym.core import (
     EpisodeBatch,
     EpisodeDistribution,
@@ -19,6 +18,7 @@ from rover_gym.core import (
     seed_generators,
     standard_normals,
 )
+from rover_gym.envs.generators import fresh_seed, generator_at, row_of
 from rover_gym.envs.vector import RoverVectorEnv
 
 #: Everything that can be drawn is drawn.

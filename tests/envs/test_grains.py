@@ -10,10 +10,10 @@ import pytest
 from equal_bits import bits
 from gymnasium.utils.env_checker import check_env
 
-from rover_gym.envs import EnvSnapshot, GrainsEnvSnapshot, RoverGrainsEnv
-from rover_gym.ground.grains import Pit
 from rover_gym.core import CommandError, OptionError, StateError
 from rover_gym.drive import PDPolicy
+from rover_gym.envs import EnvSnapshot, GrainsEnvSnapshot, RoverGrainsEnv
+from rover_gym.ground.grains import Pit
 
 #: A small pit just ahead of the wheels, with some 400 large grains.
 SMALL = {

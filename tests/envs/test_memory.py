@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rover_gym.envs.batch import RoverBatch
 from rover_gym.core import EpisodeBatch, OptionError, Plane
+from rover_gym.envs.batch import RoverBatch
 
 #: Bytes that a rover adds to the process, after steps and a second reset of all; the batch is larger than any noise.
 GROWTH = """

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rover_gym import RoverModel
-from rover_gym.ground.grains import Pit
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.ground.grains import Pit
 
 pygame = pytest.importorskip("pygame")
 pytest.importorskip("vtkmodules")

@@ -10,13 +10,21 @@ import pytest
 from refusals import refused
 
 from rover_gym import HeightField, ModelError, OptionError, PDPolicy, Plane, RoverEnv, RoverModel, TerrainError, Union
-from rover_gym.scenes import Scene
-from rover_gym.drive import PlannerPolicy
-from rover_gym.drive.rollouts import Rollouts
-from rover_gym.drive import ArcNetworkPolicy, GuidedPolicy, PolicyError, SandPolicy, ScanPolicy, drive_all, named_policy
+from rover_gym.drive import (
+    ArcNetworkPolicy,
+    GuidedPolicy,
+    PlannerPolicy,
+    PolicyError,
+    SandPolicy,
+    ScanPolicy,
+    drive_all,
+    named_policy,
+)
 from rover_gym.drive.evaluation import run_episode
 from rover_gym.drive.network_files import ANYWHERE, FOLDER
+from rover_gym.drive.rollouts import Rollouts
 from rover_gym.envs.sensors import WheelEncoders
+from rover_gym.scenes import Scene
 
 SEEN = ScanPolicy.arguments()
 POLICIES: dict[str, Callable[[Any], Any]] = {

@@ -6,8 +6,8 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from rover_gym.envs import PushOptions, RandomPushes
 from rover_gym.core import OptionError
+from rover_gym.envs import PushOptions, RandomPushes
 from rover_gym.envs.tasks import CommandVectorEnv, DriveByCommand
 from rover_gym.envs.vector import RandomPushesVector
 

@@ -21,9 +21,10 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import HeightField, OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
-from rover_gym.envs.sand_ground import sand_rover
-from rover_gym.core.extras import MissingExtraError
 from rover_gym.core import ModelError
+from rover_gym.core.extras import MissingExtraError
+from rover_gym.envs.sand_ground import sand_rover
+from rover_gym.ground.sand import SoftGround, named_soil
 from rover_gym.show.frames import FrameRenderer
 from rover_gym.show.frames import appearance as look
 from rover_gym.show.frames.appearance import Part, part_mesh, rover_parts
@@ -31,7 +32,6 @@ from rover_gym.show.frames.frame_renderer import contact_forces
 from rover_gym.show.frames.rut_actor import rut_mesh
 from rover_gym.show.frames.scenery_actors import BallsActor
 from rover_gym.show.replay.page import player_file
-from rover_gym.ground.sand import SoftGround, named_soil
 
 Frame = npt.NDArray[np.uint8]
 

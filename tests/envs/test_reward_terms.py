@@ -12,8 +12,8 @@ from gymnasium.utils.env_checker import data_equivalence
 from refusals import refused
 
 from rover_gym import CommandError, OptionError, RoverEnv
-from rover_gym.envs.reward_terms import WEIGHTS
 from rover_gym.core import EpisodeBatch, EpisodeRules, EpisodeRun, seed_generators
+from rover_gym.envs.reward_terms import WEIGHTS
 from rover_gym.envs.tasks import CommandVectorEnv, DriveByCommand
 from rover_gym.envs.vector import RoverVectorEnv
 from rover_gym.envs.vector.sb3 import RoverVecEnv

@@ -25,12 +25,12 @@ from rover_gym import (
     TriangleMesh,
     Union,
 )
-from rover_gym.envs import HeightScan
-from rover_gym.envs.start import scan_points
-from rover_gym.ground.terrain_parts import heights_of, plane_of, surfaces_of
 from rover_gym.drive import drive_all, summarise
 from rover_gym.drive.evaluation import ENDS
+from rover_gym.envs import HeightScan
+from rover_gym.envs.start import scan_points
 from rover_gym.envs.vector import RoverVectorEnv
+from rover_gym.ground.terrain_parts import heights_of, plane_of, surfaces_of
 
 NAN, INF = float("nan"), float("inf")
 

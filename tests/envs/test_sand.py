@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from rover_gym import RoverEnv, RoverGymError, RoverModel
-from rover_gym.envs.sand_ground import DRAWN_SOILS
-from rover_gym.ground.terrain_parts import plane_of, spheres_of, surfaces_of
 from rover_gym.drive import PDPolicy, SandPolicy, drive_all
-from rover_gym.ground.sand import Soil, named_soil
+from rover_gym.envs.sand_ground import DRAWN_SOILS
 from rover_gym.envs.vector import RoverVectorEnv
+from rover_gym.ground.sand import Soil, named_soil
+from rover_gym.ground.terrain_parts import plane_of, spheres_of, surfaces_of
 
 
 def test_soils_are_drawn_and_the_ground_follows_the_difficulty() -> None:

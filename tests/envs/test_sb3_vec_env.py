@@ -12,9 +12,9 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 
 from rover_gym import OptionError, PDPolicy, RoverEnv
-from rover_gym.learn.command_vec_env import CommandVecEnv
 from rover_gym.drive import CommandController, Features
 from rover_gym.envs.vector.sb3 import RoverVecEnv
+from rover_gym.learn.command_vec_env import CommandVecEnv
 
 LIMIT = 12
 SCENES: list[dict[str, Any]] = [

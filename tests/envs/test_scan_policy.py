@@ -12,13 +12,13 @@ import pytest
 from refusals import refused
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverModel, SphereField, StateError
-from rover_gym.models import open_model
 from rover_gym.drive import FORECAST_FILE, ForesightCosts, Network, PathCosts, PolicyError, ScanGains, ScanPolicy
 from rover_gym.drive.arc_forecast import OUTPUTS, ArcFeatures, ArcForecast, Outcomes, with_speed
 from rover_gym.drive.arc_search import Arcs, RoverOutline
 from rover_gym.drive.evaluation import drive_all
 from rover_gym.drive.named_policy import named_policy
 from rover_gym.drive.scan_policy import TRAPS, ScanMemory
+from rover_gym.models import open_model
 
 ARGUMENTS = ScanPolicy.arguments()
 

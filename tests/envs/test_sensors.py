@@ -14,7 +14,6 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField, StateError
-from rover_gym.show.frames import appearance as look
 from rover_gym.core.rotations import rotation_matrix, rotation_vector
 from rover_gym.envs.sensors import (
     ColourCamera,
@@ -30,6 +29,7 @@ from rover_gym.envs.sensors import (
 )
 from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.envs.vector import SensorVectorObservation
+from rover_gym.show.frames import appearance as look
 
 NOISY: list[Sensor] = [
     WheelEncoders(gain=(0.98, 1.02)),

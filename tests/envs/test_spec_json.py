@@ -21,11 +21,19 @@ from rover_gym import (
     TriangleMesh,
     Union,
 )
-from rover_gym.envs.spec_json import as_json, terrain_from_json
 from rover_gym.core import SoftGround
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.envs.sensors import (
+    ColourCamera,
+    DepthCamera,
+    HeadingSensor,
+    InertialUnit,
+    LaserScanner,
+    Mount,
+    WheelEncoders,
+)
+from rover_gym.envs.spec_json import as_json, terrain_from_json
 from rover_gym.ground.sand import named_soil
-from rover_gym.envs.sensors import ColourCamera, DepthCamera, HeadingSensor, InertialUnit, LaserScanner, Mount, WheelEncoders
 
 HILL = np.outer(np.hanning(40), np.hanning(40))
 HOLE = np.where(HILL > 0.9, np.nan, HILL)

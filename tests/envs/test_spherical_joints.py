@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rover_gym import PDPolicy, RoverModel
-from rover_gym.envs.tasks.command_env import DriveByCommand
 from rover_gym.drive.features import Features
 from rover_gym.drive.scan_policy import ScanPolicy
+from rover_gym.envs.tasks.command_env import DriveByCommand
 
 
 def with_a_bar() -> RoverModel:

@@ -10,13 +10,20 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from refusals import refused
 
 from rover_gym import CommandError, OptionError, PDPolicy, StateError, TerrainError
-from rover_gym.envs import ARGUMENTS
 from rover_gym.drive import CommandController, CommandLimits, ScanPolicy, summarise
-from rover_gym.envs.tasks import DriveByCommand, GoalObservation, RoverCommandEnv, RoverCommandVectorEnv, RoverGoalEnv, RoverTrapEnv
-from rover_gym.envs.tasks import trap_env as trap
 from rover_gym.drive.comparison import other_ends
 from rover_gym.drive.evaluation import drive_each
+from rover_gym.envs import ARGUMENTS
 from rover_gym.envs.sensors import HeadingSensor, InertialUnit
+from rover_gym.envs.tasks import (
+    DriveByCommand,
+    GoalObservation,
+    RoverCommandEnv,
+    RoverCommandVectorEnv,
+    RoverGoalEnv,
+    RoverTrapEnv,
+)
+from rover_gym.envs.tasks import trap_env as trap
 
 
 @pytest.fixture(scope="module")

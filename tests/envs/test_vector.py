@@ -362,9 +362,9 @@ def test_commands_go_on_alike() -> None:
 
 def test_the_vector_of_stable_baselines3_goes_on_alike() -> None:
     pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
-    from rover_gym.learn.command_vec_env import CommandVecEnv  # noqa: PLC0415 - needs the extra
     from rover_gym.drive import CommandController, Features  # noqa: PLC0415
     from rover_gym.envs.vector.sb3 import RoverVecEnv  # noqa: PLC0415
+    from rover_gym.learn.command_vec_env import CommandVecEnv  # noqa: PLC0415 - needs the extra
 
     def made() -> CommandVecEnv:
         rovers = RoverVecEnv(3, **HARD)

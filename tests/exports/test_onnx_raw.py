@@ -16,10 +16,10 @@ import stable_baselines3 as sb3
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
+from rover_gym.drive import PolicyError
 from rover_gym.exports import onnx_policy
 from rover_gym.exports.onnx_raw import raw_network
 from rover_gym.learn.raw_policy import RawPolicy
-from rover_gym.drive import PolicyError
 
 
 class Plain(gym.Env[Any, Any]):

@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from rover_gym.core import CommandError, OptionError
 from rover_gym.exports import McapWriter
+from rover_gym.record import RecordingError, read_run
+from rover_gym.record.steady_file import SteadyFile
 from rover_gym.show.live import (
     Change,
     Drive,
@@ -28,9 +31,6 @@ from rover_gym.show.live import (
 from rover_gym.show.live.live_commands import command_of, read_message
 from rover_gym.show.live.live_loop import HOLD, MOST_WAITING
 from rover_gym.show.live.live_view import HEAD, LiveView
-from rover_gym.core import CommandError, OptionError
-from rover_gym.record import RecordingError, read_run
-from rover_gym.record.steady_file import SteadyFile
 from rover_gym.show.replay import write_vrml
 from rover_gym.show.replay.rover_scene import rover_scene
 

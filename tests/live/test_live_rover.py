@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from rover_gym import HeightField
+from rover_gym.core import OptionError, TerrainError
 from rover_gym.ground.terrain_parts import spheres_of
 from rover_gym.show.live import LiveChoices, LiveRover, LiveScene
 from rover_gym.show.live.live_state import Past
-from rover_gym.core import OptionError, TerrainError
 
 
 def driven(rover: LiveRover, periods: int, forward: float = 1.0, turn: float = 0.0) -> LiveRover:

@@ -14,9 +14,9 @@ from urllib.parse import urlsplit
 import pytest
 from refusals import refused
 
+from rover_gym.core import OptionError
 from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
 from rover_gym.show.live.live_view import FRAME, HEAD, SCENE
-from rover_gym.core import OptionError
 
 client = pytest.importorskip("websockets.sync.client")
 from websockets.exceptions import InvalidStatus  # noqa: E402 - comes with it

@@ -6,12 +6,12 @@ from models.robot_files import rover, write
 from models.test_wheel_groups import four, round_shape
 
 from rover_gym import ModelError, RoverModel, Simulation
+from rover_gym.envs.sensors import LaserScanner, Mount
+from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.models.drawings import MOST_OF_ONE, simplified
 from rover_gym.models.meshes import Mesh
 from rover_gym.show.frames.appearance import TYRE_COLOUR, part_mesh, rover_parts
 from rover_gym.show.replay.scenery import coloured_meshes
-from rover_gym.envs.sensors import LaserScanner, Mount
-from rover_gym.envs.sensors.sensor import Moment
 
 pytest.importorskip("yourdfpy")
 

@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 
 from rover_gym import OptionError
 from rover_gym.cli import app
+from rover_gym.drive import ArcNetwork
 from rover_gym.learn.arc_config import ArcConfig, ArcPPOConfig, read_arc_config
 from rover_gym.learn.arc_learner import ArcVecEnv, leash_at, make_model, network_of
 from rover_gym.learn.arc_recipe import train_arcs
 from rover_gym.learn.arc_rovers import Group, Rovers
 from rover_gym.learn.configuration import find_configuration
-from rover_gym.drive import ArcNetwork
 
 TINY: dict[str, Any] = {
     "scenes": {

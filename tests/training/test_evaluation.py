@@ -10,8 +10,17 @@ import pytest
 from refusals import refused
 
 from rover_gym import OptionError, PDPolicy
+from rover_gym.drive import (
+    EvaluatedEpisode,
+    ScanPolicy,
+    drive_all,
+    mean_estimate,
+    ratio_estimate,
+    run_episode,
+    summarise,
+    wilson_interval,
+)
 from rover_gym.envs.batch import RoverBatch
-from rover_gym.drive import EvaluatedEpisode, ScanPolicy, drive_all, mean_estimate, ratio_estimate, run_episode, summarise, wilson_interval
 
 
 def a_drive(seed: int, end: str, time: float = 1.0, distance: float = 1.0, energy: float = 1.0) -> EvaluatedEpisode:

@@ -11,8 +11,8 @@ from commands import error_of, output_of
 from refusals import refused
 
 from rover_gym import OptionError
-from rover_gym.record import read_run
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.record import read_run
 from rover_gym.show.replay import RecordEpisodes
 
 learners = pytest.importorskip("stable_baselines3", reason="the extra train is not installed")

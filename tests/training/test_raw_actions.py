@@ -13,8 +13,8 @@ import yaml
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
 from rover_gym import OptionError, StateError
-from rover_gym.learn.raw_policy import RawPolicy
 from rover_gym.drive import drive_all
+from rover_gym.learn.raw_policy import RawPolicy
 
 TRAINING = Path(__file__).parents[2] / "training"
 SMALL: dict[str, dict[str, Any]] = {

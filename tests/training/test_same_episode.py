@@ -10,10 +10,10 @@ pytest.importorskip("stable_baselines3", reason="the extra train is not installe
 
 from stable_baselines3.common.vec_env import VecMonitor
 
-from rover_gym.learn.command_vec_env import CommandVecEnv
 from rover_gym.drive import CommandController, CommandLimits, Features
 from rover_gym.envs.tasks import CommandVectorEnv, DriveByCommand
 from rover_gym.envs.vector.sb3 import RoverVecEnv
+from rover_gym.learn.command_vec_env import CommandVecEnv
 
 ROVERS, SEED, LIMIT, REPEAT = 3, 70, 100, 3
 GROUNDS: dict[str, dict[str, Any]] = {

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from rover_gym import RoverModel
+from rover_gym.core import Plane
 from rover_gym.envs.start import wheel_centres
 from rover_gym.learn.varied_rover import VARIED, scaled, varied
-from rover_gym.core import Plane
 from rover_gym.models.lookup import open_model
 
 NAMES = ["rover", "open-rover", "mars-rover", "skid-steered", "four-steered"]

@@ -26,10 +26,10 @@ from ray.cluster_utils import Cluster
 from ray.rllib.env.single_agent_env_runner import SingleAgentEnvRunner
 
 from rover_gym import PDPolicy
-from rover_gym.learn.arc_config import read_arc_config
-from rover_gym.learn.arc_rovers import Rovers
 from rover_gym.drive import drive_all
 from rover_gym.envs.vector import RoverVectorEnv
+from rover_gym.learn.arc_config import read_arc_config
+from rover_gym.learn.arc_rovers import Rovers
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "cluster.md").read_text(encoding="utf-8")

@@ -10,9 +10,9 @@ import torch
 import typer
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-from rover_gym.learn.raw_policy import ALGORITHMS, RawPolicy
 from rover_gym.drive import drive_all, summarise
 from rover_gym.envs.vector.sb3 import RoverVecEnv
+from rover_gym.learn.raw_policy import ALGORITHMS, RawPolicy
 
 TASKS: dict[str, dict[str, Any]] = {
     "plane": {},

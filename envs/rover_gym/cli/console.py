@@ -25,11 +25,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from typer.models import ArgumentInfo
 
-from rover_gym.core.extras import MissingExtraError
 from rover_gym.core import OptionError, RoverGymError, __version__
+from rover_gym.core.extras import MissingExtraError
+from rover_gym.core.validation import refuse
 from rover_gym.models import RobotFileWarning
 from rover_gym.record.steady_file import ENDING
-from rover_gym.core.validation import refuse
 
 P = ParamSpec("P")
 

@@ -21,13 +21,13 @@ from rover_gym.cli.console import (
     status,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.core.files import write_whole
 from rover_gym.core import OptionError
+from rover_gym.core.files import write_whole
 from rover_gym.core.validation import refuse
 
 if TYPE_CHECKING:
-    from rover_gym.ground.grains.disk_trials import Traction
     from rover_gym.core import DiskSimulation
+    from rover_gym.ground.grains.disk_trials import Traction
 
 EARTH = 9.81  # m/s^2
 FRAMES = 25.0  # of the film, a second at EARTH
@@ -122,12 +122,12 @@ def _cross(
     *,
     film: bool,
 ) -> None:
-    from rover_gym.show.figures.grain_frames import draw_disks, film_disks  # noqa: PLC0415 - matplotlib is slow to load
     from rover_gym.ground.grains.disk_bed import (  # noqa: PLC0415
         rover_on_disks,
         settled_disks,
     )
     from rover_gym.record.disk_run import DiskRun  # noqa: PLC0415 - as above
+    from rover_gym.show.figures.grain_frames import draw_disks, film_disks  # noqa: PLC0415 - matplotlib is slow to load
 
     _check_width("disks", disks, layers, CROSSING)
     bed = settled_disks(disks, layers, seed=seed, **options)
@@ -190,7 +190,6 @@ def _sweep(
     options: dict[str, Any],
     output: Path,
 ) -> None:
-    from rover_gym.show.figures.disk_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
     from rover_gym.ground.grains.disk_bed import settled_disks  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.ground.grains.disk_trials import (  # noqa: PLC0415 - as above
         drawbar_pull,
@@ -198,6 +197,7 @@ def _sweep(
         fit_traction,
         over_beds,
     )
+    from rover_gym.show.figures.disk_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
 
     _check_width("disks", disks, layers, CROSSING)
     _check_width("pull_disks", pull_disks, pull_layers, PULLING, UNEQUAL["radius_max"])

@@ -54,15 +54,15 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.core.files import write_whole
 from rover_gym.core import OptionError
+from rover_gym.core.files import write_whole
+from rover_gym.core.validation import number, refuse
 from rover_gym.drive.comparison import EpisodeFilm
 from rover_gym.drive.evaluation import Episode, run_episode, timed
+from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.record.channels import outcome_words
 from rover_gym.show.replay.overlays import SENSORS
 from rover_gym.show.replay.tape import Tape, Watched
-from rover_gym.core.validation import number, refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
 FOLDER = Path("runs/drive")  # of the recordings

@@ -36,12 +36,10 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.envs.arguments import MAX_SLOPE_DEG, terrain_name
-from rover_gym.envs.start import DEFAULT_DIFFICULTY, MAX_DIFFICULTY
-from rover_gym.core.extras import MissingExtraError, require
-from rover_gym.show.figures.policy_figure import draw_policies
-from rover_gym.core.files import write_whole
 from rover_gym.core import OptionError, RoverModel
+from rover_gym.core.extras import MissingExtraError, require
+from rover_gym.core.files import write_whole
+from rover_gym.core.validation import number, refuse
 from rover_gym.drive.comparison import (
     ComparedScene,
     Contender,
@@ -56,7 +54,9 @@ from rover_gym.drive.comparison import (
 )
 from rover_gym.drive.evaluation import EvaluatedEpisode, PolicySummary, drive_all, summarise
 from rover_gym.drive.named_policy import NAMES, NAMES_HELP
-from rover_gym.core.validation import number, refuse
+from rover_gym.envs.arguments import MAX_SLOPE_DEG, terrain_name
+from rover_gym.envs.start import DEFAULT_DIFFICULTY, MAX_DIFFICULTY
+from rover_gym.show.figures.policy_figure import draw_policies
 
 
 @plain_errors

@@ -30,18 +30,18 @@ from rover_gym.cli.options import (
 )
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.cli.usage import WholeHelp
+from rover_gym.core import OptionError
+from rover_gym.core.extras import require
+from rover_gym.core.validation import refuse
+from rover_gym.drive.named_policy import Policy
+from rover_gym.drive.pd_policy import find_rover_env
+from rover_gym.drive.random_policy import RandomPolicy
+from rover_gym.envs.registration import ENVIRONMENTS
 from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_writer import FPS, write_mcap
 from rover_gym.exports.minari_data import write_dataset
 from rover_gym.exports.onnx_policy import write_onnx
-from rover_gym.core.extras import require
-from rover_gym.core import OptionError
-from rover_gym.drive.named_policy import Policy
-from rover_gym.drive.pd_policy import find_rover_env
-from rover_gym.drive.random_policy import RandomPolicy
 from rover_gym.record.rover_run import read_run
-from rover_gym.envs.registration import ENVIRONMENTS
-from rover_gym.core.validation import refuse
 
 export = typer.Typer(
     cls=WholeHelp, rich_markup_mode=None, help="Runs, policies and rovers in other formats.", no_args_is_help=True

@@ -14,8 +14,8 @@ from rover_gym.core import Motor, OptionError, RoverModel
 from rover_gym.core.validation import number, refuse
 
 if TYPE_CHECKING:
-    from rover_gym.record.grain_run import GrainRun
     from rover_gym.core import RoverGrainSimulation
+    from rover_gym.record.grain_run import GrainRun
 
 
 grains = typer.Typer(

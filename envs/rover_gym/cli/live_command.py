@@ -26,10 +26,10 @@ from rover_gym.cli.options import (
     named_model,
 )
 from rover_gym.cli.paths import Into, check_paths
+from rover_gym.core import Terrain
 from rover_gym.core.extras import require
 from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover, LiveScene, LiveServer
 from rover_gym.show.live.live_scene import BY_HAND
-from rover_gym.core import Terrain
 
 FOLDER = Path("runs/live")  # of the recordings
 #: How often the command looks whether the drive still runs, s.

@@ -12,18 +12,18 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from rover_gym.core import HeightField, OptionError, RoverModel, TriangleMesh
+from rover_gym.core.extras import require
+from rover_gym.core.validation import refuse
+from rover_gym.drive.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
+from rover_gym.drive.planner_policy import PlannerPolicy
 from rover_gym.envs.arguments import ARGUMENTS, TERRAINS, terrain_name
 from rover_gym.envs.episode_scene import map_place
-from rover_gym.core.extras import require
+from rover_gym.envs.registration import ENVIRONMENTS as REGISTERED
 from rover_gym.ground.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
-from rover_gym.core import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
 from rover_gym.models.lookup import KINDS
-from rover_gym.drive.planner_policy import PlannerPolicy
-from rover_gym.drive.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
-from rover_gym.envs.registration import ENVIRONMENTS as REGISTERED
 from rover_gym.show.frames.render_options import CAMERAS, check_render_options
-from rover_gym.core.validation import refuse
 
 FilmSize = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the film, pixels, even numbers.")]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rover_gym.core.files import regular_place
 from rover_gym.core import OptionError
+from rover_gym.core.files import regular_place
 from rover_gym.core.validation import refuse
 
 #: Endings of the files in a policy's folder that are read.

@@ -25,9 +25,9 @@ from rover_gym.core import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.scenes.incline import Incline, ball_on_slope
-from rover_gym.record.planar_run import PlanarRun
 from rover_gym.core.validation import number, refuse
+from rover_gym.record.planar_run import PlanarRun
+from rover_gym.scenes.incline import Incline, ball_on_slope
 
 planar = typer.Typer(
     cls=WholeHelp,

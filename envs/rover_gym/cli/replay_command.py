@@ -9,15 +9,15 @@ from rover_gym.cli.console import plain_errors, progress_bar, say_path
 from rover_gym.cli.newest import newest_run, show_in_browser
 from rover_gym.cli.options import OpenIt, complete_recording
 from rover_gym.cli.paths import Into, check_paths
+from rover_gym.core import OptionError
 from rover_gym.core.extras import require
+from rover_gym.core.validation import refuse
 from rover_gym.record.disk_run import DiskRun
 from rover_gym.record.grain_run import GrainRun
-from rover_gym.core import OptionError
 from rover_gym.record.planar_run import PlanarRun
 from rover_gym.record.rover_run import RoverRun, read_run
-from rover_gym.show.replay import write_gltf, write_page, write_vrml
 from rover_gym.record.saved_runs import open_run
-from rover_gym.core.validation import refuse
+from rover_gym.show.replay import write_gltf, write_page, write_vrml
 
 
 @plain_errors

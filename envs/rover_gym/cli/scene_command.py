@@ -24,12 +24,12 @@ from rover_gym.cli.options import (
     named_model,
     warn_of_slope,
 )
+from rover_gym.core import OptionError, Plane, RoverModel, SphereField, Terrain
+from rover_gym.core.validation import number, refuse
+from rover_gym.scenes import sphere_rug
 from rover_gym.scenes.economies import Economy, measure_economies
 from rover_gym.scenes.planner import plan
 from rover_gym.scenes.scene_plan import Accuracy, Scene, ScenePlan
-from rover_gym.core import OptionError, Plane, RoverModel, SphereField, Terrain
-from rover_gym.scenes import sphere_rug
-from rover_gym.core.validation import number, refuse
 
 #: Radius of the ground without rocks around the start, beyond the rover itself, m.
 CLEARING = 3.0

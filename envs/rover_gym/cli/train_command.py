@@ -16,13 +16,13 @@ from typer.core import TyperCommand
 from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table
 from rover_gym.cli.options import RayAddress
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.core.extras import require
 from rover_gym.core import OptionError
+from rover_gym.core.extras import require
+from rover_gym.core.validation import refuse
 from rover_gym.drive.arc_network import ArcNetwork
 from rover_gym.drive.arc_network_policy import ARCS_FILE
 from rover_gym.drive.named_policy import network_folder
 from rover_gym.drive.network_files import PolicyError
-from rover_gym.core.validation import refuse
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
 

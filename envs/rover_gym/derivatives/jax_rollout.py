@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.derivatives.rollout import rollout, state_size
-from rover_gym.core.extras import require
 from rover_gym.core import Simulation
+from rover_gym.core.extras import require
+from rover_gym.derivatives.rollout import rollout, state_size
 
 
 def jax_rollout(simulation: Simulation, threads: int | None = None) -> Any:

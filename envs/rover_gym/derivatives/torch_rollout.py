@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from rover_gym.derivatives.rollout import rollout
-from rover_gym.core.extras import require
 from rover_gym.core import Simulation
+from rover_gym.core.extras import require
+from rover_gym.derivatives.rollout import rollout
 
 
 def torch_rollout(simulation: Simulation, threads: int | None = None) -> Any:

@@ -12,14 +12,14 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.observation import Array, Mask, Observations
-from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.core import CommandError, OptionError, sin_cos
+from rover_gym.core.validation import array, refuse
 from rover_gym.drive.command import N_COMMANDS, CommandController
 from rover_gym.drive.features import ground_slope
 from rover_gym.drive.rover_view import LARGEST, N_FEATURES, RoverView
 from rover_gym.drive.scan_policy import SCAN, ScanMemory, ScanPolicy, scan_grid
-from rover_gym.core.validation import array, refuse
+from rover_gym.envs.observation import Array, Mask, Observations
+from rover_gym.envs.rover_env import RoverEnv
 
 #: Direction, curvature and sideways motion of the arcs, over their limits: those of a rover that steers all wheels.
 ARCS: Array = np.array(

@@ -16,12 +16,12 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.core.validation import number, refuse
 from rover_gym.drive.arc_search import Arcs, ArcSearch
 from rover_gym.drive.command import N_COMMANDS
 from rover_gym.drive.network_files import Network, PolicyError
 from rover_gym.drive.rover_view import GOAL, N_FEATURES, PLACES, Planner, RoverView
-from rover_gym.core.validation import number, refuse
+from rover_gym.envs.rover_env import RoverEnv
 
 Array = npt.NDArray[np.float64]
 

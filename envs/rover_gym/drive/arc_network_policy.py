@@ -7,13 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import StateError
+from rover_gym.core.validation import array, refuse
 from rover_gym.drive.arc_driver import ArcDriver
 from rover_gym.drive.arc_network import ArcNetwork
 from rover_gym.drive.features import check_observed
 from rover_gym.drive.network_files import PolicyError, is_there
 from rover_gym.drive.pd_policy import driven_rover
 from rover_gym.drive.scan_policy import ScanMemory, ScanPolicy
-from rover_gym.core.validation import array, refuse
 
 #: The file of a network in its folder.
 ARCS_FILE = "arcs.npz"

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.start import HeightScan, wheel_centres
 from rover_gym.core import OptionError, PathSearch, Plane, RoverModel, atan2, sin_cos
 from rover_gym.core.polytopes import box_around
 from rover_gym.core.validation import number, refuse
+from rover_gym.envs.start import HeightScan, wheel_centres
 
 Array = npt.NDArray[np.float64]
 

@@ -21,11 +21,11 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.core import OptionError, atan2, sin_cos
+from rover_gym.core.validation import number, refuse
 from rover_gym.drive.pd_policy import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.drive.regulator import WheelRegulator
-from rover_gym.core.validation import number, refuse
+from rover_gym.envs.rover_env import RoverEnv
 
 Array = npt.NDArray[np.float64]
 

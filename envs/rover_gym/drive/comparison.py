@@ -13,10 +13,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
 from rover_gym.core.files import write_whole
-from rover_gym.models.lookup import ModelLike
 from rover_gym.drive.arc_forecast import FORECAST_FILE
 from rover_gym.drive.arc_network_policy import ARCS_FILE
 from rover_gym.drive.evaluation import (
@@ -31,6 +28,9 @@ from rover_gym.drive.evaluation import (
     timed,
 )
 from rover_gym.drive.named_policy import NAMES, Policy, named_policy, network_folder
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
+from rover_gym.models.lookup import ModelLike
 from rover_gym.record.channels import outcome_words
 from rover_gym.show.frames.caption import captioned
 from rover_gym.show.frames.render_options import VideoWriter

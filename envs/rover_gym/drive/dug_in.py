@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core.validation import number
 from rover_gym.drive.named_policy import Policy
 from rover_gym.drive.pd_policy import driven_rover
-from rover_gym.core.validation import number
 
 
 class DugIn:

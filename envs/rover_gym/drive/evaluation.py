@@ -12,12 +12,12 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import number, refuse, whole
+from rover_gym.drive.named_policy import Policy, named_policy
 from rover_gym.envs.batch import RoverBatch
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
-from rover_gym.core import OptionError
-from rover_gym.drive.named_policy import Policy, named_policy
-from rover_gym.core.validation import number, refuse, whole
 
 #: Ends of an episode that tables count even where there was none.
 ENDS = ("goal", "time", "high_centred", "roll_over", "left_field", "step_failed")

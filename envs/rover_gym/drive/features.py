@@ -12,10 +12,10 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.observation import ObservationLayout
-from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.core import OptionError, StateError, exp, sin_cos
 from rover_gym.core.validation import refuse, whole
+from rover_gym.envs.observation import ObservationLayout
+from rover_gym.envs.rover_env import RoverEnv
 
 # Features are clipped to this magnitude; larger values come from impacts and free wheels.
 LARGEST_FEATURE = 5.0

@@ -13,14 +13,14 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.extras import require
-from rover_gym.ground.terrain_parts import heights_of
-from rover_gym.ground.maps.ground_lookup import TerrainLike, as_terrain
 from rover_gym.core import OptionError, RoverModel
+from rover_gym.core.extras import require
+from rover_gym.core.validation import number, refuse, vector
+from rover_gym.drive.arc_search import ways_by_price
+from rover_gym.ground.maps.ground_lookup import TerrainLike, as_terrain
+from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.models.statics import Statics, check_statics
-from rover_gym.drive.arc_search import ways_by_price
-from rover_gym.core.validation import number, refuse, vector
 
 Array = npt.NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.start import HeightScan, Point, scan_points
 from rover_gym.core import exp, sin_cos
-from rover_gym.drive.arc_search import ArcSearch
 from rover_gym.core.validation import number, whole
+from rover_gym.drive.arc_search import ArcSearch
+from rover_gym.envs.start import HeightScan, Point, scan_points
 
 Array = npt.NDArray[np.float64]
 Cells = npt.NDArray[np.float32]

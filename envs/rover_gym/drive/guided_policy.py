@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core.validation import number
 from rover_gym.drive.arc_driver import ARCS, arc_of
 from rover_gym.drive.arc_network import ArcNetwork
 from rover_gym.drive.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
@@ -12,7 +13,6 @@ from rover_gym.drive.features import ground_slope
 from rover_gym.drive.network_files import ANYWHERE, FOLDER
 from rover_gym.drive.pd_policy import find_rover_env
 from rover_gym.drive.scan_policy import ScanPolicy
-from rover_gym.core.validation import number
 
 #: Cost of an arc, over the rover's reach, by which the network finds it e times less probable.
 WEIGHT = 0.1

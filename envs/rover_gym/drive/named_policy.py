@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.models.lookup import ModelLike
+from rover_gym.core.validation import refuse
 from rover_gym.drive.arc_forecast import FORECAST_FILE
 from rover_gym.drive.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
 from rover_gym.drive.guided_policy import GuidedPolicy
@@ -18,7 +18,7 @@ from rover_gym.drive.network_files import ANYWHERE, FOLDER, PolicyError, is_ther
 from rover_gym.drive.pd_policy import PDPolicy
 from rover_gym.drive.sand_policy import SandPolicy
 from rover_gym.drive.scan_policy import ScanPolicy
-from rover_gym.core.validation import refuse
+from rover_gym.models.lookup import ModelLike
 
 #: Help text of the command line about the names.
 NAMES_HELP = (

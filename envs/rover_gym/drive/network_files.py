@@ -13,10 +13,10 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.files import written_whole
 from rover_gym.core import OptionError, RoverGymError
-from rover_gym.drive.features import LARGEST_FEATURE
+from rover_gym.core.files import written_whole
 from rover_gym.core.validation import refuse
+from rover_gym.drive.features import LARGEST_FEATURE
 
 
 class PolicyError(OptionError):

@@ -24,12 +24,12 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.start import Steering, wheel_centres
 from rover_gym.core import OptionError, RoverModel, StateError, atan2, sin_cos
+from rover_gym.core.validation import array, number, refuse
 from rover_gym.drive.features import check_observed
 from rover_gym.drive.regulator import Regulator, WheelRegulator
-from rover_gym.core.validation import array, number, refuse
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.start import Steering, wheel_centres
 
 #: Commanded curvature of a skidding rover relative to that of the path.
 WIDENING = 1.5

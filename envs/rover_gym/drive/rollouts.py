@@ -6,10 +6,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.core import EpisodeBatch, EpisodeRules, EpisodeRun, Simulation, Terrain
-from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.core.validation import number, whole
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.models.lookup import ModelLike, as_model
 
 Array = npt.NDArray[np.float64]
 

@@ -27,12 +27,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.start import drive_signs
 from rover_gym.core import OptionError, StateError, atan2, sin_cos
+from rover_gym.core.validation import array, number, refuse
 from rover_gym.drive.features import check_observed
 from rover_gym.drive.pd_policy import PDGains, PDPolicy, driven_rover
-from rover_gym.core.validation import array, number, refuse
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.start import drive_signs
 
 Array = npt.NDArray[np.float64]
 

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.start import HeightScan, wheel_centres
 from rover_gym.core import OptionError, RoverModel, StateError, exp, sin_cos
-from rover_gym.models.lookup import ModelLike, as_model
+from rover_gym.core.validation import array, number, refuse
 from rover_gym.drive.arc_forecast import FORECAST_FILE, USUAL_WAY, ArcFeatures, ArcForecast, ForesightCosts
 from rover_gym.drive.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline, SearchTask
 from rover_gym.drive.command import N_COMMANDS, CommandController, CommandLimits
@@ -19,7 +17,9 @@ from rover_gym.drive.features import check_observed, ground_slope
 from rover_gym.drive.ground_map import GroundMap, MapOptions
 from rover_gym.drive.network_files import FOLDER, FORECAST, Network, PolicyError, is_there
 from rover_gym.drive.pd_policy import Turning, driven_rover
-from rover_gym.core.validation import array, number, refuse
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.start import HeightScan, wheel_centres
+from rover_gym.models.lookup import ModelLike, as_model
 
 Array = npt.NDArray[np.float64]
 

@@ -15,16 +15,16 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
+from rover_gym.core import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
+from rover_gym.core.validation import Range, flag, known_keys, mapping, number, refuse, span, vector, whole
 from rover_gym.envs.observation import info_table, observation_table
 from rover_gym.envs.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_reward_terms
 from rover_gym.envs.spec_json import model_from_json, soil_from_json, terrain_from_json
 from rover_gym.envs.start import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.ground.maps.map_files import is_terrain_file, open_terrain
-from rover_gym.core import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
+from rover_gym.ground.sand.soils import Soil, named_soil
 from rover_gym.models.lookup import as_model
 from rover_gym.show.frames.render_options import check_render_mode, check_render_options
-from rover_gym.ground.sand.soils import Soil, named_soil
-from rover_gym.core.validation import Range, flag, known_keys, mapping, number, refuse, span, vector, whole
 
 TERRAINS = ("plane", "rocks", "hills", "sand")
 

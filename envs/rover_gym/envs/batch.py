@@ -15,6 +15,22 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from rover_gym.core import (
+    CommandError,
+    DrawnEpisodes,
+    EpisodeBatch,
+    EpisodeRun,
+    GrainSimulation,
+    OptionError,
+    Plane,
+    RoverGrainSimulation,
+    RoverGymError,
+    Simulation,
+    StateError,
+    TerrainError,
+    seed_generators,
+)
+from rover_gym.core.validation import Range, refuse, whole
 from rover_gym.envs.arguments import RoverArguments, check_arguments, takes_arguments
 from rover_gym.envs.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
 from rover_gym.envs.episode_scene import (
@@ -39,23 +55,7 @@ from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.reward_terms import earn, total
 from rover_gym.envs.task import Task, check_actions, make_task
 from rover_gym.ground.terrain_parts import bounds_of, surfaces_of
-from rover_gym.core import (
-    CommandError,
-    DrawnEpisodes,
-    EpisodeBatch,
-    EpisodeRun,
-    GrainSimulation,
-    OptionError,
-    Plane,
-    RoverGrainSimulation,
-    RoverGymError,
-    Simulation,
-    StateError,
-    TerrainError,
-    seed_generators,
-)
 from rover_gym.show.frames.render_options import RenderOptions
-from rover_gym.core.validation import Range, refuse, whole
 
 #: Termination of an episode whose physics could not take a step.
 STEP_FAILED = "step_failed"

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.envs.episode_scene import EpisodeScene
-from rover_gym.envs.task import Task
 from rover_gym.core import EpisodeRun, RoverGymError, Snapshot, StateError
 from rover_gym.core.validation import Range, refuse
+from rover_gym.envs.episode_scene import EpisodeScene
+from rover_gym.envs.task import Task
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.envs.arguments import MAX_SLOPE_DEG
-from rover_gym.envs.generators import Rows
-from rover_gym.envs.observation import Array
-from rover_gym.envs.start import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Domain, Rocks, Start
-from rover_gym.envs.task import Task
-from rover_gym.ground.terrain_parts import plane_of
 from rover_gym.core import (
     DrawnEpisodes,
     EpisodeBatch,
@@ -26,6 +20,12 @@ from rover_gym.core import (
     Terrain,
 )
 from rover_gym.core.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
+from rover_gym.envs.arguments import MAX_SLOPE_DEG
+from rover_gym.envs.generators import Rows
+from rover_gym.envs.observation import Array
+from rover_gym.envs.start import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Domain, Rocks, Start
+from rover_gym.envs.task import Task
+from rover_gym.ground.terrain_parts import plane_of
 
 RESET_OPTIONS = (
     "difficulty",

@@ -10,12 +10,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.arguments import RoverArguments
-from rover_gym.envs.batch import Restored, RoverBatch
-from rover_gym.envs.env_snapshot import EnvSnapshot
-from rover_gym.envs.episode_scene import EpisodeScene, ResetOptions
-from rover_gym.envs.generators import Rows, generator_at, row_of
-from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.core import (
     DrawnEpisodes,
     EpisodeBatch,
@@ -28,6 +22,12 @@ from rover_gym.core import (
     StateError,
 )
 from rover_gym.core.validation import Range, flag, number, refuse, span, whole
+from rover_gym.envs.arguments import RoverArguments
+from rover_gym.envs.batch import Restored, RoverBatch
+from rover_gym.envs.env_snapshot import EnvSnapshot
+from rover_gym.envs.episode_scene import EpisodeScene, ResetOptions
+from rover_gym.envs.generators import Rows, generator_at, row_of
+from rover_gym.envs.rover_env import RoverEnv
 
 if TYPE_CHECKING:
     from rover_gym.ground.grains.pit import Pit, PitFill

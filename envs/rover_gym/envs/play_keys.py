@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.start import wheel_centres
 from rover_gym.core import atan2
+from rover_gym.envs.start import wheel_centres
 
 if TYPE_CHECKING:
     from rover_gym.envs.task import Task

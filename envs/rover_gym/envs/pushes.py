@@ -9,12 +9,12 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import Range, refuse, span, vector
 from rover_gym.envs.batch import NOT_BEGUN
 from rover_gym.envs.generators import Rows, row_of
 from rover_gym.envs.observation import Array, Observations
 from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.core import OptionError
-from rover_gym.core.validation import Range, refuse, span, vector
 
 #: Makes the pushes' random numbers differ from all others that follow from the same generator.
 SALT = 0x70757368

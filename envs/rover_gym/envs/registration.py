@@ -54,7 +54,9 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverArcs-v0": _task("arcs", MAX_ARCS, {"terrain": "rocks"}),
     "RoverGoal-v0": _task("goal", MAX_COMMANDS, {}),
     "RoverTrap-v0": _task("trap", MAX_TRAP_STEPS, {}),
-    "RoverGrains-v0": Registration("rover_gym.envs.sensors:make_grains_rover", "rover_gym.envs.vector:make_grains_vector"),
+    "RoverGrains-v0": Registration(
+        "rover_gym.envs.sensors:make_grains_rover", "rover_gym.envs.vector:make_grains_vector"
+    ),
 }
 
 

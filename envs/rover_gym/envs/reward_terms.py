@@ -25,9 +25,9 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.observation import Array, Mask, ObservationLayout, Observations
 from rover_gym.core import OptionError
 from rover_gym.core.validation import refuse, shown
+from rover_gym.envs.observation import Array, Mask, ObservationLayout, Observations
 
 Fields: TypeAlias = dict[str, Array]
 

@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.envs.registration import EnvSpec
 
+from rover_gym.core import CommandError, EpisodeRun, RoverGrainSimulation, RoverModel, Simulation
+from rover_gym.core.validation import Range
 from rover_gym.envs.arguments import RoverArguments, takes_arguments, with_tables
 from rover_gym.envs.batch import RoverBatch
 from rover_gym.envs.env_snapshot import EnvSnapshot
@@ -20,10 +22,8 @@ from rover_gym.envs.sand_ground import soil_of
 from rover_gym.envs.spec_json import RoverSpec, rover_spec
 from rover_gym.envs.start import Domain, Rocks, Start
 from rover_gym.envs.task import Task, check_actions
-from rover_gym.core import CommandError, EpisodeRun, RoverGrainSimulation, RoverModel, Simulation
-from rover_gym.show.frames.render_options import RENDER_MODES
 from rover_gym.ground.sand.soils import Soil
-from rover_gym.core.validation import Range
+from rover_gym.show.frames.render_options import RENDER_MODES
 
 if TYPE_CHECKING:
     from rover_gym.show.frames import FrameRenderer

@@ -1,9 +1,9 @@
 """The sand of episodes: soils to draw from, and a rover that they carry."""
 
-from rover_gym.ground.terrain_parts import sand_of
 from rover_gym.core import ModelError, OptionError, RoverModel, Terrain
-from rover_gym.ground.sand.soils import Soil, named_soil
 from rover_gym.core.validation import refuse
+from rover_gym.ground.sand.soils import Soil, named_soil
+from rover_gym.ground.terrain_parts import sand_of
 
 #: Soils that an episode's sand is drawn from unless they are given: dry sands and simulants in the law that was
 #: measured, from loose to dense.

@@ -33,8 +33,8 @@ from rover_gym.core import (
     TriangleMesh,
     Union,
 )
-from rover_gym.ground.sand.soils import Soil
 from rover_gym.core.validation import known_keys, mapping, refuse
+from rover_gym.ground.sand.soils import Soil
 
 #: Longest array that is written as a list.
 LISTED = 100

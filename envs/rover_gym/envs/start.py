@@ -22,9 +22,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.terrain_parts import plane_of
 from rover_gym.core import OptionError, Plane, RoverModel, SphereField, Terrain, TerrainError, atan2, sin_cos
 from rover_gym.core.validation import number, refuse, vector
+from rover_gym.ground.terrain_parts import plane_of
 
 Point: TypeAlias = tuple[float, float]
 

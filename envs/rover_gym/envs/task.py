@@ -8,17 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.observation import ObservationLayout
-from rover_gym.envs.reward_terms import WEIGHTS, RewardTerms
-from rover_gym.envs.sand_ground import check_wheels_for_sand, sand_rover, soils_of
-from rover_gym.envs.start import (
-    DEFAULT_DIFFICULTY,
-    FIELD_MARGINS,
-    MAX_GOAL_DISTANCE,
-    Domain,
-    Steering,
-    slope_of,
-)
 from rover_gym.core import (
     CommandError,
     EpisodeDistribution,
@@ -31,8 +20,19 @@ from rover_gym.core import (
     Terrain,
     sin_cos,
 )
-from rover_gym.ground.sand.soils import Soil
 from rover_gym.core.validation import Range, array, number, refuse, span
+from rover_gym.envs.observation import ObservationLayout
+from rover_gym.envs.reward_terms import WEIGHTS, RewardTerms
+from rover_gym.envs.sand_ground import check_wheels_for_sand, sand_rover, soils_of
+from rover_gym.envs.start import (
+    DEFAULT_DIFFICULTY,
+    FIELD_MARGINS,
+    MAX_GOAL_DISTANCE,
+    Domain,
+    Steering,
+    slope_of,
+)
+from rover_gym.ground.sand.soils import Soil
 
 #: Most physics steps per control period.
 MAX_SUBSTEPS = 10_000

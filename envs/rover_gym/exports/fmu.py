@@ -14,8 +14,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from rover_gym.exports.axes import AXES, Axes, pitch_sign, vector_components
-from rover_gym.core.files import check_xml, written_whole
 from rover_gym.core import (
     HeightField,
     OptionError,
@@ -28,13 +26,15 @@ from rover_gym.core import (
     Union,
     __version__,
 )
+from rover_gym.core.files import check_xml, written_whole
 from rover_gym.core.validation import checked, refuse
+from rover_gym.exports.axes import AXES, Axes, pitch_sign, vector_components
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from rover_gym.exports.axes import Axes
     from rover_gym.core import Simulation
+    from rover_gym.exports.axes import Axes
 
 
 #: Exponents of the base units.

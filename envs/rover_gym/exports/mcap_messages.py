@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.core.extras import MissingExtraError, require
-from rover_gym.record.channels import RecordingError, file_path
-from rover_gym.record.steady_file import FileInUseError, SteadyFile
 from rover_gym.core.rotations import quaternions
 from rover_gym.core.validation import refuse
+from rover_gym.exports.axes import MAP_FROM_WORLD
+from rover_gym.record.channels import RecordingError, file_path
+from rover_gym.record.steady_file import FileInUseError, SteadyFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

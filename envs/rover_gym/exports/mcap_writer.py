@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import RoverModel, Simulation, Terrain
+from rover_gym.core.extras import require
+from rover_gym.core.validation import TERRAINS, array, checked, number, refuse, vector
 from rover_gym.exports import mcap_messages as messages
 from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.exports.mcap_messages import McapFile
-from rover_gym.core.extras import require
-from rover_gym.core import RoverModel, Simulation, Terrain
 from rover_gym.record.channels import RecordingError, RoverSampler, storable, versions
 from rover_gym.record.rover_run import RoverRun, film_rows
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.show.frames.appearance import ROCK_COLOUR
 from rover_gym.show.replay import scenery
 from rover_gym.show.replay.overlays import SENSORS, hits, sensor_of
-from rover_gym.core.validation import TERRAINS, array, checked, number, refuse, vector
 
 if TYPE_CHECKING:
     from types import TracebackType

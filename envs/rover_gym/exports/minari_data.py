@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 import numpy as np
 
-from rover_gym.core.extras import require
 from rover_gym.core import OptionError, __version__
-from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.core.extras import require
 from rover_gym.core.validation import checked, refuse, whole
+from rover_gym.envs.registration import ENVIRONMENTS
 
 if TYPE_CHECKING:
     from rover_gym.drive.named_policy import Policy

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.extras import require
 from rover_gym.core import __version__
+from rover_gym.core.extras import require
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

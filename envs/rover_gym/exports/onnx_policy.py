@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.exports.onnx_arcs import arcs_model
-from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 from rover_gym.core.extras import MissingExtraError, require
 from rover_gym.core.files import write_whole
+from rover_gym.core.validation import checked, refuse
 from rover_gym.drive.arc_forecast import FORECAST_FILE, OUTPUTS
 from rover_gym.drive.arc_network import ArcNetwork
 from rover_gym.drive.arc_network_policy import ARCS_FILE
 from rover_gym.drive.features import LARGEST_FEATURE
 from rover_gym.drive.network_files import ANYWHERE, FOLDER, FORECAST, Network, PolicyError, is_there
-from rover_gym.core.validation import checked, refuse
+from rover_gym.exports.onnx_arcs import arcs_model
+from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 
 #: The file that identifies a run of `RawPolicy.save`.
 RAW_FILE = "model.zip"

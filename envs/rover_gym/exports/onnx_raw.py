@@ -9,10 +9,10 @@ import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.sac.policies import SACPolicy
 
+from rover_gym.core.validation import refuse
+from rover_gym.drive.network_files import PolicyError
 from rover_gym.exports.onnx_graph import Array, Perceptron
 from rover_gym.learn.raw_policy import RawPolicy
-from rover_gym.drive.network_files import PolicyError
-from rover_gym.core.validation import refuse
 
 #: Activations by their module, with the attributes that stable-baselines3 leaves as they are.
 ACTIVATIONS = {torch.nn.Tanh: "Tanh", torch.nn.ReLU: "Relu", torch.nn.ELU: "Elu", torch.nn.LeakyReLU: "LeakyRelu"}

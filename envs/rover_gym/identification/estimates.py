@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.identification.fitting import EXACT, Solution, Window, WindowFit, is_identifiable
-from rover_gym.identification.parameters import Parameter
 from rover_gym.core import OptionError
 from rover_gym.core.validation import refuse
+from rover_gym.identification.fitting import EXACT, Solution, Window, WindowFit, is_identifiable
+from rover_gym.identification.parameters import Parameter
 
 Array = npt.NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.identification.parameters import Parameter, Setup
 from rover_gym.core import OptionError, Simulation, SimulationBatch
-from rover_gym.record.rover_run import RoverRun
 from rover_gym.core.validation import number, refuse
+from rover_gym.identification.parameters import Parameter, Setup
+from rover_gym.record.rover_run import RoverRun
 
 Array = npt.NDArray[np.float64]
 

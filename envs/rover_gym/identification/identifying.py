@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import OptionError, RoverModel
+from rover_gym.core.validation import number, refuse, whole
 from rover_gym.identification.estimates import (
     FROM_MEDIAN,
     Estimate,
@@ -19,11 +21,9 @@ from rover_gym.identification.estimates import (
 )
 from rover_gym.identification.fitting import SMALLEST_CHANGE, Solution, Window, WindowFit, cut
 from rover_gym.identification.parameters import Parameter, Setup, chosen_parameters
-from rover_gym.core import OptionError, RoverModel
 from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.record.channels import RoverSampler
 from rover_gym.record.rover_run import RoverRun, read_run
-from rover_gym.core.validation import number, refuse, whole
 
 Array = npt.NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import yaml
 
-from rover_gym.envs.arguments import ARGUMENTS
-from rover_gym.learn.configuration import build, plain
 from rover_gym.core import OptionError
 from rover_gym.core.validation import known_keys, mapping, number, refuse, regular_file
+from rover_gym.envs.arguments import ARGUMENTS
+from rover_gym.learn.configuration import build, plain
 
 #: Teachers: the planner alone, or with a learned forecast.
 TEACHERS = ("scan", "foresight")

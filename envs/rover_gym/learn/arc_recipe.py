@@ -23,6 +23,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from torch.utils.tensorboard import SummaryWriter
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
+from rover_gym.drive.arc_network import ArcNetwork
+from rover_gym.drive.arc_network_policy import ARCS_FILE
+from rover_gym.drive.evaluation import summarise
 from rover_gym.learn.arc_config import ArcConfig, ArcPPOConfig, read_arc_config
 from rover_gym.learn.arc_learner import (
     ArcVecEnv,
@@ -36,11 +41,6 @@ from rover_gym.learn.arc_learner import (
 from rover_gym.learn.arc_rovers import Labels, Rovers
 from rover_gym.learn.cluster import ClusterRovers
 from rover_gym.learn.provenance import provenance
-from rover_gym.core import OptionError
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.arc_network_policy import ARCS_FILE
-from rover_gym.drive.evaluation import summarise
-from rover_gym.core.validation import refuse
 
 Say = Callable[[str], None]
 

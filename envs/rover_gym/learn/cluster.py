@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from rover_gym.core.extras import require
-from rover_gym.learn.arc_config import ArcConfig
-from rover_gym.learn.arc_rovers import Group, LabelledGroup, Labels, Rovers, evaluate, join_labels
 from rover_gym.core import OptionError
+from rover_gym.core.extras import require
+from rover_gym.core.validation import refuse
 from rover_gym.drive.arc_network import ArcNetwork
 from rover_gym.drive.evaluation import EvaluatedEpisode, drive_all
 from rover_gym.drive.named_policy import Policy
-from rover_gym.core.validation import refuse
+from rover_gym.learn.arc_config import ArcConfig
+from rover_gym.learn.arc_rovers import Group, LabelledGroup, Labels, Rovers, evaluate, join_labels
 
 #: Episodes of a task: as many as `drive_all` runs at a time.
 EPISODES = 32

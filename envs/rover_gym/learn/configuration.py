@@ -7,9 +7,9 @@ from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
-from rover_gym.envs.arguments import ARGUMENTS
 from rover_gym.core import OptionError
 from rover_gym.core.validation import number, refuse
+from rover_gym.envs.arguments import ARGUMENTS
 
 T = TypeVar("T")
 

@@ -13,16 +13,16 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
 from rover_gym.core import OptionError, sin_cos
-from rover_gym.drive.rollouts import Rollouts
+from rover_gym.core.validation import refuse, whole
 from rover_gym.drive.arc_forecast import HORIZON, OUTPUTS, ArcFeatures, with_speed
 from rover_gym.drive.features import LARGEST_FEATURE
 from rover_gym.drive.named_policy import named_policy
 from rover_gym.drive.network_files import Network
+from rover_gym.drive.rollouts import Rollouts
 from rover_gym.drive.scan_policy import ScanPolicy
-from rover_gym.core.validation import refuse, whole
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
 
 Single = npt.NDArray[np.float32]
 

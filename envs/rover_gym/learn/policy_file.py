@@ -11,10 +11,10 @@ from typing import Any
 import gymnasium as gym
 from stable_baselines3.common.vec_env import VecNormalize
 
-from rover_gym.learn.configuration import environment_arguments
+from rover_gym.core.validation import refuse
 from rover_gym.drive.named_policy import NamedPolicy
 from rover_gym.drive.network_files import PolicyError
-from rover_gym.core.validation import refuse
+from rover_gym.learn.configuration import environment_arguments
 
 #: Algorithms by an entry that only their files have; the first that fits.
 ALGORITHMS = (

@@ -12,12 +12,12 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
+from rover_gym.drive.features import check_observed
+from rover_gym.envs.vector.sb3 import RoverVecEnv
 from rover_gym.learn.configuration import environment_arguments
 from rover_gym.learn.provenance import provenance
-from rover_gym.core import OptionError
-from rover_gym.drive.features import check_observed
-from rover_gym.core.validation import refuse
-from rover_gym.envs.vector.sb3 import RoverVecEnv
 
 #: The algorithms of stable-baselines3, by name.
 ALGORITHMS: Mapping[str, type[BaseAlgorithm]] = {"PPO": PPO, "SAC": SAC}

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.envs.start import wheel_centres
 from rover_gym.core import RoverModel
+from rover_gym.envs.start import wheel_centres
 
 #: Ranges of the factors on size, wheel radius, masses and torques, and of the height by which the trunk's mass centre
 #: rises, over half the track.

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from rover_gym.core.rotations import rotation_vector, turn_z_to
 from rover_gym.models.drawings import Drawer
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
 from rover_gym.models.loop_description import describe_loops
 from rover_gym.models.meshes import MeshOptions, hulls_of
 from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree, mesh_of
 from rover_gym.models.roles import WheelRole
-from rover_gym.core.rotations import rotation_vector, turn_z_to
 
 GRAVITY = 9.81
 #: Torque limit of a wheel if the file has none, relative to its share of the weight times its radius.

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from rover_gym.core import ModelError, RoverModel
+from rover_gym.core.validation import refuse
 from rover_gym.models.import_report import ImportReport
 from rover_gym.models.reading import read_mjcf, read_urdf
 from rover_gym.models.robot_tree import checked_path, is_urdf
-from rover_gym.core.validation import refuse
 
 #: A model, a name of the gallery or a file, as `as_model` takes it.
 ModelLike: TypeAlias = RoverModel | str | os.PathLike[str]

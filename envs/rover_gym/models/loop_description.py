@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from rover_gym.core.rotations import rotation_vector
 from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, LoopEnd
 from rover_gym.models.robot_tree import RobotTree
-from rover_gym.core.rotations import rotation_vector
 
 
 def close_distant_couplings(tree: RobotTree) -> None:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.core.extras import require
 from rover_gym.core import ModelError
+from rover_gym.core.extras import require
+from rover_gym.core.validation import number, refuse
 from rover_gym.models.import_report import Array
 from rover_gym.models.robot_tree import FileLink, FileShape, RobotTree, mesh_of
-from rover_gym.core.validation import number, refuse
 
 
 def state_masses(tree: RobotTree, masses: object) -> None:

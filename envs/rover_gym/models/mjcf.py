@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rover_gym.core.extras import require
+from rover_gym.core.rotations import from_quaternion
 from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, LoopEnd
 from rover_gym.models.robot_tree import (
@@ -27,7 +28,6 @@ from rover_gym.models.robot_tree import (
     refuse_in,
     right_angle,
 )
-from rover_gym.core.rotations import from_quaternion
 
 
 def complete_right_angles(mujoco: Any, spec: Any) -> list[str]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from rover_gym.core import ModelError, RoverModel
+from rover_gym.core.validation import number, refuse, regular_file, whole
 from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.import_report import ImportReport, RobotFileWarning, axes_of, check_folders, solid_rows, together
 from rover_gym.models.loop_description import close_distant_couplings
@@ -27,7 +28,6 @@ from rover_gym.models.robot_tree import (
 )
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
-from rover_gym.core.validation import number, refuse, regular_file, whole
 
 SOLID = re.compile(r"(solids|wheels|tags|loops)\[(\d+)\]")
 

@@ -28,11 +28,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import ModelError
+from rover_gym.core.rotations import turn_z_to
+from rover_gym.core.validation import refuse, regular_file, shown
 from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, move_ends
 from rover_gym.models.meshes import Mesh, load_mesh
-from rover_gym.core.rotations import turn_z_to
-from rover_gym.core.validation import refuse, regular_file, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
 MAX_LINKS = 2000

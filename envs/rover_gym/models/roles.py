@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_gym.core import ModelError
+from rover_gym.core.validation import number, refuse
 from rover_gym.models.ground_reach import check_wheels_reach_the_ground
 from rover_gym.models.import_report import Array
 from rover_gym.models.robot_tree import (
@@ -33,7 +34,6 @@ from rover_gym.models.robot_tree import (
     width,
 )
 from rover_gym.models.statics import search_wheels
-from rover_gym.core.validation import number, refuse
 
 STEERS = re.compile(r"steer|swerve|turn|rudder", re.IGNORECASE)
 CASTER = re.compile(r"cast[eo]r|swivel", re.IGNORECASE)

@@ -26,11 +26,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import ModelError, Plane, RoverModel, Simulation
+from rover_gym.core.rotations import rotation_matrix
+from rover_gym.core.validation import number, refuse
 from rover_gym.models.ground_reach import above_the_ground
 from rover_gym.models.import_report import Array
 from rover_gym.models.robot_tree import FileLink, RobotTree, largest_round, round_radius
-from rover_gym.core.rotations import rotation_matrix
-from rover_gym.core.validation import number, refuse
 
 #: The rover has settled when nothing moves faster than this, m/s and rad/s.
 AT_REST = 1e-7

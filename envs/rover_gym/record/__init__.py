@@ -10,12 +10,12 @@ from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory
 
 __all__ = [
     "Channel",
-    "PlanarRun",
-    "PlanarSampler",
     "DiskRun",
     "DiskSampler",
     "GrainRun",
     "GrainSampler",
+    "PlanarRun",
+    "PlanarSampler",
     "Recorder",
     "RecordingError",
     "RoverRun",

@@ -17,9 +17,9 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.terrain_parts import sand_of
 from rover_gym.core import OptionError, RoverGymError, RoverModel, Simulation, __version__
 from rover_gym.core.validation import checked, number, refuse
+from rover_gym.ground.terrain_parts import sand_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.record.bed_run import Array, bed_channels, strongest_contacts
-from rover_gym.ground.grains.disk_bed import surface_height
 from rover_gym.core import DiskSimulation
+from rover_gym.core.validation import refuse
+from rover_gym.ground.grains.disk_bed import surface_height
+from rover_gym.record.bed_run import Array, bed_channels, strongest_contacts
 from rover_gym.record.channels import TIME, Channel, RecordingError, Sampler, sound
 from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.core.validation import refuse
 
 MOST_CHAINS = 2000  # strongest contacts kept per row
 

@@ -20,9 +20,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.record.bed_run import Array, bed_channels, strongest_contacts
-from rover_gym.ground.grains.grain_surface import SurfaceMap, surface_map
-from rover_gym.ground.grains.moving_window import MovingWindow
 from rover_gym.core import (
     Drum,
     GrainSimulation,
@@ -33,6 +30,10 @@ from rover_gym.core import (
     Silo,
     Simulation,
 )
+from rover_gym.core.validation import refuse
+from rover_gym.ground.grains.grain_surface import SurfaceMap, surface_map
+from rover_gym.ground.grains.moving_window import MovingWindow
+from rover_gym.record.bed_run import Array, bed_channels, strongest_contacts
 from rover_gym.record.channels import (
     ITERATIONS,
     TIME,
@@ -46,7 +47,6 @@ from rover_gym.record.channels import (
 )
 from rover_gym.record.rover_run import LARGEST, RoverRun, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory, read_frames
-from rover_gym.core.validation import refuse
 
 if TYPE_CHECKING:
     from rover_gym.core import Terrain

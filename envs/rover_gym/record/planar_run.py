@@ -23,6 +23,7 @@ from rover_gym.core import (
     Sine,
     Spline,
 )
+from rover_gym.core.validation import refuse
 from rover_gym.record.channels import (
     RESIDUAL,
     TIME,
@@ -34,7 +35,6 @@ from rover_gym.record.channels import (
 )
 from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
 from rover_gym.record.trajectory import Trajectory
-from rover_gym.core.validation import refuse
 
 Array = npt.NDArray[np.float64]
 

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import Terrain
+from rover_gym.core.validation import TERRAINS, checked, refuse, whole
 from rover_gym.record.channels import (
     FRAMES,
     LIBRARY,
@@ -35,7 +36,6 @@ from rover_gym.record.checksums import CHECKSUM, checksum, sum_of_array, sum_of_
 from rover_gym.record.steady_file import FileInUseError, SteadyFile, uninterrupted
 from rover_gym.record.stored_terrain import write_terrain
 from rover_gym.record.trajectory import read_trajectory
-from rover_gym.core.validation import TERRAINS, checked, refuse, whole
 
 if TYPE_CHECKING:
     import h5py

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.terrain_parts import sand_of
 from rover_gym.core import RoverModel, Terrain
+from rover_gym.core.validation import number, refuse, vector
+from rover_gym.ground.terrain_parts import sand_of
 from rover_gym.record.channels import ITERATIONS, TIME, Channel, RecordingError, RoverSampler, sound
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.core.validation import number, refuse, vector
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

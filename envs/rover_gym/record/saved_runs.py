@@ -10,15 +10,15 @@ from typing import Any, TypeAlias, TypeVar, overload
 
 import numpy as np
 
+from rover_gym.core import DiskSimulation, PlanarSimulation, Simulation
+from rover_gym.core.validation import checked, number, refuse
+from rover_gym.record.channels import RecordingError, RoverSampler, Sampler, row_count
 from rover_gym.record.disk_run import DiskRun, DiskSampler, disk_run_of, is_disks
 from rover_gym.record.grain_run import GrainRun, GrainSampler, Recordable, grain_run_of, is_grains
-from rover_gym.core import DiskSimulation, PlanarSimulation, Simulation
 from rover_gym.record.planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
-from rover_gym.record.channels import RecordingError, RoverSampler, Sampler, row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, Run, run_of
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.core.validation import checked, number, refuse
 
 __all__ = ["SavedRun", "open_run", "record_run", "saved_run_of"]
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.terrain_parts import parts_of, plane_of, spheres_of, surfaces_of
 from rover_gym.core import HeightField, Plane, SphereField, Terrain, TriangleMesh
+from rover_gym.ground.terrain_parts import parts_of, plane_of, spheres_of, surfaces_of
 from rover_gym.record.channels import write_attribute, write_description, write_texts
 from rover_gym.record.checksums import sum_of_array
 

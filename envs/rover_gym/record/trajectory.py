@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import RoverGymError, Terrain, Union
+from rover_gym.core.validation import refuse
 from rover_gym.record.channels import (
     FORMAT,
     FRAMES,
@@ -30,7 +31,6 @@ from rover_gym.record.channels import (
 from rover_gym.record.checksums import CHECKSUM, SINCE, checksum, sum_of_array, sum_of_attributes
 from rover_gym.record.steady_file import FileInUseError, lock
 from rover_gym.record.stored_terrain import MATERIALS, Stored, is_stored, stored_parts
-from rover_gym.core.validation import refuse
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -20,4 +20,20 @@ from rover_gym.scenes.planner import plan
 from rover_gym.scenes.report_scenes import ReportScene, SceneResult, inclined_plane, report_model, sphere_rug
 from rover_gym.scenes.scene_plan import Accuracy, Decision, PlannedRover, Scene, ScenePlan
 
-__all__ = ["Accuracy", "Decision", "Economy", "Incline", "PlannedRover", "ReportScene", "Scene", "ScenePlan", "SceneResult", "ball_on_slope", "inclined_plane", "measure_economies", "plan", "report_model", "sphere_rug"]
+__all__ = [
+    "Accuracy",
+    "Decision",
+    "Economy",
+    "Incline",
+    "PlannedRover",
+    "ReportScene",
+    "Scene",
+    "ScenePlan",
+    "SceneResult",
+    "ball_on_slope",
+    "inclined_plane",
+    "measure_economies",
+    "plan",
+    "report_model",
+    "sphere_rug",
+]

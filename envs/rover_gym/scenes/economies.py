@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.scenes.scene_plan import PlannedRover, ScenePlan
 from rover_gym.core import Simulation
+from rover_gym.scenes.scene_plan import PlannedRover, ScenePlan
 
 #: Interval between comparisons of the trunk's position, s.
 SAMPLE = 0.1

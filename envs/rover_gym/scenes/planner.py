@@ -5,18 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.scenes.scene_plan import (
-    Accuracy,
-    Array,
-    Decision,
-    Kind,
-    Scene,
-    ScenePlan,
-    check_scene,
-    gravity_of,
-    steering_joints,
-)
-from rover_gym.ground.terrain_parts import parts_of, plane_of, surfaces_of
 from rover_gym.core import (
     HeightField,
     Line,
@@ -35,6 +23,18 @@ from rover_gym.core import (
     accuracy_options,
 )
 from rover_gym.core.validation import flag, number, refuse, vector
+from rover_gym.ground.terrain_parts import parts_of, plane_of, surfaces_of
+from rover_gym.scenes.scene_plan import (
+    Accuracy,
+    Array,
+    Decision,
+    Kind,
+    Scene,
+    ScenePlan,
+    check_scene,
+    gravity_of,
+    steering_joints,
+)
 
 # The bounds hold for 10 s from rest on a plane while the wheels do not slip; `docs/economy.md` lists the measurements.
 #: Largest distance between the trunks of the welded model and of the full model with PD-held steering, m. On a plane a

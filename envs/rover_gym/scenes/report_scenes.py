@@ -28,8 +28,8 @@ from typing import Any
 import numpy as np
 
 from rover_gym.core import BallSimulation, Line, Plane, RoverModel, Simulation, Sine, SphereField, Terrain
-from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.record.saved_runs import record_run
+from rover_gym.record.trajectory import Trajectory, read_trajectory
 
 BALL: dict[str, Any] = {
     "mass": 3.0,

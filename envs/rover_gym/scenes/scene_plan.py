@@ -7,7 +7,6 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.maps.ground_lookup import as_terrain
 from rover_gym.core import (
     CommandError,
     Line,
@@ -20,8 +19,9 @@ from rover_gym.core import (
     StepReport,
     Terrain,
 )
-from rover_gym.models.lookup import as_model
 from rover_gym.core.validation import flag, known_keys, refuse, vector
+from rover_gym.ground.maps.ground_lookup import as_terrain
+from rover_gym.models.lookup import as_model
 
 Array: TypeAlias = npt.NDArray[np.float64]
 

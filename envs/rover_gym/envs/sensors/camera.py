@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from rover_gym.core import OptionError, RoverModel
-from rover_gym.envs.sensors.sensor import Array, Mount, Sensor
 from rover_gym.core.validation import flag, number, refuse, whole
+from rover_gym.envs.sensors.sensor import Array, Mount, Sensor
 
 #: Most pixels along a side, and the widest view, deg.
 MAX_PIXELS = 4096

@@ -6,12 +6,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from rover_gym.ground.terrain_parts import sand_of, spheres_of
 from rover_gym.core import RoverModel, SphereField, Terrain
-from rover_gym.show.frames import appearance as look
+from rover_gym.core.validation import Range, number
 from rover_gym.envs.sensors.camera import Camera, as_image, check_image
 from rover_gym.envs.sensors.sensor import Array, Moment, Values, gaussian, uniform
-from rover_gym.core.validation import Range, number
+from rover_gym.ground.terrain_parts import sand_of, spheres_of
+from rover_gym.show.frames import appearance as look
 
 #: Shadows begin this far above a surface, m, which then does not shade itself.
 CLEARANCE = 1e-4

@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 
 from rover_gym.core import OptionError, RoverModel
+from rover_gym.core.validation import Range, flag, number, refuse, vector, whole
 from rover_gym.envs.sensors.camera import Camera, as_image, check_image
 from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
-from rover_gym.core.validation import Range, flag, number, refuse, vector, whole
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,8 @@ import numpy as np
 
 from rover_gym.core import OptionError, RoverModel
 from rover_gym.core.rotations import rotation_matrix, rotation_vector
-from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
 from rover_gym.core.validation import Range, refuse
+from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from rover_gym.envs.spec_json import named_object
 from rover_gym.core import OptionError
+from rover_gym.core.validation import known_keys, mapping, refuse
 from rover_gym.envs.sensors.colour_camera import ColourCamera
 from rover_gym.envs.sensors.depth_camera import DepthCamera, LaserScanner
 from rover_gym.envs.sensors.inertial_unit import InertialUnit
 from rover_gym.envs.sensors.sensor import Mount, Sensor
 from rover_gym.envs.sensors.wheel_encoders import HeadingSensor, MotorSensors, WheelEncoders
-from rover_gym.core.validation import known_keys, mapping, refuse
+from rover_gym.envs.spec_json import named_object
 
 #: The sensors that a mapping may name.
 SENSORS: Mapping[str, type[Sensor]] = {

@@ -12,16 +12,16 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
+from rover_gym.core import OptionError, RoverModel, StateError
+from rover_gym.core.validation import refuse
 from rover_gym.envs.batch import BatchSnapshot
 from rover_gym.envs.env_snapshot import EnvSnapshot
 from rover_gym.envs.grains_env import RoverGrainsEnv
 from rover_gym.envs.observation import Mask
 from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.core import OptionError, RoverModel, StateError
-from rover_gym.show.frames.render_options import RENDER_MODES, check_display
 from rover_gym.envs.sensors.named_sensor import sensor_of
 from rover_gym.envs.sensors.sensor import Array, Moment, Sensor, Values, uniform
-from rover_gym.core.validation import refuse
+from rover_gym.show.frames.render_options import RENDER_MODES, check_display
 
 #: Key of the environment's own observation, unless that is a dictionary.
 STATE = "state"

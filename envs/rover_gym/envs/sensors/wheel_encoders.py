@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_gym.core import RoverModel
-from rover_gym.envs.sensors.sensor import Array, Moment, Sensor, Values, gaussian, uniform
 from rover_gym.core.validation import Range, whole
+from rover_gym.envs.sensors.sensor import Array, Moment, Sensor, Values, gaussian, uniform
 
 
 @dataclass(frozen=True, kw_only=True)

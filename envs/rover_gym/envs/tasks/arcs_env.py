@@ -9,13 +9,8 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
-from rover_gym.envs.arguments import RoverArguments, takes_arguments
-from rover_gym.envs.observation import Array, Mask, Observations
-from rover_gym.envs.play_keys import keys_to_action
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.time_limits import MAX_ARCS
 from rover_gym.core import OptionError, TerrainError
-from rover_gym.models.lookup import open_model
+from rover_gym.core.validation import refuse
 from rover_gym.drive.arc_driver import (
     ArcDriver,
     ArcObservation,
@@ -25,8 +20,13 @@ from rover_gym.drive.arc_driver import (
     observation_space,
 )
 from rover_gym.drive.scan_policy import ScanGains, ScanPolicy, hold_periods
-from rover_gym.core.validation import refuse
+from rover_gym.envs.arguments import RoverArguments, takes_arguments
+from rover_gym.envs.observation import Array, Mask, Observations
+from rover_gym.envs.play_keys import keys_to_action
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.time_limits import MAX_ARCS
 from rover_gym.envs.vector.vector_env import RoverVectorEnv, episode_limit
+from rover_gym.models.lookup import open_model
 
 
 class CommandPlanner(Protocol):

@@ -12,6 +12,11 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
+from rover_gym.core import CommandError, OptionError, TerrainError
+from rover_gym.core.validation import array, known_keys, refuse, whole
+from rover_gym.drive.command import N_COMMANDS, CommandController, CommandLimits, command_space
+from rover_gym.drive.features import Features
+from rover_gym.drive.pd_policy import find_rover_env
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.batch import BatchSnapshot
 from rover_gym.envs.env_snapshot import EnvSnapshot
@@ -19,11 +24,6 @@ from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.play_keys import keys_to_action
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.time_limits import MAX_COMMANDS, REPEAT
-from rover_gym.core import CommandError, OptionError, TerrainError
-from rover_gym.drive.command import N_COMMANDS, CommandController, CommandLimits, command_space
-from rover_gym.drive.features import Features
-from rover_gym.drive.pd_policy import find_rover_env
-from rover_gym.core.validation import array, known_keys, refuse, whole
 from rover_gym.envs.vector.pushed_vector import RandomPushesVector
 from rover_gym.envs.vector.vector_env import RoverVectorEnv, episode_limit
 

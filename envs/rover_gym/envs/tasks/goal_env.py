@@ -6,9 +6,11 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import OptionError, StateError, sin_cos
+from rover_gym.core.validation import array, refuse
+from rover_gym.drive.pd_policy import find_rover_env
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.core import OptionError, StateError, sin_cos
 from rover_gym.envs.tasks.command_env import (
     CommandArguments,
     DriveByCommand,
@@ -16,8 +18,6 @@ from rover_gym.envs.tasks.command_env import (
     RoverCommandVectorEnv,
     takes_command_arguments,
 )
-from rover_gym.drive.pd_policy import find_rover_env
-from rover_gym.core.validation import array, refuse
 
 GoalDict = dict[str, npt.NDArray[Any]]
 

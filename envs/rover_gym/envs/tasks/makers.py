@@ -2,11 +2,11 @@
 
 from functools import partial
 
+from rover_gym.envs.sensors.sensor_suite import make_rover
 from rover_gym.envs.tasks.arcs_env import RoverArcsEnv, RoverArcsVectorEnv
 from rover_gym.envs.tasks.command_env import RoverCommandEnv, RoverCommandVectorEnv
 from rover_gym.envs.tasks.goal_env import RoverGoalEnv, RoverGoalVectorEnv
 from rover_gym.envs.tasks.trap_env import RoverTrapEnv, RoverTrapVectorEnv
-from rover_gym.envs.sensors.sensor_suite import make_rover
 from rover_gym.envs.vector.sensed_vector import make_rover_vector
 
 make_arcs_rover = partial(make_rover, make=RoverArcsEnv)

@@ -9,14 +9,6 @@ from typing import Any, ClassVar, Unpack
 
 import numpy as np
 
-from rover_gym.envs.arguments import RoverArguments, takes_arguments
-from rover_gym.envs.batch import Drawn, RoverBatch
-from rover_gym.envs.episode_scene import ResetOptions, origin_of
-from rover_gym.envs.generators import Rows
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.start import Start
-from rover_gym.envs.task import TRUNK_LOAD, Task, make_task
-from rover_gym.envs.time_limits import MAX_TRAP_STEPS
 from rover_gym.core import (
     EpisodeRun,
     OptionError,
@@ -25,8 +17,16 @@ from rover_gym.core import (
     TerrainError,
     standard_normals,
 )
-from rover_gym.drive.pd_policy import PDPolicy
 from rover_gym.core.validation import Range, number, refuse
+from rover_gym.drive.pd_policy import PDPolicy
+from rover_gym.envs.arguments import RoverArguments, takes_arguments
+from rover_gym.envs.batch import Drawn, RoverBatch
+from rover_gym.envs.episode_scene import ResetOptions, origin_of
+from rover_gym.envs.generators import Rows
+from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.start import Start
+from rover_gym.envs.task import TRUNK_LOAD, Task, make_task
+from rover_gym.envs.time_limits import MAX_TRAP_STEPS
 from rover_gym.envs.vector.vector_env import RoverVectorEnv
 
 #: Arguments of `RoverEnv` with another default.

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorWrapper
 
-from rover_gym.envs.observation import Array, Mask, Observations
-from rover_gym.envs.pushes import PushedRovers, push_options
 from rover_gym.core import OptionError
 from rover_gym.core.validation import Range, refuse
+from rover_gym.envs.observation import Array, Mask, Observations
+from rover_gym.envs.pushes import PushedRovers, push_options
 from rover_gym.envs.vector.vector_env import RoverVectorEnv
 
 

@@ -16,16 +16,16 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import OptionError, StateError
+from rover_gym.core.extras import MissingExtraError
+from rover_gym.core.validation import Range, refuse
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.batch import BatchSnapshot, Drawn
 from rover_gym.envs.generators import check_seed
 from rover_gym.envs.observation import Observations
 from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.task import check_actions
-from rover_gym.core.extras import MissingExtraError
-from rover_gym.core import OptionError, StateError
 from rover_gym.envs.sensors.sensor_suite import SensedRovers, SensedSnapshot, SensorLike, with_readings
-from rover_gym.core.validation import Range, refuse
+from rover_gym.envs.task import check_actions
 from rover_gym.envs.vector.vector_env import RoverVectorEnv
 
 try:

@@ -8,14 +8,14 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import refuse
 from rover_gym.envs.grains_env import RoverGrainsEnv
 from rover_gym.envs.observation import Mask
 from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.time_limits import MAX_COURSE_STEPS
-from rover_gym.core import OptionError
 from rover_gym.envs.sensors.sensor import Array
 from rover_gym.envs.sensors.sensor_suite import SensedRovers, SensorLike, SuiteState, with_readings
-from rover_gym.core.validation import refuse
+from rover_gym.envs.time_limits import MAX_COURSE_STEPS
 from rover_gym.envs.vector.vector_env import RoverVectorEnv
 
 

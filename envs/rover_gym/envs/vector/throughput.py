@@ -16,10 +16,10 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import Plane, Simulation, SimulationBatch
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.batch import RoverBatch
 from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.core import Plane, Simulation, SimulationBatch
 from rover_gym.envs.vector.vector_env import RoverVectorEnv
 
 Ground = Literal["plane", "rocks"]

@@ -10,6 +10,8 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import Range, mapping, refuse, whole
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.batch import BatchSnapshot
 from rover_gym.envs.episode_scene import ResetOptions
@@ -19,8 +21,6 @@ from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.spec_json import RoverSpec, rover_spec
 from rover_gym.envs.task import check_actions
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
-from rover_gym.core import OptionError
-from rover_gym.core.validation import Range, mapping, refuse, whole
 
 _Info = dict[str, Any]
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.grains.grain_surface import surface_map
 from rover_gym.core import GrainSimulation, OptionError, arrange_balls
 from rover_gym.core.validation import array, checked, number, refuse, whole
+from rover_gym.ground.grains.grain_surface import surface_map
 
 Array = npt.NDArray[np.float64]
 

@@ -7,10 +7,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.grains.ball_bed import DENSITY, MOST_BALLS, BallBed, check_memory, settle
-from rover_gym.record.grain_run import GrainRun
-from rover_gym.ground.grains.grain_surface import surface_map
-from rover_gym.ground.grains.pit import PitFill
 from rover_gym.core import (
     Drum,
     GrainSimulation,
@@ -23,6 +19,10 @@ from rover_gym.core import (
     ball_packing,
 )
 from rover_gym.core.validation import checked, number, refuse, whole
+from rover_gym.ground.grains.ball_bed import DENSITY, MOST_BALLS, BallBed, check_memory, settle
+from rover_gym.ground.grains.grain_surface import surface_map
+from rover_gym.ground.grains.pit import PitFill
+from rover_gym.record.grain_run import GrainRun
 
 CLEARANCE = 1e-3  # m, between a rover's wheels and the balls, or a sphere and the balls, at the start
 

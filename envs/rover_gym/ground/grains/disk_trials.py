@@ -24,9 +24,9 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.grains.disk_bed import WHEEL_RADIUS, DiskBed, rover_on_disks, step_count
 from rover_gym.core import DiskSimulation, OptionError
 from rover_gym.core.validation import number, refuse
+from rover_gym.ground.grains.disk_bed import WHEEL_RADIUS, DiskBed, rover_on_disks, step_count
 
 __all__ = [
     "BedEstimate",

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.grains.grain_surface import MAP, Footprint, Parts
 from rover_gym.core import GrainSimulation, OptionError, RoverGrainSimulation, Simulation, StateError
 from rover_gym.core.validation import checked, number, refuse, whole
+from rover_gym.ground.grains.grain_surface import MAP, Footprint, Parts
 
 if TYPE_CHECKING:
     from rover_gym.core import Drum, Silo, Snapshot, StepReport

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.grains.ball_bed import DENSITY, MOST_BALLS, settle
 from rover_gym.core import GrainSimulation, OptionError, TriangleMesh, ball_packing
 from rover_gym.core.validation import number, refuse
+from rover_gym.ground.grains.ball_bed import DENSITY, MOST_BALLS, settle
 
 Array = npt.NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from typing import TypeAlias
 
-from rover_gym.ground.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
 from rover_gym.core import Plane, Terrain, TerrainError, Union
 from rover_gym.core.validation import refuse
+from rover_gym.ground.maps.map_files import MAP_ENDINGS, MESH_ENDINGS, is_terrain_file, open_terrain
 
 #: A terrain, a name or a file, as `as_terrain` takes it.
 TerrainLike: TypeAlias = Terrain | str | os.PathLike[str]

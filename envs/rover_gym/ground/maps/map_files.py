@@ -18,8 +18,8 @@ from typing import Any, NoReturn, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.extras import require
 from rover_gym.core import HeightField, TerrainError, TriangleMesh
+from rover_gym.core.extras import require
 from rover_gym.core.validation import number, refuse, regular_file
 
 

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rover_gym.ground.maps.fractal import fractal_map, pair
-from rover_gym.ground.maps.map_files import open_terrain, read_map, read_mesh
 from rover_gym.core import HeightField, Plane, SphereField, Terrain, TerrainError, TriangleMesh
 from rover_gym.core.validation import refuse, text_of_file
+from rover_gym.ground.maps.fractal import fractal_map, pair
+from rover_gym.ground.maps.map_files import open_terrain, read_map, read_mesh
 
 #: Longest file of spheres, bytes.
 MOST_BYTES = 1 << 28

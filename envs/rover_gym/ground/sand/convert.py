@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rover_gym.core import OptionError
 from rover_gym.core.extras import require
 from rover_gym.core.files import written_whole
-from rover_gym.core import OptionError
 from rover_gym.ground.sand.measurements import COLUMNS
 
 

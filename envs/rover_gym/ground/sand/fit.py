@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.extras import require
 from rover_gym.core import OptionError
+from rover_gym.core.extras import require
 from rover_gym.ground.sand.measurements import Runs, SingleWheel
 from rover_gym.ground.sand.soils import Soil
 

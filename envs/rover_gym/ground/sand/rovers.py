@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from rover_gym.core import OptionError, Plane, RoverModel, Simulation, SoftGround
+from rover_gym.core.validation import number
 from rover_gym.ground.sand.measurements import GRAVITY
 from rover_gym.ground.sand.soils import Soil
-from rover_gym.core.validation import number
 
 #: Step, and period in which the torques follow the rim speeds, s.
 STEP, PERIOD = 0.005, 0.01

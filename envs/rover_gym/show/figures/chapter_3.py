@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.record.saved_runs import record_run
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.scenes.report_scenes import ball_on_incline, ball_on_sine, published
 from rover_gym.show.figures.planar_drawing import GROUND
 from rover_gym.show.figures.style import circle, save_figures
-from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.show.frames.appearance import PLANAR_WHEEL_COLOURS
-from rover_gym.scenes.report_scenes import ball_on_incline, ball_on_sine, published
-from rover_gym.record.saved_runs import record_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

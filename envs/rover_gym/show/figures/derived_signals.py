@@ -12,8 +12,8 @@ from rover_gym.envs.start import SLIP_SPEED, drive_signs
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rover_gym.show.figures.style import WheelStyle
     from rover_gym.record.rover_run import RoverRun
+    from rover_gym.show.figures.style import WheelStyle
 
 
 Array = npt.NDArray[np.float64]

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rover_gym.envs.start import SLIP_SPEED
 from rover_gym.core.extras import MissingExtraError
+from rover_gym.core.files import written_whole
+from rover_gym.envs.start import SLIP_SPEED
+from rover_gym.ground.grains.disk_trials import DiskDrive, Pull
 from rover_gym.show.figures.derived_signals import WINDOW, Array, smooth
 from rover_gym.show.figures.style import (
     DARK,
@@ -22,16 +24,14 @@ from rover_gym.show.figures.style import (
     panel_legend,
     title,
 )
-from rover_gym.core.files import written_whole
-from rover_gym.ground.grains.disk_trials import DiskDrive, Pull
 from rover_gym.show.frames.appearance import PLANAR_WHEEL_COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rover_gym.show.figures.style import Sheet
-    from rover_gym.record.disk_run import DiskRun
     from rover_gym.ground.grains.disk_trials import Traction
+    from rover_gym.record.disk_run import DiskRun
+    from rover_gym.show.figures.style import Sheet
 
 
 def driving(figure: Sheet, run: DiskRun) -> None:

@@ -6,22 +6,22 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rover_gym.core.validation import checked
+from rover_gym.record.disk_run import DiskRun
+from rover_gym.record.grain_run import GrainRun
+from rover_gym.record.planar_run import PlanarRun
+from rover_gym.record.rover_run import RoverRun
 from rover_gym.show.figures.disk_run_figures import DISK_DRAWINGS
 from rover_gym.show.figures.grain_run_figures import GRAIN_DRAWINGS
 from rover_gym.show.figures.planar_drawing import PLANAR_DRAWINGS, planar_page
 from rover_gym.show.figures.run_figures import DRAWINGS
 from rover_gym.show.figures.style import WIDTH, Drawing, check_format, save_figures
-from rover_gym.record.disk_run import DiskRun
-from rover_gym.record.grain_run import GrainRun
-from rover_gym.record.planar_run import PlanarRun
-from rover_gym.record.rover_run import RoverRun
-from rover_gym.core.validation import checked
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rover_gym.show.figures.style import Sheet
     from rover_gym.record.saved_runs import SavedRun
+    from rover_gym.show.figures.style import Sheet
 
 #: The figures of each kind of run by file name, and the columns of their page.
 KINDS: dict[type, tuple[Mapping[str, Drawing], int]] = {

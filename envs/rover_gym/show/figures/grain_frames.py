@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.extras import MissingExtraError, require
-from rover_gym.show.figures.rover_film import RoverFilm, ShownSample
-from rover_gym.core.files import written_whole
 from rover_gym.core import Plane
+from rover_gym.core.extras import MissingExtraError, require
+from rover_gym.core.files import written_whole
 from rover_gym.record.rover_run import RoverRun
+from rover_gym.show.figures.rover_film import RoverFilm, ShownSample
 from rover_gym.show.frames import FrameRenderer, VideoWriter
 from rover_gym.show.frames.appearance import GROUND_COLOUR, ROCK_COLOUR
 from rover_gym.show.frames.render_options import whole_film

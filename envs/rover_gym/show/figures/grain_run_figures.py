@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rover_gym.core import RoverModel
 from rover_gym.envs.start import SLIP_SPEED
+from rover_gym.ground.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.show.figures.derived_signals import SMOOTHED, WINDOW, Array, of_wheels, plot_raw_and_smooth, smooth
 from rover_gym.show.figures.style import (
     DARK,
@@ -16,14 +18,12 @@ from rover_gym.show.figures.style import (
     panel_legend,
     title,
 )
-from rover_gym.ground.grains.grain_surface import SurfaceMap, surface_map
-from rover_gym.core import RoverModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rover_gym.show.figures.style import Sheet
     from rover_gym.record.grain_run import GrainRun
+    from rover_gym.show.figures.style import Sheet
 
 
 POINTS = 400  # of a section

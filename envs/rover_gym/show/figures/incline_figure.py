@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.scenes.incline import Incline, acceleration
 from rover_gym.show.figures.planar_drawing import path_over_ground
 from rover_gym.show.figures.style import DARK, QUANTITY_COLOURS, panel_legend, save_figures
-from rover_gym.scenes.incline import Incline, acceleration
 from rover_gym.show.frames.appearance import PLANAR_WHEEL_COLOURS
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from rover_gym.show.figures.style import Sheet
     from rover_gym.record.planar_run import PlanarRun
+    from rover_gym.show.figures.style import Sheet
 
 Array = npt.NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.extras import require
-from rover_gym.show.figures.style import DARK, QUANTITY_COLOURS, check_format, plain, save_figures
 from rover_gym.core import RoverModel
+from rover_gym.core.extras import require
 from rover_gym.models.lookup import ModelLike, as_model
+from rover_gym.show.figures.style import DARK, QUANTITY_COLOURS, check_format, plain, save_figures
 from rover_gym.show.frames.appearance import part_mesh, rover_parts
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import Polyline
 from rover_gym.show.figures.style import (
     DARK,
     QUANTITY_COLOURS,
@@ -16,7 +17,6 @@ from rover_gym.show.figures.style import (
     panel_legend,
     plain,
 )
-from rover_gym.core import Polyline
 from rover_gym.show.frames.appearance import PLANAR_WHEEL_COLOURS
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from rover_gym.show.figures.style import Sheet
     from rover_gym.record.planar_run import PlanarRun
+    from rover_gym.show.figures.style import Sheet
 
 Array = npt.NDArray[np.float64]
 

@@ -37,8 +37,8 @@ from rover_gym.show.figures.wheel_paths import path_from_above
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rover_gym.show.figures.style import Sheet
     from rover_gym.record.rover_run import RoverRun
+    from rover_gym.show.figures.style import Sheet
 
 
 #: Minimum upper end of the load axis, N, for runs without weight.

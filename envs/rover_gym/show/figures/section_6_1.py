@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import SphereField
+from rover_gym.core.validation import checked
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.scenes.report_scenes import WHEEL_RADIUS, reference_data, report_model
 from rover_gym.show.figures.derived_signals import SMOOTHED, linear_then_log, plot_raw_and_smooth
 from rover_gym.show.figures.style import (
     COLOURS,
@@ -26,10 +30,6 @@ from rover_gym.show.figures.style import (
     save_figures,
     step_size,
 )
-from rover_gym.core import SphereField
-from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.scenes.report_scenes import WHEEL_RADIUS, reference_data, report_model
-from rover_gym.core.validation import checked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

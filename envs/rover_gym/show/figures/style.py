@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.envs.start import wheel_centres
+from rover_gym.core import OptionError, RoverModel
 from rover_gym.core.extras import require
 from rover_gym.core.files import written_whole
-from rover_gym.core import OptionError, RoverModel
-from rover_gym.record.trajectory import Trajectory
 from rover_gym.core.validation import refuse
+from rover_gym.envs.start import wheel_centres
+from rover_gym.record.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rover_gym.core import SphereField, Terrain
 from rover_gym.core.extras import require
+from rover_gym.ground.terrain_parts import parts_of, plane_of, spheres_of, surface_heights, surfaces_of
 from rover_gym.show.figures.derived_signals import Array
 from rover_gym.show.figures.style import WheelStyle, title
-from rover_gym.ground.terrain_parts import parts_of, plane_of, spheres_of, surface_heights, surfaces_of
-from rover_gym.core import SphereField, Terrain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rover_gym.show.figures.style import Sheet
     from rover_gym.record.rover_run import RoverRun
+    from rover_gym.show.figures.style import Sheet
 
 MARGIN = 0.1  # shown around the way, of its larger extent
 RATIO = 1.5  # of the map, width to height

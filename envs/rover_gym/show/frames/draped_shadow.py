@@ -6,8 +6,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkTexture
 
-from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.core import RoverModel, Terrain
+from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.show.frames import appearance as look
 from rover_gym.show.frames.appearance import SHADOW, SUN
 from rover_gym.show.frames.vtk_actors import Array, actor_with, mesh

@@ -20,9 +20,9 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkArrowSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
 
-from rover_gym.ground.terrain_parts import plane_of, sand_of, spheres_of, surfaces_of
-from rover_gym.ground.maps.ground_lookup import TerrainLike, as_terrain
 from rover_gym.core import RoverModel, Simulation, Terrain
+from rover_gym.ground.maps.ground_lookup import TerrainLike, as_terrain
+from rover_gym.ground.terrain_parts import plane_of, sand_of, spheres_of, surfaces_of
 from rover_gym.models.lookup import ModelLike, as_model
 from rover_gym.show.frames import appearance as look
 from rover_gym.show.frames.draped_shadow import DrapedShadow

@@ -14,9 +14,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
+from rover_gym.core import OptionError
 from rover_gym.core.extras import MissingExtraError
 from rover_gym.core.files import written_whole
-from rover_gym.core import OptionError
 from rover_gym.core.validation import known_keys, refuse, vector, whole
 
 if TYPE_CHECKING:

@@ -3,8 +3,8 @@
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.core import SoftGround, Terrain
+from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.show.frames import appearance as look
 from rover_gym.show.frames.appearance import SUN
 from rover_gym.show.frames.scenery_actors import LIFT

@@ -9,8 +9,8 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSphereMapper
 
-from rover_gym.ground.terrain_parts import heights_of, triangles_of
 from rover_gym.core import HeightField, Plane, Terrain, TriangleMesh
+from rover_gym.ground.terrain_parts import heights_of, triangles_of
 from rover_gym.show.frames import appearance as look
 from rover_gym.show.frames.appearance import FIXED_BALL_COLOUR, SAND_COLOUR, SUN
 from rover_gym.show.frames.shading import SoilShading

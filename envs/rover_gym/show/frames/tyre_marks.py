@@ -3,8 +3,8 @@
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkPolyDataMapper
 
-from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.core import RoverModel, Terrain
+from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.show.frames.vtk_actors import Array, actor_with, mesh
 
 TYRE_MARK = (0.23, 0.13, 0.09)

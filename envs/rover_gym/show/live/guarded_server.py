@@ -17,8 +17,8 @@ from collections.abc import Awaitable, Callable
 from typing import Any, TypeAlias
 from urllib.parse import urlsplit
 
-from rover_gym.core.extras import require
 from rover_gym.core import OptionError
+from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse, whole
 
 #: A connection of a page to the drive; one of the library `websockets`.

@@ -20,7 +20,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rover_gym.core import CommandError, RoverGymError
 from rover_gym.core.extras import MissingExtraError
+from rover_gym.core.validation import checked, refuse
 from rover_gym.show.live.live_commands import (
     Change,
     Command,
@@ -35,9 +37,7 @@ from rover_gym.show.live.live_commands import (
 from rover_gym.show.live.live_recording import LiveRecording
 from rover_gym.show.live.live_scene import BY_HAND
 from rover_gym.show.live.live_state import LiveState, Past, poses_of
-from rover_gym.core import CommandError, RoverGymError
 from rover_gym.show.replay.overlays import live_overlays
-from rover_gym.core.validation import checked, refuse
 
 if TYPE_CHECKING:
     from rover_gym.show.live.live_rover import LiveRover

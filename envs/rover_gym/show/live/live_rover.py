@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import EpisodeRun, OptionError, SphereField, TerrainError, Union, sin_cos
+from rover_gym.core.validation import checked, number, refuse
+from rover_gym.drive.command import CommandController
 from rover_gym.envs.env_snapshot import EnvSnapshot
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.task import TRUNK_LOAD
 from rover_gym.ground.terrain_parts import heights_of, plane_of
 from rover_gym.show.live.live_scene import LiveChoices, LiveScene
-from rover_gym.core import EpisodeRun, OptionError, SphereField, TerrainError, Union, sin_cos
-from rover_gym.drive.command import CommandController
-from rover_gym.core.validation import checked, number, refuse
 
 if TYPE_CHECKING:
-    from rover_gym.envs.episode_scene import EpisodeScene
     from rover_gym.drive.named_policy import NamedPolicy, Policy
+    from rover_gym.envs.episode_scene import EpisodeScene
 
 #: Radii of rocks that may be thrown, m, and how many lie at most.
 ROCK_RADII = (0.03, 0.6)

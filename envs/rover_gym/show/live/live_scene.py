@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
+from rover_gym.core import OptionError, RoverModel, Terrain
+from rover_gym.core.validation import number, refuse, whole
+from rover_gym.drive.named_policy import NamedPolicy, named_policy
 from rover_gym.envs.arguments import TERRAINS
 from rover_gym.envs.start import MAX_DIFFICULTY
-from rover_gym.core import OptionError, RoverModel, Terrain
-from rover_gym.drive.named_policy import NamedPolicy, named_policy
-from rover_gym.core.validation import number, refuse, whole
 
 #: A driver that is no policy: the keyboard, the gamepad or the sliders.
 BY_HAND = "hand"

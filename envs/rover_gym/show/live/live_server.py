@@ -11,17 +11,17 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rover_gym.envs.start import MAX_DIFFICULTY
+from rover_gym.core import CommandError, RoverGymError
 from rover_gym.core.extras import require
+from rover_gym.core.validation import checked, refuse
+from rover_gym.envs.start import MAX_DIFFICULTY
+from rover_gym.show.frames.appearance import WHEEL_COLOURS
 from rover_gym.show.live.guarded_server import GuardedServer
 from rover_gym.show.live.live_commands import command_of, read_message
 from rover_gym.show.live.live_rover import ROCK_RADII
 from rover_gym.show.live.live_scene import GOAL_DISTANCES, GRAVITY
 from rover_gym.show.live.live_view import LiveView
-from rover_gym.core import CommandError, RoverGymError
-from rover_gym.show.frames.appearance import WHEEL_COLOURS
 from rover_gym.show.replay.page import page_parts, page_policy
-from rover_gym.core.validation import checked, refuse
 
 if TYPE_CHECKING:
     from rover_gym.show.live.live_loop import LiveLoop

@@ -13,9 +13,9 @@ from rover_gym.core import OptionError
 from rover_gym.core.validation import number, refuse
 
 if TYPE_CHECKING:
+    from rover_gym.core import RoverModel, Terrain
     from rover_gym.show.live.live_rover import LiveMoment, LiveRover
     from rover_gym.show.live.live_scene import LiveScene
-    from rover_gym.core import RoverModel, Terrain
     from rover_gym.show.replay.overlays import Overlays
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.terrain_parts import sand_of
 from rover_gym.core import sin_cos
+from rover_gym.ground.terrain_parts import sand_of
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.show.replay.page_scene import FrameChannel, PageScene

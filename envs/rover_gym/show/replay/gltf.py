@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import __version__
 from rover_gym.core.extras import require
 from rover_gym.core.files import write_whole
-from rover_gym.core import __version__
+from rover_gym.core.rotations import continuous, quaternions
+from rover_gym.core.validation import checked
 from rover_gym.show.frames.appearance import ROCK_COLOUR, Colour, Part, sphere_mesh
 from rover_gym.show.replay.scenery import (
     coloured_meshes,
@@ -26,8 +28,6 @@ from rover_gym.show.replay.scenery import (
     spheres,
     surfaces,
 )
-from rover_gym.core.rotations import continuous, quaternions
-from rover_gym.core.validation import checked
 
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core.rotations import continuous, quaternions
 from rover_gym.ground.terrain_parts import plane_of, spheres_of
 from rover_gym.record.rover_run import moving_mean
 from rover_gym.show.frames.appearance import (
@@ -34,7 +35,6 @@ from rover_gym.show.replay.scenery import (
     wall_polygons,
     wall_poses,
 )
-from rover_gym.core.rotations import continuous, quaternions
 
 if TYPE_CHECKING:
     from rover_gym.record.grain_run import GrainRun

@@ -10,17 +10,17 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rover_gym.core import OptionError
 from rover_gym.core.files import written_whole
+from rover_gym.core.validation import checked, refuse
 from rover_gym.record.disk_run import DiskRun
 from rover_gym.record.grain_run import GrainRun
-from rover_gym.core import OptionError
 from rover_gym.record.planar_run import PlanarRun
 from rover_gym.record.rover_run import RoverRun
 from rover_gym.show.replay.flat_scene import disk_scene, planar_scene
 from rover_gym.show.replay.grain_scene import grain_scene
 from rover_gym.show.replay.page_scene import SAMPLES
 from rover_gym.show.replay.rover_scene import rover_scene
-from rover_gym.core.validation import checked, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

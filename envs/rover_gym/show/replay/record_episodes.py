@@ -8,12 +8,12 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import checked, known_keys, refuse
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.spec_json import as_json
-from rover_gym.core import OptionError
 from rover_gym.show.replay.overlays import SENSORS
 from rover_gym.show.replay.tape import Tape, Watched
-from rover_gym.core.validation import checked, known_keys, refuse
 
 
 class RecordEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.terrain_parts import map_of, surfaces_of
 from rover_gym.core import HeightField
+from rover_gym.core.rotations import continuous, quaternions
+from rover_gym.ground.terrain_parts import map_of, surfaces_of
 from rover_gym.record.channels import outcome_words
 from rover_gym.record.rover_run import moving_mean
 from rover_gym.show.frames.appearance import GROUND_COLOUR_2, HAZE, SAND_GROUND, WHEEL_COLOURS
@@ -28,7 +29,6 @@ from rover_gym.show.replay.scenery import (
     trunk_path,
 )
 from rover_gym.show.replay.wheel_marks import DrawnWheel, drawn_wheels, feet, marks, rut_edits, world_forces
-from rover_gym.core.rotations import continuous, quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

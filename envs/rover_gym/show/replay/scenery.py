@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground.terrain_parts import heights_of, plane_of, spheres_of, surfaces_of, triangles_of
 from rover_gym.core import HeightField, Plane, TriangleMesh
+from rover_gym.core.rotations import quaternions
+from rover_gym.ground.terrain_parts import heights_of, plane_of, spheres_of, surfaces_of, triangles_of
 from rover_gym.show.frames.appearance import (
     COLUMN_COLOUR,
     GOAL_COLOUR,
@@ -24,7 +25,6 @@ from rover_gym.show.frames.appearance import (
     pennant,
     rover_parts,
 )
-from rover_gym.core.rotations import quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

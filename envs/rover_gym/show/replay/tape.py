@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from rover_gym.envs.rover_env import RoverEnv
     from rover_gym.drive.named_policy import Policy
+    from rover_gym.envs.rover_env import RoverEnv
 
 
 class Watched:

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core.files import written_whole
+from rover_gym.core.rotations import axis_angles, continuous, quaternions
+from rover_gym.core.validation import checked
 from rover_gym.show.frames.appearance import (
     ROCK_COLOUR,
     SKY_COLOUR,
@@ -32,8 +34,6 @@ from rover_gym.show.replay.scenery import (
     spheres,
     surfaces,
 )
-from rover_gym.core.rotations import axis_angles, continuous, quaternions
-from rover_gym.core.validation import checked
 
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun

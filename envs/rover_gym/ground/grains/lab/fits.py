@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import checked, number, refuse
 from rover_gym.ground.grains.disk_trials import Pull, Traction, fit_traction
 from rover_gym.ground.grains.lab.plate_and_shear import PlatePoint, ShearPoint
 from rover_gym.ground.grains.lab.wheel import WheelPoint
-from rover_gym.core import OptionError
-from rover_gym.core.validation import checked, number, refuse
 
 Array = npt.NDArray[np.float64]
 

@@ -30,6 +30,8 @@ from typing import Any
 
 import numpy as np
 
+from rover_gym.core import OptionError
+from rover_gym.core.validation import checked, number, refuse, whole
 from rover_gym.ground.grains.ball_bed import BallBed
 from rover_gym.ground.grains.lab.rig import (
     Rig,
@@ -41,8 +43,6 @@ from rover_gym.ground.grains.lab.rig import (
     larger_than_grains,
     step_count,
 )
-from rover_gym.core import OptionError
-from rover_gym.core.validation import checked, number, refuse, whole
 
 
 @dataclass(frozen=True)

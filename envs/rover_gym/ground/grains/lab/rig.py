@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core.files import written_whole
-from rover_gym.ground.grains.ball_bed import BallBed
 from rover_gym.core import GrainSimulation, OptionError, Plane, RoverGrainSimulation, RoverModel, Simulation
+from rover_gym.core.files import written_whole
 from rover_gym.core.validation import checked, number, refuse
+from rover_gym.ground.grains.ball_bed import BallBed
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -24,10 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.ground.grains.ball_bed import BallBed
-from rover_gym.ground.grains.lab.rig import Array, Rig, clear_height, fall, ground, larger_than_grains, step_count
 from rover_gym.core import OptionError
 from rover_gym.core.validation import checked, number, refuse, whole
+from rover_gym.ground.grains.ball_bed import BallBed
+from rover_gym.ground.grains.lab.rig import Array, Rig, clear_height, fall, ground, larger_than_grains, step_count
 
 #: Distance of the wheel's centre from the end walls, radii.
 CLEAR_OF_WALLS = 1.5
