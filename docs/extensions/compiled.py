@@ -12,7 +12,7 @@ from typing import Any
 from sphinx.pycode import ModuleAnalyzer
 
 import rover_gym
-from rover_gym import mechanics
+from rover_gym import core
 
 NAMES_IN_PRINT = (
     ("npt.ArrayLike", "ArrayLike"),
@@ -34,10 +34,11 @@ def in_print(text: str) -> str:
 
 def use_stub() -> None:
     """Puts the stub's classes where Sphinx looks for the compiled ones, in `rover_gym.core`."""
-    name = mechanics.__name__
-    stub = ModuleType(name, mechanics.__doc__)
-    source = Path(mechanics.__file__).with_name("_core.pyi")
+    name = core.__name__
+    stub = ModuleType(name, core.__doc__)
+    source = Path(core.__file__).parents[1] / "_core.pyi"
     text = in_print(source.read_text(encoding="utf-8"))
+    stub.__path__ = core.__path__  # its checks of arguments are modules
     stub.ArrayLike = type("ArrayLike", (), {"__module__": "numpy.typing"})
     stub.first_docstring = first_docstring
     run = text.replace("@overload", "@first_docstring")

@@ -10,7 +10,7 @@ def home(name: str) -> str:
     """The full name under which a chapter documents a name of `rover_gym`."""
     thing = getattr(rover_gym, name)
     module = str(getattr(thing, "__module__", ""))
-    room = "mechanics" if is_compiled(thing) or not module.startswith("rover_gym.") else module.split(".")[1]
+    room = "core" if is_compiled(thing) or not module.startswith("rover_gym.") else module.split(".")[1]
     return f"rover_gym.{room}.{name}"
 
 

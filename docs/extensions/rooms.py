@@ -12,7 +12,7 @@ CHAPTERS = Path(__file__).parents[1] / "api"
 
 def without_chapter() -> list[str]:
     """Names of the rooms that offer public names and have no chapter."""
-    rooms = [f"rover_gym.{info.name}" for info in pkgutil.iter_modules(rover_gym.__path__) if info.ispkg]
+    rooms = [info.name for info in pkgutil.walk_packages(rover_gym.__path__, "rover_gym.") if info.ispkg]
     chapters = "".join(page.read_text(encoding="utf-8") for page in CHAPTERS.glob("*.md"))
     open_ones = [room for room in rooms if hasattr(importlib.import_module(room), "__all__")]
     return sorted(room for room in open_ones if not re.search(rf"auto\w+:: {re.escape(room)}\b", chapters))

@@ -31,7 +31,7 @@ from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover
 pytest.importorskip("h5py")
 
 FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
-ROOMS = ("record", "replay", "grains", "grains.lab", "figures", "live", "exports")
+ROOMS = ("record", "ground.grains", "ground.grains.lab", "show.replay", "show.figures", "show.live", "exports")
 #: What only holds results, and is made by other functions.
 RESULTS = {
     "BallBed", "BedEnergy", "GrainRun", "LiveState", "PitFill", "PlatePoint", "PressureLaw", "RoverRun", "ShearLaw",

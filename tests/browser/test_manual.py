@@ -17,7 +17,7 @@ from PIL import Image
 from selenium import webdriver
 
 import rover_gym
-from rover_gym import _core, mechanics
+from rover_gym import _core, core
 from rover_gym.envs.registration import ENVIRONMENTS
 
 pytestmark = pytest.mark.timeout(1200)
@@ -66,9 +66,9 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chro
 
 def rooms() -> list[ModuleType]:
     """The modules that offer public names."""
-    names = [f"rover_gym.{info.name}" for info in pkgutil.iter_modules(rover_gym.__path__) if info.ispkg]
+    names = [info.name for info in pkgutil.walk_packages(rover_gym.__path__, "rover_gym.") if info.ispkg]
     found = [importlib.import_module(name) for name in names]
-    return [mechanics, *(room for room in found if hasattr(room, "__all__"))]
+    return [room for room in found if hasattr(room, "__all__")]
 
 
 def public_names() -> Iterator[tuple[str, Any]]:
@@ -77,7 +77,7 @@ def public_names() -> Iterator[tuple[str, Any]]:
         for name in room.__all__:
             thing = getattr(room, name)
             is_compiled = getattr(_core, name, None) is thing
-            if name.startswith("_") or (is_compiled and room is not mechanics):
+            if name.startswith("_") or (is_compiled and room is not core):
                 continue
             full = f"{room.__name__}.{name}"
             yield full, thing

@@ -6,6 +6,7 @@ from rover_gym.record.grain_run import GrainRun, GrainSampler
 from rover_gym.record.planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, read_run
+from rover_gym.record.saved_runs import SavedRun, open_run, record_run
 from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory
 
 __all__ = [
@@ -20,12 +21,15 @@ __all__ = [
     "RecordingError",
     "RoverRun",
     "RoverSampler",
+    "SavedRun",
     "Trajectory",
     "describe",
     "is_planar",
+    "open_run",
     "planar_run_of",
     "read_frames",
     "read_run",
     "read_trajectory",
+    "record_run",
     "row_count",
 ]

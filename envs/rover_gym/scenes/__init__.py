@@ -1,4 +1,8 @@
-"""The cheapest simulation that a scene permits: model, ground, time-stepping scheme and step size, each with a reason.
+"""Simulations made for a scene.
+
+`plan` chooses the cheapest simulation that a scene permits: model, ground, time-stepping scheme and step size, each
+with a reason. `inclined_plane` and `sphere_rug` are experiments of the report of 2010; a closed form exists for
+`ball_on_slope`.
 
     >>> from rover_gym import Plane
     >>> from rover_gym.scenes import Scene, plan

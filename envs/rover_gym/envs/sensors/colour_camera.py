@@ -24,9 +24,9 @@ SAME_DISTANCE = 1e-9
 class ColourCamera(Camera):
     """A colour image of ground, rocks, rover and sky, cast ray by ray in the core; it needs no renderer.
 
-    Colours, Sun, sky light and haze are those of rendered frames (`rover_gym.show.frames.appearance`): a matt surface of
-    normal n shows its colour times the light of sky and ground and, outside shadows, that of the Sun times max(0, n·s)
-    (Lambert 1760). Of the rover, collision shapes are seen. Its place and its pixels are those of `Camera`.
+    Colours, Sun, sky light and haze are those of rendered frames (`rover_gym.show.frames.appearance`): a matt surface
+    of normal n shows its colour times the light of sky and ground and, outside shadows, that of the Sun times
+    max(0, n·s) (Lambert 1760). Of the rover, collision shapes are seen. Place and pixels are those of `Camera`.
 
     Args:
         max_range: How far it sees, m; by default as far as the haze lets it.

@@ -1,7 +1,7 @@
 """Vectorised environments, stepped by the compiled core.
 
-`RoverVectorEnv` is for Gymnasium. `rover_gym.envs.vector.sb3`, which imports stable-baselines3, has its equivalent for that
-library.
+`RoverVectorEnv` is for Gymnasium. `rover_gym.envs.vector.sb3` has its equivalent for stable-baselines3, which
+it imports.
 """
 
 from rover_gym.envs.batch import BatchSnapshot, RoverBatch

@@ -3,7 +3,7 @@
 Pressure under a plate at a depth (Bekker 1969):       p = k zⁿ
 Shear stress at a displacement (Janosi and Hanamoto 1961): τ = τ_max (1 − exp(−j / K))
 Its limit under a normal stress (Mohr and Coulomb):      τ_max = c + σ tan φ
-Pull of a wheel at a slip, in loads:                     A (1 − exp(−(s − s₀) / K)), as `rover_gym.ground.grains` fits it
+Pull of a wheel at a slip, in loads:                     A (1 − exp(−(s − s₀) / K)), as disks are fitted
 
 Errors are standard errors from the scatter about the curve, as if the points scattered independently.
 """
