@@ -30,11 +30,12 @@ from rover_gym.core import (
     Plane,
     Simulation,
     SimulationBatch,
+    SoftGround,
     TwoWheelRoverSimulation,
     disk_packing,
 )
 from rover_gym.envs.sand_ground import sand_rover
-from rover_gym.ground.sand import SoftGround, named_soil
+from rover_gym.ground.sand import named_soil
 
 COMMITTED = Path(__file__).parents[2] / "tests" / "golden" / "bits.json"
 #: Simulated of each scene, s, and between two states that are hashed.

@@ -35,12 +35,13 @@ from rover_gym.core import (
     MirroredRoverSimulation,
     RoverGrainSimulation,
     Sine,
+    SoftGround,
     TwoWheelRoverSimulation,
     ball_packing,
     disk_packing,
 )
 from rover_gym.envs.sand_ground import sand_rover
-from rover_gym.ground.sand import SoftGround, named_soil
+from rover_gym.ground.sand import named_soil
 
 Arrays = tuple[npt.NDArray[np.float64], ...]
 #: Time between two states that are recorded, s, and how many there are of each drive.

@@ -7,9 +7,9 @@ import pytest
 from refusals import refused
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, StateError
-from rover_gym.core import HeightField, SphereField, Terrain
+from rover_gym.core import HeightField, SoftGround, SphereField, Terrain
 from rover_gym.derivatives import jax_rollout, rollout, torch_rollout
-from rover_gym.ground.sand import SoftGround, Soil, named_soil
+from rover_gym.ground.sand import Soil, named_soil
 
 from .test_derivatives import commands_of, relative, state_of, value_and_gradients
 from .test_derivatives_of_loops import with_a_bar

@@ -17,9 +17,7 @@ from rover_gym.ground.grains import (
     even_radii,
     lognormal_radii,
     outflow,
-    penetration_depths,
     rover_on_bed,
-    run_out,
     settled_balls,
     sieved_radii,
     silo,
@@ -28,6 +26,7 @@ from rover_gym.ground.grains import (
     tiled,
     with_wheel_width,
 )
+from rover_gym.record import penetration_depths, run_out
 from rover_gym.record.saved_runs import open_run, record_run
 
 G = 9.81

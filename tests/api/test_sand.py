@@ -14,6 +14,7 @@ from rover_gym.core import (
     RoverGymError,
     RoverModel,
     Simulation,
+    SoftGround,
     SphereField,
     TerrainError,
     Union,
@@ -21,7 +22,6 @@ from rover_gym.core import (
 from rover_gym.ground.sand import (
     Runs,
     SingleWheel,
-    SoftGround,
     Soil,
     climbed_slope,
     errors_of,
@@ -54,7 +54,7 @@ def test_every_soil_bears_a_wheel_and_says_where_it_is_from(name: str) -> None:
 
 
 def test_the_points_follow_the_accuracy() -> None:
-    from rover_gym.ground.sand import WheelBed  # noqa: PLC0415 - beside its use
+    from rover_gym.core import WheelBed  # noqa: PLC0415 - beside its use
 
     coarse, fine = (WheelBed(named_soil("cmu-sand"), 0.058, 0.05, accuracy=a) for a in (0.05, 0.002))
     assert coarse.n_points < fine.n_points

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 from rover_gym import Plane, RoverModel, Simulation
 from rover_gym.cli import app
 from rover_gym.cli.console import figure, tidy
-from rover_gym.ground.sand import SoftGround, named_soil, with_wide_wheels
+from rover_gym.core import SoftGround
+from rover_gym.ground.sand import named_soil, with_wide_wheels
 from rover_gym.record import read_run
 from rover_gym.record.saved_runs import record_run
 from rover_gym.show.figures.drawing import drawable

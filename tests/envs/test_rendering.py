@@ -21,10 +21,10 @@ from refusals import refused
 
 import rover_gym
 from rover_gym import HeightField, OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
-from rover_gym.core import ModelError
+from rover_gym.core import ModelError, SoftGround
 from rover_gym.core.extras import MissingExtraError
 from rover_gym.envs.sand_ground import sand_rover
-from rover_gym.ground.sand import SoftGround, named_soil
+from rover_gym.ground.sand import named_soil
 from rover_gym.show.frames import FrameRenderer
 from rover_gym.show.frames import appearance as look
 from rover_gym.show.frames.appearance import Part, part_mesh, rover_parts

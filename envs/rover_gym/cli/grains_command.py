@@ -131,7 +131,8 @@ def sphere(
 ) -> None:
     """Let a sphere strike a bed of balls; record it and say how deep it goes."""
     from rover_gym.ground.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.ground.grains.bed_scenes import penetration_depths, striking_sphere  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.bed_scenes import striking_sphere  # noqa: PLC0415 - as above
+    from rover_gym.record import penetration_depths
 
     given.check("sphere")
     options = given.options

@@ -22,7 +22,6 @@ from rover_gym.core.validation import checked, number, refuse, whole
 from rover_gym.ground.grains.ball_bed import DENSITY, MOST_BALLS, BallBed, check_memory, settle
 from rover_gym.ground.grains.grain_surface import surface_map
 from rover_gym.ground.grains.pit import PitFill
-from rover_gym.record.grain_run import GrainRun
 
 CLEARANCE = 1e-3  # m, between a rover's wheels and the balls, or a sphere and the balls, at the start
 
@@ -61,18 +60,6 @@ def striking_sphere(bed: BallBed, sphere_radius: float, density: float, drop: fl
     velocity[-1, 1] = -np.sqrt(2.0 * g * drop)
     sim.set_state(position, velocity)
     return sim
-
-
-@checked(run="GrainRun")
-def penetration_depths(run: GrainRun) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """(n,) depth of the lowest point of the last ball below the surface that it struck, m.
-
-    Args:
-        run: Of a `striking_sphere`.
-    """
-    lowest = run.positions[:, -1, 1].astype(np.float64) - run.radius[-1]
-    depths: np.ndarray[Any, np.dtype[np.float64]] = lowest[0] - lowest
-    return depths
 
 
 @checked(bed="BallBed", model="RoverModel")
@@ -174,9 +161,6 @@ FLOOR = ((0.0, 0.0, 0.0, 0.0, 1.0, 0.0),)
 
 SPREAD = 0.1  # radii of balls are drawn within this share of their mean
 
-#: Share of a column's balls below its height, and share of the floor that balls cover at the edge of its deposit.
-HIGHEST, COVERED = 0.98, 0.5
-
 #: Share of a drum's radius about its axis in which the slope is measured, away from the wall.
 INNER = 0.6
 
@@ -254,27 +238,6 @@ def drum(
     settle(filled)
     turning = Drum(wall, length, rate)
     return GrainSimulation(filled.radius, filled.mass, filled.position, vessel=turning, **options)
-
-
-@checked(run="GrainRun", tube=float)
-def run_out(run: GrainRun, tube: float) -> tuple[float, float]:
-    """Aspect ratio of a column at the first sample, and how far its edge went by the last, in its first radii.
-
-    Single balls roll on: the edge is where balls cover less than half of the floor.
-
-    Args:
-        run: Of a `column`.
-        tube: Its first radius, m.
-    """
-    first, last = (run.positions_of(run.rows[[k]])[0].astype(np.float64) for k in (0, -1))
-    height = float(np.quantile(first[:, 1] + run.radius, HIGHEST))
-    surface = surface_map(last, run.radius)
-    x, z = np.meshgrid(surface.x, surface.z)
-    rings = (np.hypot(x, z) / (2.0 * float(run.radius.mean()))).astype(int).ravel()
-    covered = np.bincount(rings, np.isfinite(surface.heights).ravel()) / np.maximum(np.bincount(rings), 1)
-    thin = np.flatnonzero(covered < COVERED)
-    edge = 2.0 * float(run.radius.mean()) * float(thin[0] if len(thin) else len(covered))
-    return height / tube, edge / tube - 1.0
 
 
 @checked(run="GrainRun")

@@ -1,6 +1,5 @@
 """Wheels on sand: soils, a virtual test bed for one wheel, and fits to measurements."""
 
-from rover_gym.core import SoftGround, WheelBed
 from rover_gym.ground.sand.fit import FittedSoil, errors_of, fit_soil
 from rover_gym.ground.sand.measurements import Runs, SingleWheel, read_runs
 from rover_gym.ground.sand.rovers import slip_on_slope, with_wide_wheels
@@ -12,10 +11,8 @@ __all__ = [
     "FittedSoil",
     "Runs",
     "SingleWheel",
-    "SoftGround",
     "Soil",
     "Trial",
-    "WheelBed",
     "climbed_slope",
     "errors_of",
     "fit_soil",
