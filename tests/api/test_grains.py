@@ -16,17 +16,15 @@ from rover_gym.ground.grains import (
     drum,
     even_radii,
     lognormal_radii,
-    outflow,
     rover_on_bed,
     settled_balls,
     sieved_radii,
     silo,
-    slopes,
     striking_sphere,
     tiled,
     with_wheel_width,
 )
-from rover_gym.record import penetration_depths, run_out
+from rover_gym.record import outflow, penetration_depths, run_out, slopes
 from rover_gym.record.saved_runs import open_run, record_run
 
 G = 9.81

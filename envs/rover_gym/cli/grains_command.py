@@ -132,7 +132,7 @@ def sphere(
     """Let a sphere strike a bed of balls; record it and say how deep it goes."""
     from rover_gym.ground.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.ground.grains.bed_scenes import striking_sphere  # noqa: PLC0415 - as above
-    from rover_gym.record import penetration_depths
+    from rover_gym.record import penetration_depths  # noqa: PLC0415 - as above
 
     given.check("sphere")
     options = given.options

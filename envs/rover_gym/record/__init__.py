@@ -2,7 +2,7 @@
 
 from rover_gym.record.channels import Channel, RecordingError, RoverSampler, describe, row_count
 from rover_gym.record.disk_run import DiskRun, DiskSampler
-from rover_gym.record.grain_measures import penetration_depths, run_out
+from rover_gym.record.grain_measures import outflow, penetration_depths, run_out, slopes
 from rover_gym.record.grain_run import GrainRun, GrainSampler
 from rover_gym.record.planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
 from rover_gym.record.recorder import Recorder
@@ -27,6 +27,7 @@ __all__ = [
     "describe",
     "is_planar",
     "open_run",
+    "outflow",
     "penetration_depths",
     "planar_run_of",
     "read_frames",
@@ -35,4 +36,5 @@ __all__ = [
     "record_run",
     "row_count",
     "run_out",
+    "slopes",
 ]

@@ -23,16 +23,7 @@ from rover_gym.ground.grains.ball_bed import (
     sieved_radii,
     tiled,
 )
-from rover_gym.ground.grains.bed_scenes import (
-    column,
-    drum,
-    outflow,
-    rover_on_bed,
-    silo,
-    slopes,
-    striking_sphere,
-    with_wheel_width,
-)
+from rover_gym.ground.grains.bed_scenes import column, drum, rover_on_bed, silo, striking_sphere, with_wheel_width
 from rover_gym.ground.grains.disk_bed import DiskBed, rover_on_disks, settled_disks
 from rover_gym.ground.grains.disk_trials import (
     BedEstimate,
@@ -69,7 +60,6 @@ __all__ = [
     "even_radii",
     "fit_traction",
     "lognormal_radii",
-    "outflow",
     "over_beds",
     "rover_on_bed",
     "rover_on_disks",
@@ -79,7 +69,6 @@ __all__ = [
     "settled_track",
     "sieved_radii",
     "silo",
-    "slopes",
     "striking_sphere",
     "surface_map",
     "tiled",

@@ -20,7 +20,6 @@ from rover_gym.core import (
 )
 from rover_gym.core.validation import checked, number, refuse, whole
 from rover_gym.ground.grains.ball_bed import DENSITY, MOST_BALLS, BallBed, check_memory, settle
-from rover_gym.ground.grains.grain_surface import surface_map
 from rover_gym.ground.grains.pit import PitFill
 
 CLEARANCE = 1e-3  # m, between a rover's wheels and the balls, or a sphere and the balls, at the start
@@ -161,9 +160,6 @@ FLOOR = ((0.0, 0.0, 0.0, 0.0, 1.0, 0.0),)
 
 SPREAD = 0.1  # radii of balls are drawn within this share of their mean
 
-#: Share of a drum's radius about its axis in which the slope is measured, away from the wall.
-INNER = 0.6
-
 
 @checked(seed=int)
 def column(count: int, tube: float, radius: float, *, seed: int = 0, **options: Any) -> GrainSimulation:
@@ -238,39 +234,6 @@ def drum(
     settle(filled)
     turning = Drum(wall, length, rate)
     return GrainSimulation(filled.radius, filled.mass, filled.position, vessel=turning, **options)
-
-
-@checked(run="GrainRun")
-def outflow(run: GrainRun) -> Array:
-    """(n,) mass that has left a silo through its hole, kg.
-
-    Args:
-        run: Of a `silo`.
-    """
-    below = run.positions[..., 1] < 0.0
-    result: Array = below @ run.mass
-    return result
-
-
-@checked(run="GrainRun")
-def slopes(run: GrainRun) -> Array:
-    """(n,) slope of the surface in a drum, rad, positive where it rises along x; nan where too few balls lie.
-
-    Args:
-        run: Of a `drum`.
-    """
-    if run.vessel is None or run.vessel["kind"] != "drum":
-        refuse(OptionError, "run", run.title, "is not a run of a drum")
-    inner = INNER * run.vessel["radius"]
-    result = np.full(run.n_frames, np.nan)
-    for k, places in enumerate(run.positions):
-        surface = surface_map(places, run.radius)
-        heights = surface.heights
-        x = np.broadcast_to(surface.x - run.vessel["centre"][0], heights.shape)
-        used = np.isfinite(heights) & (np.abs(x) < inner)
-        if used.sum() > 2 and np.ptp(x[used]) > 0.5 * inner:
-            result[k] = np.arctan(np.polyfit(x[used], heights[used], 1)[0])
-    return result
 
 
 def _rows_in_drum(wall: float, length: float, largest: float) -> Array:
