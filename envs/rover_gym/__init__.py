@@ -23,8 +23,20 @@ The package consists of the subpackages below. Each one may import those above i
 
 import lazy_loader
 
+from rover_gym.core import HeightField, RoverModel, SphereField, Terrain, TriangleMesh
+from rover_gym.core.deferred import defer
 from rover_gym.envs.registration import register_environments
 
 register_environments()
+
+_METHODS = ("from_file", "from_urdf", "from_mjcf", "to_file", "to_urdf", "to_mjcf", "_opened")
+defer(RoverModel, "rover_gym.models.model_files", *_METHODS)
+for _cls, _names in (
+    (SphereField, ["from_file"]),
+    (HeightField, ["from_file", "fractal"]),
+    (TriangleMesh, ["from_file"]),
+    (Terrain, ["_opened"]),
+):
+    defer(_cls, "rover_gym.ground.maps.terrain_files", *_names)
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

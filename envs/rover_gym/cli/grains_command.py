@@ -37,7 +37,8 @@ def collapse(
     tube: Annotated[float, typer.Option(help="Radius of the column, m.")] = 0.06,
 ) -> None:
     """Let a round column of balls collapse on a floor; record it and say how far it spreads."""
-    from rover_gym.ground.grains.bed_scenes import column, run_out  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.ground.grains.bed_scenes import column  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.record.grain_measures import run_out  # noqa: PLC0415 - as above
 
     given.check("collapse")
     options = given.options
@@ -66,8 +67,8 @@ def silo(
     hole: Annotated[float, typer.Option(help="Radius of the hole in its floor, m.")] = 0.03,
 ) -> None:
     """Empty a silo of balls through a round hole; record it and say how fast they leave."""
-    from rover_gym.ground.grains.bed_scenes import outflow  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.ground.grains.bed_scenes import silo as scene  # noqa: PLC0415 - as above
+    from rover_gym.ground.grains.bed_scenes import silo as scene  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.record.grain_measures import outflow  # noqa: PLC0415 - as above
 
     given.check("silo")
     options = given.options
@@ -101,7 +102,7 @@ def drum(
 ) -> None:
     """Turn a drum with balls; record it and say how steep they lie."""
     from rover_gym.ground.grains.bed_scenes import drum as scene  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.ground.grains.bed_scenes import slopes  # noqa: PLC0415 - as above
+    from rover_gym.record.grain_measures import slopes  # noqa: PLC0415 - as above
 
     given.check("drum")
     options = given.options
@@ -132,7 +133,7 @@ def sphere(
     """Let a sphere strike a bed of balls; record it and say how deep it goes."""
     from rover_gym.ground.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.ground.grains.bed_scenes import striking_sphere  # noqa: PLC0415 - as above
-    from rover_gym.record import penetration_depths  # noqa: PLC0415 - as above
+    from rover_gym.record.grain_measures import penetration_depths  # noqa: PLC0415 - as above
 
     given.check("sphere")
     options = given.options

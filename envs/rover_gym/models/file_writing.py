@@ -16,7 +16,8 @@ from rover_gym.core.polytopes import hull_properties
 from rover_gym.core.rotations import quaternion, roll_pitch_yaw, rotation_matrix, turn_z_to
 from rover_gym.core.validation import refuse
 from rover_gym.models.import_report import Z_UP_TO_Y_UP, Array
-from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds, checked_path
+from rover_gym.models.model_paths import checked_path
+from rover_gym.models.robot_tree import THIN_DISC, FileShape, check_kinds
 
 #: Width of the cylinder that represents a thin disc, relative to its radius.
 DISC_WIDTH = 0.1

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rover_gym.core import ModelError, RoverModel
 from rover_gym.core.validation import refuse
-from rover_gym.models.import_report import ImportReport
-from rover_gym.models.reading import read_mjcf, read_urdf
-from rover_gym.models.robot_tree import checked_path, is_urdf
+from rover_gym.models.model_paths import checked_path, is_urdf
+
+if TYPE_CHECKING:
+    from rover_gym.models.import_report import ImportReport
 
 #: A model, a name of the gallery or a file, as `as_model` takes it.
 ModelLike: TypeAlias = RoverModel | str | os.PathLike[str]
@@ -82,6 +83,8 @@ def read_robot(path: object, **options: Any) -> tuple[RoverModel, ImportReport]:
         ModelError: The file is of another kind, or cannot be read as a robot.
         OSError: The file cannot be read.
     """
+    from rover_gym.models.reading import read_mjcf, read_urdf  # noqa: PLC0415 - most models come from the gallery
+
     place = checked_path(path)
     kind = _kind(place)
     if kind not in ("URDF", "MJCF"):

@@ -17,6 +17,7 @@ from rover_gym.core.extras import require
 from rover_gym.core.rotations import from_quaternion
 from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, LoopEnd
+from rover_gym.models.model_paths import is_urdf
 from rover_gym.models.robot_tree import (
     MAX_LINKS,
     FileJoint,
@@ -24,7 +25,6 @@ from rover_gym.models.robot_tree import (
     FileShape,
     RobotTree,
     check_size,
-    is_urdf,
     refuse_in,
     right_angle,
 )

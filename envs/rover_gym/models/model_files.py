@@ -16,8 +16,8 @@ from rover_gym.core.validation import text_of_file
 from rover_gym.models.file_writing import write_mjcf, write_urdf
 from rover_gym.models.import_report import ImportReport
 from rover_gym.models.lookup import as_model
+from rover_gym.models.model_paths import checked_path
 from rover_gym.models.reading import read_mjcf, read_urdf
-from rover_gym.models.robot_tree import checked_path
 
 #: Longest model file, bytes.
 MOST_BYTES = 16 << 20

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
@@ -29,7 +28,7 @@ import numpy.typing as npt
 
 from rover_gym.core import ModelError
 from rover_gym.core.rotations import turn_z_to
-from rover_gym.core.validation import refuse, regular_file, shown
+from rover_gym.core.validation import refuse, shown
 from rover_gym.models.import_report import Array
 from rover_gym.models.loops import FileLoop, move_ends
 from rover_gym.models.meshes import Mesh, load_mesh
@@ -282,17 +281,6 @@ def refuse_in(path: Path, where: str, value: object, reason: str) -> NoReturn:
     raise error
 
 
-def checked_path(path: object) -> Path:
-    """Checks a path given by the user.
-
-    Raises:
-        ModelError: It is not a path.
-    """
-    if not isinstance(path, (str, os.PathLike)):
-        refuse(ModelError, "path", path, "must be a path")
-    return Path(os.fsdecode(path))
-
-
 def check_size(path: Path) -> None:
     """Rejects a file of more than `MAX_BYTES` before it is read.
 
@@ -303,19 +291,6 @@ def check_size(path: Path) -> None:
     size = path.stat().st_size
     if size > MAX_BYTES:
         refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
-
-
-def is_urdf(path: Path) -> bool:
-    """Whether a file is a URDF, judged by its beginning.
-
-    Raises:
-        ModelError: It is no regular file.
-        OSError: The file cannot be read.
-    """
-    with regular_file(path, error=ModelError).open("rb") as file:
-        start = file.read(1 << 16)
-    place = start.find(b"<robot")
-    return place >= 0 and b"<mujoco" not in start[:place]
 
 
 #: Smallest mass of a solid of a model, kg.

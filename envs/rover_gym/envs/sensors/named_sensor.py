@@ -1,22 +1,23 @@
 """Sensors from mappings, as the JSON of an environment's specification has them: `{"LaserScanner": {"rays": 90}}`."""
 
-from collections.abc import Mapping
 from dataclasses import fields
+from importlib import import_module
 from typing import Any
 
 from rover_gym.core import OptionError
 from rover_gym.core.validation import known_keys, mapping, refuse
-from rover_gym.envs.sensors.colour_camera import ColourCamera
-from rover_gym.envs.sensors.depth_camera import DepthCamera, LaserScanner
-from rover_gym.envs.sensors.inertial_unit import InertialUnit
 from rover_gym.envs.sensors.sensor import Mount, Sensor
-from rover_gym.envs.sensors.wheel_encoders import HeadingSensor, MotorSensors, WheelEncoders
 from rover_gym.envs.spec_json import named_object
 
-#: The sensors that a mapping may name.
-SENSORS: Mapping[str, type[Sensor]] = {
-    cls.__name__: cls
-    for cls in (ColourCamera, DepthCamera, HeadingSensor, InertialUnit, LaserScanner, MotorSensors, WheelEncoders)
+#: The sensors that a mapping may name, and their modules.
+SENSORS = {
+    "ColourCamera": "colour_camera",
+    "DepthCamera": "depth_camera",
+    "HeadingSensor": "wheel_encoders",
+    "InertialUnit": "inertial_unit",
+    "LaserScanner": "depth_camera",
+    "MotorSensors": "wheel_encoders",
+    "WheelEncoders": "wheel_encoders",
 }
 
 
@@ -38,7 +39,8 @@ def sensor_of(field: str, value: object) -> Sensor:
     name, given = found
     if name not in SENSORS:
         refuse(OptionError, field, name, f"unknown class of a sensor; known are {', '.join(SENSORS)}")
-    return SENSORS[name](**_arguments(f"{field}.{name}", SENSORS[name], given))
+    made: type[Sensor] = getattr(import_module(f"rover_gym.envs.sensors.{SENSORS[name]}"), name)
+    return made(**_arguments(f"{field}.{name}", made, given))
 
 
 def _arguments(field: str, cls: type[Sensor | Mount], value: object) -> dict[str, Any]:

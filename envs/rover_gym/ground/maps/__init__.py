@@ -4,8 +4,6 @@ These functions return arrays; `HeightField.from_file`, `HeightField.fractal`, `
 `SphereField.from_file`, in `terrain_files`, make terrains of them.
 """
 
-import rover_gym.ground.maps.terrain_files  # noqa: F401 - methods of the terrains
-from rover_gym.ground.maps.fractal import fractal_map
-from rover_gym.ground.maps.map_files import read_map, read_mesh
+import lazy_loader
 
-__all__ = ["fractal_map", "read_map", "read_mesh"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
