@@ -29,6 +29,7 @@ from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
 from rover_gym.models.ground_reach import above_the_ground
 from rover_gym.models.import_report import Array
 from rover_gym.models.robot_tree import FileLink, RobotTree, largest_round, round_radius
+from rover_gym.polytopes import reach
 from rover_gym.rotations import rotation_matrix
 from rover_gym.validation import number, refuse
 
@@ -202,12 +203,10 @@ def _clearance(model: RoverModel, sim: Simulation) -> float:
 
 
 def _lowest(shape: dict[str, Any], origin: Array, rotation: Array) -> float:
-    """Height of the lowest point of a box or sphere of a solid at a pose, m."""
+    """Height of the lowest point of a shape of a solid at a pose, m."""
     centre = origin + rotation @ np.array(shape.get("position") or (0.0, 0.0, 0.0))
-    if shape["kind"] == "sphere":
-        return float(centre[1] - shape["radius"])
     turn = rotation @ rotation_matrix(shape.get("rotation") or (0.0, 0.0, 0.0))
-    return float(centre[1] - np.abs(turn[1]) @ np.array(shape["size"]) / 2.0)
+    return float(centre[1]) - reach(shape, -turn[1])
 
 
 NAMED = re.compile(r"wheel|tyre|tire", re.IGNORECASE)
