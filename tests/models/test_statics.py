@@ -71,3 +71,31 @@ def test_a_line_behind_the_trunk_is_not_a_negative_distance_ahead() -> None:
     told = check_statics(RoverModel()).turning_centre
     assert "0.04 m behind the trunk's origin" in told
     assert "ahead" not in told
+
+
+@pytest.mark.parametrize(
+    ("shape", "height"),
+    [
+        ({"kind": "cylinder", "radius": 0.05, "height": 0.2}, 0.05),
+        ({"kind": "capsule", "radius": 0.05, "height": 0.2}, 0.05),
+        ({"kind": "ellipsoid", "radii": [0.1, 0.08, 0.05]}, 0.05),
+        ({"kind": "sphere", "radius": 0.06}, 0.06),
+        ({"kind": "box", "size": [0.1, 0.2, 0.08]}, 0.04),
+        (
+            {"kind": "hull", "points": [[-0.1, 0.0, -0.03], [0.1, 0.0, -0.03], [0.0, 0.1, 0.05], [0.0, -0.1, 0.05]]},
+            0.05,
+        ),
+    ],
+)
+def test_the_clearance_is_under_the_lowest_shape_of_any_kind(shape, height):
+    """A cylinder, a capsule, an ellipsoid or a hull under the trunk ended with a KeyError: only boxes were expected."""
+
+    def clearance(lowest: dict[str, object]) -> float:
+        description = RoverModel.named("skid-steered").to_dict()
+        trunk = description["solids"][0]
+        place = {"position": [0.0, -0.1, 0.0], "rotation": [math.pi / 2.0, 0.0, 0.0], "collides": True}
+        trunk["shapes"] = [*(trunk.get("shapes") or []), lowest | place]
+        return check_statics(RoverModel.from_dict(description)).clearance
+
+    point = clearance({"kind": "sphere", "radius": 1e-3}) + 1e-3
+    assert point - clearance(shape) == pytest.approx(height, abs=1e-4)

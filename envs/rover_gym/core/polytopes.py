@@ -92,21 +92,27 @@ def hull_properties(points: npt.ArrayLike) -> tuple[float, Array, Array]:
     return volume, origin + centroid, np.trace(second) * np.eye(3) - second
 
 
-def box_around(shape: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Middle and half edge lengths (3,), m, of the box with its axes around a shape of a model that can collide."""
-    middle = np.zeros(3)
+def reach(shape: Mapping[str, Any], direction: npt.ArrayLike) -> float:
+    """How far a shape of a model extends along a unit vector (3,) of its own axes, from its own origin, m."""
+    n = np.asarray(direction, dtype=np.float64)
     match shape["kind"]:
         case "box":
-            half = 0.5 * np.array(shape["size"], dtype=np.float64)
+            return float(0.5 * np.array(shape["size"]) @ np.abs(n))
         case "ellipsoid":
-            half = np.array(shape["radii"], dtype=np.float64)
+            return float(np.linalg.norm(np.array(shape["radii"]) * n))
         case "hull":
-            points = np.array(shape["points"], dtype=np.float64)
-            low, high = points.min(axis=0), points.max(axis=0)
-            middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        case "cylinder" | "capsule":
-            radius, along = shape["radius"], 0.5 * shape["height"]
-            half = np.array([radius, along + (radius if shape["kind"] == "capsule" else 0.0), radius])
-        case _:
-            half = np.full(3, float(shape["radius"]))
-    return middle, half
+            return float((np.array(shape["points"]) @ n).max())
+        case "cylinder":
+            return float(0.5 * shape["height"] * abs(n[1]) + shape["radius"] * np.hypot(n[0], n[2]))
+        case "capsule":
+            return float(0.5 * shape["height"] * abs(n[1]) + shape["radius"])
+        case "sphere":
+            return float(shape["radius"])
+        case kind:
+            raise ValueError(f"no shape that collides is a {kind}")
+
+
+def box_around(shape: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Middle and half edge lengths (3,), m, of the box with its axes around a shape of a model that can collide."""
+    above, below = (np.array([reach(shape, sign * axis) for axis in np.eye(3)]) for sign in (1.0, -1.0))
+    return 0.5 * (above - below), 0.5 * (above + below)

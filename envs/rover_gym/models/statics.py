@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import ModelError, Plane, RoverModel, Simulation
+from rover_gym.core.polytopes import reach
 from rover_gym.core.rotations import rotation_matrix
 from rover_gym.core.validation import number, refuse
 from rover_gym.models.ground_reach import above_the_ground
@@ -202,12 +203,10 @@ def _clearance(model: RoverModel, sim: Simulation) -> float:
 
 
 def _lowest(shape: dict[str, Any], origin: Array, rotation: Array) -> float:
-    """Height of the lowest point of a box or sphere of a solid at a pose, m."""
+    """Height of the lowest point of a shape of a solid at a pose, m."""
     centre = origin + rotation @ np.array(shape.get("position") or (0.0, 0.0, 0.0))
-    if shape["kind"] == "sphere":
-        return float(centre[1] - shape["radius"])
     turn = rotation @ rotation_matrix(shape.get("rotation") or (0.0, 0.0, 0.0))
-    return float(centre[1] - np.abs(turn[1]) @ np.array(shape["size"]) / 2.0)
+    return float(centre[1]) - reach(shape, -turn[1])
 
 
 NAMED = re.compile(r"wheel|tyre|tire", re.IGNORECASE)

@@ -55,15 +55,36 @@ mass = 3.0
 /// The tips that an arm may have.
 ///
 /// Cylinder, capsule and ellipsoid lie across the arm.
-pub fn tips() -> [&'static str; 7] {
-    [
-        "shape = { kind = \"box\", size = [0.2, 0.1, 0.3] }\ncollides = true",
-        "shape = { kind = \"sphere\", radius = 0.1 }\ncollides = true",
-        "shape = { kind = \"disc\", radius = 0.15 }\n[[wheels]]\nname = \"W\"\nsolid = \"tip\"\naxle = [0.0, 0.0, 1.0]\nradius = 0.15\ntorque_limit = 1.0\ndrive_sign = 1.0",
-        "shapes = [{ kind = \"cylinder\", radius = 0.1, height = 0.3, rotation = [1.5707963267948966, 0.0, 0.0], collides = true }]",
-        "shapes = [{ kind = \"capsule\", radius = 0.1, height = 0.2, rotation = [1.5707963267948966, 0.0, 0.0], collides = true }]",
-        "shape = { kind = \"ellipsoid\", radii = [0.1, 0.1, 0.2] }\ncollides = true",
-        "shapes = [{ kind = \"hull\", collides = true, points = [[-0.1, -0.05, -0.15], [0.1, -0.05, -0.15], [-0.1, -0.05, 0.15], [0.1, -0.05, 0.15], [-0.05, 0.05, -0.1], [0.05, 0.05, -0.1], [-0.05, 0.05, 0.1], [0.05, 0.05, 0.1]] }]",
+pub fn tips() -> Vec<(&'static str, f64)> {
+    vec![
+        (
+            "shape = { kind = \"box\", size = [0.2, 0.1, 0.3] }\ncollides = true",
+            0.05,
+        ),
+        (
+            "shape = { kind = \"sphere\", radius = 0.1 }\ncollides = true",
+            0.1,
+        ),
+        (
+            "shape = { kind = \"disc\", radius = 0.15 }\n[[wheels]]\nname = \"W\"\nsolid = \"tip\"\naxle = [0.0, 0.0, 1.0]\nradius = 0.15\ntorque_limit = 1.0\ndrive_sign = 1.0",
+            0.15,
+        ),
+        (
+            "shapes = [{ kind = \"cylinder\", radius = 0.1, height = 0.3, rotation = [1.5707963267948966, 0.0, 0.0], collides = true }]",
+            0.1,
+        ),
+        (
+            "shapes = [{ kind = \"capsule\", radius = 0.1, height = 0.2, rotation = [1.5707963267948966, 0.0, 0.0], collides = true }]",
+            0.1,
+        ),
+        (
+            "shape = { kind = \"ellipsoid\", radii = [0.1, 0.1, 0.2] }\ncollides = true",
+            0.1,
+        ),
+        (
+            "shapes = [{ kind = \"hull\", collides = true, points = [[-0.1, -0.05, -0.15], [0.1, -0.05, -0.15], [-0.1, -0.05, 0.15], [0.1, -0.05, 0.15], [-0.05, 0.05, -0.1], [0.05, 0.05, -0.1], [-0.05, 0.05, 0.1], [0.05, 0.05, 0.1]] }]",
+            0.05,
+        ),
     ]
 }
 
