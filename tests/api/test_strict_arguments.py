@@ -27,7 +27,7 @@ from rover_gym import (
     TriangleMesh,
     _core,
     accuracy_options,
-    mechanics,
+    core,
     solve_friction_contact,
 )
 from rover_gym.core import (
@@ -390,15 +390,15 @@ def test_a_list_of_a_billion_entries_is_refused_before_they_are_read(field: str,
 
 
 def test_it_offers_all_that_is_compiled() -> None:
-    assert set(mechanics.__all__) == {name for name in vars(_core) if not name.startswith("_")} | {
+    assert set(core.__all__) == {name for name in vars(_core) if not name.startswith("_")} | {
         "__version__",
         "Terrain",
     }
 
 
-@pytest.mark.parametrize("name", [name for name in mechanics.__all__ if isinstance(getattr(mechanics, name), type)])
+@pytest.mark.parametrize("name", [name for name in core.__all__ if isinstance(getattr(core, name), type)])
 def test_a_class_says_where_it_is_found(name: str) -> None:
-    found = getattr(mechanics, name)
+    found = getattr(core, name)
     assert (found.__module__, found.__qualname__) == ("rover_gym.core", name)
     assert pickle.loads(pickle.dumps(found)) is found  # noqa: S301 - our own
     title = pydoc.plain(pydoc.render_doc(found)).splitlines()[0]
@@ -406,7 +406,7 @@ def test_a_class_says_where_it_is_found(name: str) -> None:
 
 
 def test_what_most_programs_need_is_in_the_package_itself() -> None:
-    shared = set(rover_gym.__all__) & set(mechanics.__all__)
+    shared = set(rover_gym.__all__) & set(core.__all__)
     assert {"Simulation", "RoverModel", "Plane", "SphereField", "RoverGymError", "solve_friction_contact"} <= shared
     for name in shared:
-        assert getattr(rover_gym, name) is getattr(mechanics, name)
+        assert getattr(rover_gym, name) is getattr(core, name)

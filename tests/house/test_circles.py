@@ -16,7 +16,7 @@ USES = re.compile(r"(\bpub(?:\([^)]*\))?\s+)?\buse\s+([^;]+);")
 DECLARATIONS = re.compile(r"#!?\[[^\]]*\]|(?:\bpub(?:\([^)]*\))?\s+)?\bmod \w+;")
 PATHS = re.compile(r"(?<![\w:])(?<!\(in )(\w+(?:::\w+)+)")
 WORDS = re.compile(r"\w+")
-PUBLIC_FACE = re.compile(r'(?:\bmodule = |"__module__", )"rover_gym\.mechanics"')
+PUBLIC_FACE = re.compile(r'(?:\bmodule = |"__module__", )"rover_gym\.core"')
 PACKAGE_NAMES = re.compile(r'"(rover_gym(?:\.\w+)*)"')
 
 Module = tuple[str, ...]

@@ -16,7 +16,8 @@ from types import FunctionType
 import pytest
 from house.test_tree import tracked_files
 
-from rover_gym import _core, extras
+from rover_gym import _core
+from rover_gym.core import extras
 
 ROOT = Path(__file__).parents[2]
 
