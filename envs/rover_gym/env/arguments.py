@@ -20,7 +20,7 @@ from rover_gym.env.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_r
 from rover_gym.env.spec_json import model_from_json, soil_from_json, terrain_from_json
 from rover_gym.env.start import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
 from rover_gym.maps.map_files import is_terrain_file, open_terrain
-from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
+from rover_gym.mechanics import ModelError, OptionError, RoverModel, Simulation, Terrain, TerrainError, Union
 from rover_gym.models.lookup import as_model
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
 from rover_gym.sand.soils import Soil, named_soil
@@ -31,16 +31,11 @@ TERRAINS = ("plane", "rocks", "hills", "sand")
 #: Another name of a terrain, which files of trainings hold.
 SYNONYMS = {"sphere_field": "rocks"}
 
-SOLVER_OPTIONS = (
-    "variant",
-    "theta",
-    "forecast",
-    "solver",
-    "tolerance",
-    "max_iterations",
-    "budget",
-    "stabilisation",
-    "warm_start",
+#: Options of `Simulation` that the environment does not have as arguments of its own.
+SOLVER_OPTIONS = tuple(
+    name
+    for name in inspect.signature(Simulation).parameters
+    if name not in ("model", "terrain", "gravity", "friction", "restitution", "materials", "time_step", "accuracy")
 )
 
 #: Largest slope; a wheel treats steeper ground as a wall.
@@ -400,7 +395,9 @@ class RoverArguments(TypedDict, total=False):
     ]
     solver_options: Annotated[
         Mapping[str, Any] | None,
-        Argument(None, Special("a mapping", check_solver_options), "further options of `Simulation`, by name"),
+        Argument(
+            None, Special("a mapping", check_solver_options), "of `Simulation`, by name: " + ", ".join(SOLVER_OPTIONS)
+        ),
     ]
     reward_weights: Annotated[
         Mapping[str, float] | None,

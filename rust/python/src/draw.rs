@@ -14,10 +14,9 @@ use crate::arrays::{Array, fresh_rows, two, vector};
 use crate::episode::{GivenRules, GivenSimulation};
 use crate::errors::{Kind, Result};
 use crate::generators::generators;
-use crate::options::SolverWords;
 use crate::reading::points;
 use crate::shared::{Release, Watch};
-use crate::simulation::{Origin, Simulation};
+use crate::simulation::Simulation;
 use crate::terrain::{self, Terrain};
 
 /// Distribution of the episodes of a task.
@@ -51,7 +50,6 @@ use crate::terrain::{self, Terrain};
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
-    pub words: SolverWords,
     /// Constructor arguments, for pickling.
     given: ((GivenRules, Py<Simulation>), Py<PyDict>),
 }
@@ -60,7 +58,6 @@ pub struct EpisodeDistribution {
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct DrawnEpisodes {
     pub drawn: Vec<Beginning>,
-    pub words: SolverWords,
 }
 
 /// A range (low, high).
@@ -183,7 +180,6 @@ impl EpisodeDistribution {
         })?;
         Ok(DrawnEpisodes {
             drawn: watch.result(drawn)?.unwrap_or_default(),
-            words: self.words.clone(),
         })
     }
 }
@@ -244,7 +240,6 @@ impl EpisodeDistribution {
                 rules,
                 trunk_load_limit,
             },
-            words: made.origin().words.clone(),
             given: kept,
         })
     }
@@ -332,8 +327,7 @@ impl DrawnEpisodes {
     fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
         let one = self.at(index)?;
         let made = RoverSimulation::placed(one.scene.placement.clone())?;
-        let (terrain, words) = (one.scene.ground.clone(), self.words.clone());
-        let made = Simulation::of(made, Origin { terrain, words });
+        let made = Simulation::of(made, one.scene.ground.clone());
         Ok(Py::new(index.py(), made)?)
     }
 

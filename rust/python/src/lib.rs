@@ -128,6 +128,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<planar_machines::BallSimulation>()?;
     module.add_class::<planar_machines::TwoWheelRoverSimulation>()?;
     module.add_class::<planar_machines::MirroredRoverSimulation>()?;
+    options::register(module)?;
     planar_soil::register(module)?;
     grains::register(module)?;
     rover_grains::register(module)?;
