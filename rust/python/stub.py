@@ -5,6 +5,7 @@
 
 import ast
 import inspect
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -37,11 +38,12 @@ class Writer(ast.NodeTransformer):
         self.documented: set[str] = set()
 
     def stub(self, types: str) -> str:
-        """The stub, whose lines `ruff format` sets."""
+        """The stub, whose lines ruff sets."""
         tree = ast.parse(types)
         self.compare("the module", set(self.module.__all__), tree)
         tree.body[0] = docstring(self.module.__doc__ or "", "")
-        return ast.unparse(ast.fix_missing_locations(self.visit(tree)))
+        made = ast.unparse(ast.fix_missing_locations(self.visit(tree)))
+        return re.sub(r"\n\n(?=    (?:@|def ))", "\n", made)
 
     def compare(self, where: str, expected: set[str], node: ast.Module | ast.ClassDef) -> None:
         """Raises an error unless the types name just the members that are expected."""
@@ -62,7 +64,8 @@ class Writer(ast.NodeTransformer):
         self.owner = owner = getattr(self.module, node.name)
         node.body = [one for one in node.body if not isinstance(one, ast.Expr)]
         if not issubclass(owner, Exception):
-            self.compare(node.name, {one for one in vars(owner) if not one.startswith("_")}, node)
+            public = {one for one in vars(owner) if not one.startswith("_")}
+            self.compare(node.name, public | ({"__new__"} if owner.__text_signature__ else set()), node)
             if not owner.__flags__ & CAN_BE_SUBCLASSED:
                 node.decorator_list = [ast.Name("final")]
             elif owner.__basicsize__ > object.__basicsize__:

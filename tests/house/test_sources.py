@@ -246,7 +246,6 @@ def parameters(name: str) -> list[inspect.Parameter]:
 
 
 def test_the_stub_is_up_to_date() -> None:
-    """Its lines are `ruff format`'s."""
     made = ast.parse(WRITER["Writer"](_core).stub(TYPES))
     assert ast.dump(made) == ast.dump(ast.parse(STUB)), "run `make stub`"
 
