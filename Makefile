@@ -77,9 +77,10 @@ format: $(STAMPS)/test ## rewrite the sources as the linters want them
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-stub: $(STAMPS)/test $(STAMPS)/core ## write the compiled module's docstrings into its stub
+stub: $(STAMPS)/test $(STAMPS)/core ## write the stub of the compiled module from its types, rust/python/types.pyi
 	$(BIN)/python rust/python/stub.py
 	$(BIN)/ruff format --quiet envs/rover_gym/_core.pyi
+	$(BIN)/ruff check --quiet --fix envs/rover_gym/_core.pyi
 
 # Properties are tried on the same cases in every fast run, and on new ones in a run of all tests.
 SAME_CASES = $(if $(filter all,$(TIER)),,PROPTEST_RNG_SEED=1)

@@ -102,7 +102,6 @@ __all__: list[str] = [
     "solve_friction_contact",
     "standard_normals",
 ]
-
 __version__: str
 
 class RoverGymError(Exception):
@@ -162,7 +161,6 @@ class Motor:
         ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` is neither from
             1e-6 to 1e9 rad/s nor infinite.
     """
-
     def __new__(cls, stall_torque: float, no_load_speed: float, regenerating: bool = True) -> Motor: ...
     @property
     def stall_torque(self) -> float:
@@ -186,14 +184,13 @@ class Motor:
         Raises:
             CommandError: A number is not finite.
         """
-    def __getnewargs__(self) -> tuple[float, float, bool]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class Machine:
     """A machine of a model, with its slices of the model's arrays."""
-
     @property
     def name(self) -> str:
         """Name of the machine."""
@@ -223,7 +220,6 @@ class RoverModel:
     StateError if `q` or `qdot` has a wrong length or an entry that is not finite, OptionError if
     `coordinates` is neither of the two, and TerrainError if `terrain` is not a terrain.
     """
-
     def __new__(cls) -> RoverModel: ...
     from_file = staticmethod(model_files.from_file)
     @staticmethod
@@ -598,6 +594,8 @@ class RoverModel:
         Raises:
             StateError: An array has a wrong length or an entry that is not finite.
         """
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
     def __reduce__(self) -> Any: ...
 
 @disjoint_base
@@ -607,7 +605,6 @@ class Terrain:
     Its subclasses are `Plane`, `SphereField`, `HeightField`, `TriangleMesh`, `SoftGround` and
     `Union`.
     """
-
     def heights(self, points: npt.ArrayLike) -> _Array:
         """The height of the visible surface at places of the map.
 
@@ -658,7 +655,6 @@ class Plane(Terrain):
         TerrainError: A number is not finite, the normal has no direction, or the offset is beyond
             1e6 m.
     """
-
     def __new__(cls, normal: npt.ArrayLike | None = None, offset: float = 0.0) -> Plane: ...
     @property
     def normal(self) -> _Array:
@@ -709,7 +705,6 @@ class SoftGround(Terrain):
         TerrainError: The surface is not a terrain, or a number of the soil is missing or out of
             range.
     """
-
     def __new__(cls, surface: Terrain, soil: _Soil | Mapping[str, float], rut_cell: float = 0.02) -> SoftGround: ...
     @property
     def surface(self) -> Terrain:
@@ -740,7 +735,6 @@ class WheelBed:
         TerrainError: A number of the soil is missing or out of its range.
         OptionError: A number of the wheel is out of its range.
     """
-
     def __new__(
         cls,
         soil: _Soil | Mapping[str, float],
@@ -816,7 +810,6 @@ class SphereField(Terrain):
         TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
             there are no spheres or too many of them.
     """
-
     def __new__(
         cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None, material: str = "rock"
     ) -> SphereField: ...
@@ -902,7 +895,6 @@ class HeightField(Terrain):
         TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
             has data, the spacing is not positive, or a change per metre is 0.
     """
-
     def __new__(
         cls,
         heights: npt.ArrayLike,
@@ -979,7 +971,6 @@ class TriangleMesh(Terrain):
         TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
             an index out of range, or neighbouring triangles have opposite orientations.
     """
-
     def __new__(cls, vertices: npt.ArrayLike, triangles: npt.ArrayLike, material: str = "ground") -> TriangleMesh: ...
     from_file = staticmethod(terrain_files.triangle_mesh_from_file)
     @property
@@ -1015,7 +1006,6 @@ class Union(Terrain):
     Raises:
         TerrainError: A part is not a terrain, the list is empty, or two parts contain a plane.
     """
-
     def __new__(cls, parts: _Terrains) -> Union: ...
     @property
     def parts(self) -> list[Terrain]:
@@ -1026,7 +1016,6 @@ class Union(Terrain):
 @final
 class StepReport:
     """Summary of the time steps of one call: sums or worst values over the steps."""
-
     @property
     def status(self) -> Literal["converged", "not_converged"]:
         """Whether the steps "converged" or "not_converged".
@@ -1159,7 +1148,6 @@ class StepReport:
 @final
 class Contacts:
     """Contacts of a rover in the last step, as new arrays with one row for each contact."""
-
     @property
     def bodies(self) -> list[str]:
         """Name of the solid in each contact, or of the joint that is at its stop."""
@@ -1229,7 +1217,6 @@ class PathSearch:
     Raises:
         OptionError: An argument is missing, not a number, or has a wrong shape.
     """
-
     def __new__(
         cls,
         *,
@@ -1330,7 +1317,6 @@ class Linearisation:
     (3) and its rotation (3) that the sand remembers, in units of its memory (1 and 1/m, world
     axes), and the energy that the sand may give back, J. All arrays are new.
     """
-
     @property
     def a(self) -> _Array:
         """Derivative of the next state by the state, (nx, nx) with nx = 2 nv, or 2 nv + 7 n_wheels."""
@@ -1394,7 +1380,6 @@ class Linearisation:
 @final
 class StepDerivatives:
     """Steps of trajectories with their derivatives, as `Simulation.differentiate` returns them."""
-
     @property
     def states(self) -> _Array:
         """States, (n, steps + 1, nx)."""
@@ -1411,7 +1396,6 @@ class StepDerivatives:
 @final
 class Energy:
     """Kinetic and potential energy."""
-
     @property
     def kinetic(self) -> float:
         """Kinetic energy, J."""
@@ -1428,7 +1412,6 @@ class Energy:
 @final
 class Snapshot:
     """Complete state of a simulation, from which it continues bit for bit. Picklable."""
-
     @staticmethod
     def from_bytes(data: bytes) -> Snapshot:
         """Reads a snapshot.
@@ -1441,9 +1424,9 @@ class Snapshot:
         """
     def to_bytes(self) -> bytes:
         """The snapshot as bytes, for `from_bytes`."""
-    def __reduce__(self) -> Any: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
 
 @disjoint_base
 class AnySimulation:
@@ -1455,7 +1438,6 @@ class AnySimulation:
     Only one call may run at a time. A second call, from another thread or a signal handler, raises
     BusyError.
     """
-
     @property
     def time(self) -> float:
         """Time since the last call of `set_state`, s; among grains, the time of the grains."""
@@ -1534,7 +1516,6 @@ class Simulation(AnySimulation):
         OSError: A file cannot be read.
         OptionError: An option is out of range, or must not be given beside `accuracy`.
     """
-
     def __new__(
         cls,
         model: RoverModel | str | os.PathLike[str] | None = None,
@@ -1890,7 +1871,7 @@ class Simulation(AnySimulation):
             coefficients, (n_c,).
         """
     def linearise(
-        self, check: bool = False, perturbation: float = 1e-6, parameters: Sequence[str] | str = ()
+        self, check: bool = False, perturbation: float = 1e-06, parameters: Sequence[str] | str = ()
     ) -> Linearisation:
         """Derivatives of the next step with respect to state, command and parameters.
 
@@ -1973,7 +1954,6 @@ class PlanarGround:
 
     Its subclasses are `Line`, `Sine`, `Spline` and `Polyline`.
     """
-
     @overload
     def height(self, x: float) -> float:
         """The height of the ground at one place or at many.
@@ -2001,7 +1981,6 @@ class Line(PlanarGround):
     Raises:
         TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
     """
-
     def __new__(cls, slope: float = 0.0, offset: float = 0.0) -> Line: ...
     @property
     def slope(self) -> float:
@@ -2025,7 +2004,6 @@ class Sine(PlanarGround):
         TerrainError: A number is not finite, the wavelength is below 1e-3 m, or the slope 2 pi
             amplitude / wavelength is beyond 1000.
     """
-
     def __new__(cls, amplitude: float, wavelength: float, phase: float = 0.0, offset: float = 0.0) -> Sine: ...
     @property
     def amplitude(self) -> float:
@@ -2055,7 +2033,6 @@ class Spline(PlanarGround):
         TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
             entry is not finite or beyond 1e6 m, or x does not increase.
     """
-
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Spline: ...
     @property
     def x(self) -> _Array:
@@ -2079,7 +2056,6 @@ class Polyline(PlanarGround):
         TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
             entry is not finite or beyond 1e6 m, x decreases, or a point is given twice.
     """
-
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Polyline: ...
     @staticmethod
     def step(x: float, height: float) -> Polyline:
@@ -2103,7 +2079,6 @@ class Polyline(PlanarGround):
 @final
 class PlanarContacts:
     """Contacts of a planar simulation in the last step, as new arrays with one row for each contact."""
-
     @property
     def discs(self) -> npt.NDArray[np.int64]:
         """Index of the disc in each contact, (n,); 0 is the ball or wheel A, 1 is wheel B."""
@@ -2130,7 +2105,6 @@ class PlanarContacts:
 @disjoint_base
 class PlanarSimulation(AnySimulation):
     """Base class of planar machines on a ground. It cannot be instantiated."""
-
     @property
     def ground(self) -> PlanarGround:
         """The ground."""
@@ -2200,8 +2174,29 @@ class BallSimulation(PlanarSimulation):
         mass: Mass, kg.
         radius: Radius, m.
         inertia: Inertia about the centre, kg m²; the inertia of a homogeneous disc by default.
-        **options: Options of `Simulation` from `gravity`, here (2,), to `warm_start`, and
-            `contact`: "nearest", the contact is the point of the ground nearest to the disc's
+        gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
+        restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
+            [0, 1].
+        materials: Friction and restitution by pair of materials, in any order, such as
+            `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+            restitution). None by default.
+        time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
+        variant: "linearised" evaluates the forces once in each step; "newton" solves for the forces
+            at its end. "linearised" by default.
+        theta: Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+        forecast: A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+            its normal velocity; in [0, 1].
+        solver: Method for the contact problem, as in `solve_friction_contact`.
+        tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        max_iterations: Largest number of iterations of the contact solver in a step.
+        budget: Largest amount of work of the contact solver in a step, in the unit of
+            `solve_friction_contact` (operations, not time). By default it grows with the number of
+            contacts.
+        stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+            leaves them.
+        warm_start: Whether the contact solver starts from the last step's impulses.
+        contact: "nearest", the contact is the point of the ground nearest to the disc's
             centre, or "centre_height", the rule of the 2010 report, by which the centre itself
             stops at the ground.
 
@@ -2211,7 +2206,6 @@ class BallSimulation(PlanarSimulation):
         OptionError: An option is out of its range.
         TypeError: An option is unknown.
     """
-
     def __new__(
         cls,
         ground: PlanarGround,
@@ -2219,7 +2213,21 @@ class BallSimulation(PlanarSimulation):
         mass: float = 3.0,
         radius: float = 1.5,
         inertia: float | None = None,
-        **options: Any,
+        gravity: npt.ArrayLike | None = None,
+        friction: float = 0.7,
+        restitution: float = 0.0,
+        materials: _Materials | None = None,
+        time_step: float | None = None,
+        variant: Literal["linearised", "newton"] | None = None,
+        theta: float = 0.5,
+        forecast: float = 0.5,
+        solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
+        tolerance: float | None = None,
+        max_iterations: int = 1000,
+        budget: int | None = None,
+        stabilisation: Literal["projection", "none"] = "projection",
+        warm_start: bool = True,
+        contact: Literal["nearest", "centre_height"] = "nearest",
     ) -> BallSimulation: ...
 
 @final
@@ -2243,7 +2251,31 @@ class TwoWheelRoverSimulation(PlanarSimulation):
             default.
         axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
             default.
-        **options: Options of `BallSimulation`.
+        gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
+        restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
+            [0, 1].
+        materials: Friction and restitution by pair of materials, in any order, such as
+            `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+            restitution). None by default.
+        time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
+        variant: "linearised" evaluates the forces once in each step; "newton" solves for the forces
+            at its end. "linearised" by default.
+        theta: Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+        forecast: A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+            its normal velocity; in [0, 1].
+        solver: Method for the contact problem, as in `solve_friction_contact`.
+        tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        max_iterations: Largest number of iterations of the contact solver in a step.
+        budget: Largest amount of work of the contact solver in a step, in the unit of
+            `solve_friction_contact` (operations, not time). By default it grows with the number of
+            contacts.
+        stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+            leaves them.
+        warm_start: Whether the contact solver starts from the last step's impulses.
+        contact: "nearest", the contact is the point of the ground nearest to the disc's
+            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
+            stops at the ground.
 
     Raises:
         ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
@@ -2251,7 +2283,6 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         OptionError: An option is out of its range.
         TypeError: An option is unknown.
     """
-
     def __new__(
         cls,
         ground: PlanarGround,
@@ -2263,7 +2294,21 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         wheel_inertia: float | npt.ArrayLike | None = None,
         axle_a: npt.ArrayLike | None = None,
         axle_b: npt.ArrayLike | None = None,
-        **options: Any,
+        gravity: npt.ArrayLike | None = None,
+        friction: float = 0.7,
+        restitution: float = 0.0,
+        materials: _Materials | None = None,
+        time_step: float | None = None,
+        variant: Literal["linearised", "newton"] | None = None,
+        theta: float = 0.5,
+        forecast: float = 0.5,
+        solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
+        tolerance: float | None = None,
+        max_iterations: int = 1000,
+        budget: int | None = None,
+        stabilisation: Literal["projection", "none"] = "projection",
+        warm_start: bool = True,
+        contact: Literal["nearest", "centre_height"] = "nearest",
     ) -> TwoWheelRoverSimulation: ...
 
 @final
@@ -2278,7 +2323,31 @@ class MirroredRoverSimulation(PlanarSimulation):
         ground: A `Line`, `Sine`, `Spline` or `Polyline`.
         model: The machine: an object, a name of the gallery or a file. It must be symmetric about
             the trunk's x-y plane; the built-in rover by default.
-        **options: Options of `BallSimulation`.
+        gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
+        restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
+            [0, 1].
+        materials: Friction and restitution by pair of materials, in any order, such as
+            `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+            restitution). None by default.
+        time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
+        variant: "linearised" evaluates the forces once in each step; "newton" solves for the forces
+            at its end. "linearised" by default.
+        theta: Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+        forecast: A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+            its normal velocity; in [0, 1].
+        solver: Method for the contact problem, as in `solve_friction_contact`.
+        tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        max_iterations: Largest number of iterations of the contact solver in a step.
+        budget: Largest amount of work of the contact solver in a step, in the unit of
+            `solve_friction_contact` (operations, not time). By default it grows with the number of
+            contacts.
+        stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+            leaves them.
+        warm_start: Whether the contact solver starts from the last step's impulses.
+        contact: "nearest", the contact is the point of the ground nearest to the disc's
+            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
+            stops at the ground.
 
     Raises:
         ModelError: The model is not symmetric.
@@ -2286,9 +2355,26 @@ class MirroredRoverSimulation(PlanarSimulation):
         OptionError: An option is out of its range.
         TypeError: An option is unknown.
     """
-
     def __new__(
-        cls, ground: PlanarGround, *, model: RoverModel | str | os.PathLike[str] | None = None, **options: Any
+        cls,
+        ground: PlanarGround,
+        *,
+        model: RoverModel | str | os.PathLike[str] | None = None,
+        gravity: npt.ArrayLike | None = None,
+        friction: float = 0.7,
+        restitution: float = 0.0,
+        materials: _Materials | None = None,
+        time_step: float | None = None,
+        variant: Literal["linearised", "newton"] | None = None,
+        theta: float = 0.5,
+        forecast: float = 0.5,
+        solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
+        tolerance: float | None = None,
+        max_iterations: int = 1000,
+        budget: int | None = None,
+        stabilisation: Literal["projection", "none"] = "projection",
+        warm_start: bool = True,
+        contact: Literal["nearest", "centre_height"] = "nearest",
     ) -> MirroredRoverSimulation: ...
     @property
     def joints(self) -> list[list[str]]:
@@ -2314,7 +2400,6 @@ class SimulationBatch:
         OptionError: There are no simulations or their models differ in size, `scan` has a wrong
             shape, or `threads` is out of its range.
     """
-
     def __new__(
         cls, simulations: Sequence[Simulation], *, scan: npt.ArrayLike | None = None, threads: int | None = None
     ) -> SimulationBatch: ...
@@ -2422,7 +2507,6 @@ class EpisodeRules:
         OptionError: A number is out of range, a list has a wrong length, or the number of weights
             differs from that of the terms.
     """
-
     def observation(self) -> list[tuple[str, int, int, str, tuple[float, ...], float, float, str]]:
         """The fields of an observation, in order.
 
@@ -2433,7 +2517,6 @@ class EpisodeRules:
     @staticmethod
     def observation_rows() -> list[tuple[int, int, str, str, str, str]]:
         """First entry, size, name, meaning, unit and scale of the built-in rover's observed fields."""
-
     @staticmethod
     def info_rows() -> list[tuple[str, str, str]]:
         """Name, unit and meaning of each entry of an info."""
@@ -2460,7 +2543,7 @@ class EpisodeRules:
         free_distance: float | None = None,
         field_margin: float | None = None,
     ) -> EpisodeRules: ...
-    def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
 
 @final
 class EpisodeRun:
@@ -2468,7 +2551,6 @@ class EpisodeRun:
 
     Create it by `begin` or `from_bytes`.
     """
-
     @staticmethod
     def begin(
         rules: EpisodeRules,
@@ -2583,7 +2665,6 @@ class EpisodeDistribution:
         OptionError: An argument is missing, not a number, or out of range.
         TerrainError: `ground` is not a terrain.
     """
-
     def __new__(
         cls,
         rules: EpisodeRules,
@@ -2598,12 +2679,11 @@ class EpisodeDistribution:
         hills: float | None = None,
         sand: Sequence[SoftGround] | None = None,
     ) -> EpisodeDistribution: ...
-    def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules, Simulation], dict[str, Any]]: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
 
 @final
 class DrawnEpisodes:
     """Drawn episodes, in the order of the generators."""
-
     @property
     def generators(self) -> _Rows:
         """States of the generators after the draws, (m, 4) uint64."""
@@ -2635,7 +2715,6 @@ class EpisodeBatch:
     Raises:
         OptionError: An argument is out of its range, or the model does not fit the rules.
     """
-
     def __new__(
         cls,
         rules: EpisodeRules,
@@ -2945,7 +3024,6 @@ class DiskSimulation(BedSimulation):
         TerrainError: A wall has no direction, or `ground` is not a ground.
         OptionError: An option is out of its range, or both `rover` and `rig` are given.
     """
-
     def __new__(
         cls,
         radius: npt.ArrayLike,
@@ -2967,7 +3045,7 @@ class DiskSimulation(BedSimulation):
         time_step: float = 0.001,
         tolerance: float = 0.0001,
         max_iterations: int = 2000,
-        stabilisation: Literal["projection", "none"] | None = None,
+        stabilisation: Literal["projection", "push_out", "none"] | None = None,
         penetration_tolerance: float | None = None,
         sleep: bool = False,
         sleep_speed: float | None = None,
@@ -3042,7 +3120,6 @@ class Drum:
     Raises:
         TerrainError: A number is not finite, or the radius or length is not positive.
     """
-
     def __new__(
         cls, radius: float, length: float, rate: float = 0.0, *, centre: npt.ArrayLike | None = None
     ) -> Drum: ...
@@ -3075,14 +3152,8 @@ class Silo:
         TerrainError: A number is not finite, the radius is not positive, or the hole is as wide as
             the tube.
     """
-
     def __new__(
-        cls,
-        radius: float,
-        *,
-        floor: float | None = None,
-        hole: float = 0.0,
-        axis: npt.ArrayLike | None = None,
+        cls, radius: float, *, floor: float | None = None, hole: float = 0.0, axis: npt.ArrayLike | None = None
     ) -> Silo: ...
     @property
     def radius(self) -> float:
@@ -3104,7 +3175,6 @@ class GrainContacts:
     Vectors have D entries: 2 for disks, 3 for balls. Contacts between sleeping grains are not
     included.
     """
-
     @property
     def bodies(self) -> npt.NDArray[np.int64]:
         """Indices of both bodies, (n, 2), grains from 0, then wheels; -1 for a wall or the ground."""
@@ -3201,7 +3271,6 @@ class GrainSimulation(BedSimulation):
             vessel.
         OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
     """
-
     def __new__(
         cls,
         radius: npt.ArrayLike,
@@ -3224,7 +3293,7 @@ class GrainSimulation(BedSimulation):
         time_step: float = 0.002,
         tolerance: float = 0.001,
         max_iterations: int = 2000,
-        stabilisation: Literal["projection", "none"] | None = None,
+        stabilisation: Literal["projection", "push_out", "none"] | None = None,
         penetration_tolerance: float | None = None,
         sleep: bool = False,
         sleep_speed: float | None = None,
@@ -3241,10 +3310,7 @@ class GrainSimulation(BedSimulation):
     def vessel(self) -> Drum | Silo | None:
         """The vessel around the balls, or None."""
     def set_state(
-        self,
-        position: npt.ArrayLike,
-        velocity: npt.ArrayLike | None = None,
-        spin: npt.ArrayLike | None = None,
+        self, position: npt.ArrayLike, velocity: npt.ArrayLike | None = None, spin: npt.ArrayLike | None = None
     ) -> None:
         """Sets positions and velocities; time starts at 0.
 
@@ -3310,7 +3376,6 @@ class RoverGrainSimulation(AnySimulation):
             finite.
         StateError: A part of the rover penetrates a grain.
     """
-
     def __new__(
         cls, rover: Simulation, grains: GrainSimulation, *, wheel_friction: float = 0.9
     ) -> RoverGrainSimulation: ...
@@ -3463,7 +3528,6 @@ def arrange_balls(
 @final
 class SolverReport:
     """Result report of the contact solver."""
-
     @property
     def status(self) -> Literal["converged", "relaxed", "not_converged", "budget_exhausted"]:
         """Outcome of the solve, "converged", "relaxed", "not_converged" or "budget_exhausted".
@@ -3521,7 +3585,6 @@ class SolverReport:
 @final
 class FrictionContactSolution:
     """The solution of a friction-contact problem."""
-
     @property
     def impulses(self) -> _Array:
         """Impulses p, (n_c, d), N s, along the normal and the tangents."""
@@ -3616,7 +3679,7 @@ def solve_friction_contact(
     W: npt.ArrayLike | _SparseArray | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     q: npt.ArrayLike,
     mu: npt.ArrayLike,
-    tolerance: float = 1e-8,
+    tolerance: float = 1e-08,
     *,
     dimension: Literal[2, 3] = 3,
     solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",

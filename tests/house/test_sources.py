@@ -16,8 +16,10 @@ from types import FunctionType
 import pytest
 from house.test_tree import tracked_files
 
-from rover_gym import _core
-from rover_gym.core import extras
+from rover_gym import RoverEnv, _core, extras
+from rover_gym.scenes.scene_plan import OPTIONS
+from rover_gym.envs.arguments import SOLVER_OPTIONS
+from rover_gym.core import PlanarSimulation, Simulation
 
 ROOT = Path(__file__).parents[2]
 
@@ -192,7 +194,7 @@ WRITER = runpy.run_path(str(ROOT / "rust" / "python" / "stub.py"))
 
 STUB = WRITER["STUB"].read_text(encoding="utf-8")
 
-STUBBED = dict(WRITER["nodes"](STUB))
+TYPES = WRITER["TYPES"].read_text(encoding="utf-8")
 
 
 def runtime(name: str) -> object:
@@ -222,7 +224,7 @@ MEMBERS = [
 # A class is called if it has a constructor; the signature is the class's own, and Python keeps no other.
 CALLED = [name for name in [*PUBLIC, *MEMBERS] if callable(runtime(name)) and not is_class(name)]
 
-CALLED += [name for name in PUBLIC if f"{name}.__new__" in STUBBED]
+CALLED += [name for name in PUBLIC if is_class(name) and runtime(name).__text_signature__]
 
 
 def sections(name: str) -> dict[str, list[str]]:
@@ -243,35 +245,29 @@ def parameters(name: str) -> list[inspect.Parameter]:
     return [parameter for parameter in found if parameter.name != "self"]
 
 
-def stubbed_parameters(name: str) -> list[tuple[str, object, object]]:
-    """Name, kind and default of every parameter in the stub; a default that is no literal is `...`."""
-    arguments = STUBBED[f"{name}.__new__" if is_class(name) else name].args
-    kinds = inspect.Parameter
-    named = [(one, kinds.POSITIONAL_OR_KEYWORD) for one in arguments.args]
-    named += [(one, kinds.KEYWORD_ONLY) for one in arguments.kwonlyargs]
-    missing = [None] * (len(arguments.args) - len(arguments.defaults))
-    defaults = [*missing, *arguments.defaults, *arguments.kw_defaults]
-    found = [
-        (one.arg, kind, kinds.empty if default is None else ast.literal_eval(default))
-        for (one, kind), default in zip(named, defaults, strict=True)
-    ]
-    found += [(arguments.kwarg.arg, kinds.VAR_KEYWORD, kinds.empty)] if arguments.kwarg else []
-    return [one for one in found if one[0] not in ("self", "cls")]
+def test_the_stub_is_up_to_date() -> None:
+    made = ast.parse(WRITER["Writer"](_core).stub(TYPES))
+    assert ast.dump(made) == ast.dump(ast.parse(STUB)), "run `make stub`"
 
 
-def test_the_stub_has_the_docstrings_of_the_module() -> None:
-    assert WRITER["with_docstrings"](STUB, _core) == STUB, "the stub is out of date: run `make stub`"
-
-
-def test_the_stub_is_compared_name_by_name() -> None:
-    """The writer sees all that is public, and takes out a docstring that the module does not have."""
-    assert set(PUBLIC) | set(MEMBERS) <= set(STUBBED)
-    changed = STUB.replace('"""Takes n steps.\n', '"""Takes some steps.\n', 1).replace(
-        "    def __getnewargs__(self) -> tuple[float, float, bool]: ...",
-        '    def __getnewargs__(self) -> tuple[float, float, bool]:\n        """Not in the module."""',
-    )
-    assert changed.count("Not in the module") == changed.count("Takes some steps") == 1
-    assert WRITER["with_docstrings"](changed, _core) == STUB
+@pytest.mark.parametrize(
+    ("there", "instead", "complaint"),
+    [
+        ("    regenerating: bool\n", "", "Motor: types.pyi has no type for regenerating"),
+        ("    regenerating: bool\n", "    regenerating: bool\n    colour: str\n", "Motor has no colour"),
+        ("    def momentum(", "    momentum: float\n    def momentum(", "Simulation.momentum is no property"),
+        (
+            "stall_torque: float, no_load_speed",
+            "no_load_speed",
+            "Motor.__new__: types.pyi has no type for the argument",
+        ),
+        ("stall_torque: float, no", "stall: float, stall_torque: float, no", "Motor.__new__ has no stall"),
+        ("def exp(", "def exponential(", "the module: types.pyi has no type for exp"),
+    ],
+)
+def test_types_that_are_not_those_of_the_module_are_refused(there: str, instead: str, complaint: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(complaint)):
+        WRITER["Writer"](_core).stub(TYPES.replace(there, instead))
 
 
 def test_everything_public_says_what_it_is() -> None:
@@ -298,7 +294,15 @@ def test_every_error_that_a_docstring_names_exists() -> None:
             assert issubclass(found, Exception), name
 
 
-def test_the_stub_has_the_signatures_of_the_module() -> None:
-    """Constructors too, which stubtest does not look at: Python keeps their signature with the class."""
-    found = {name: [(one.name, one.kind, one.default) for one in parameters(name)] for name in CALLED}
-    assert found == {name: stubbed_parameters(name) for name in CALLED}
+def test_an_option_of_simulations_is_everywhere() -> None:
+    """Each list was written by hand, and the stub lacked `stabilisation="push_out"`, the default of beds of balls."""
+    options = [name for name in _core._types if not name.startswith("_")]
+    for simulation in (Simulation, *PlanarSimulation.__subclasses__()):
+        assert [name for name in inspect.signature(simulation).parameters if name in options] == options
+    assert set(options) - {"materials"} <= set(Simulation().settings)
+    assert {"friction", "restitution", "time_step", "materials", *SOLVER_OPTIONS} == set(options)
+    assert {"time_step", "variant", "tolerance", "materials", *OPTIONS} == {"gravity", *options}
+    row = next(row for row in RoverEnv.__doc__.splitlines() if row.strip().startswith("| solver_options"))
+    assert ", ".join(SOLVER_OPTIONS) in row
+    beds = re.findall(r"stabilisation: (Literal.*) \| None = None", STUB)
+    assert beds == ['Literal["projection", "push_out", "none"]'] * 2

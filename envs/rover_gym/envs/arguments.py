@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
-from rover_gym.core import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
+from rover_gym.core import ModelError, OptionError, RoverModel, Simulation, Terrain, TerrainError, Union
 from rover_gym.core.validation import Range, flag, known_keys, mapping, number, refuse, span, vector, whole
 from rover_gym.envs.observation import info_table, observation_table
 from rover_gym.envs.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_reward_terms
@@ -31,16 +31,11 @@ TERRAINS = ("plane", "rocks", "hills", "sand")
 #: Another name of a terrain, which files of trainings hold.
 SYNONYMS = {"sphere_field": "rocks"}
 
-SOLVER_OPTIONS = (
-    "variant",
-    "theta",
-    "forecast",
-    "solver",
-    "tolerance",
-    "max_iterations",
-    "budget",
-    "stabilisation",
-    "warm_start",
+#: Options of `Simulation` that the environment does not have as arguments of its own.
+SOLVER_OPTIONS = tuple(
+    name
+    for name in inspect.signature(Simulation).parameters
+    if name not in ("model", "terrain", "gravity", "friction", "restitution", "materials", "time_step", "accuracy")
 )
 
 #: Largest slope; a wheel treats steeper ground as a wall.
@@ -400,7 +395,9 @@ class RoverArguments(TypedDict, total=False):
     ]
     solver_options: Annotated[
         Mapping[str, Any] | None,
-        Argument(None, Special("a mapping", check_solver_options), "further options of `Simulation`, by name"),
+        Argument(
+            None, Special("a mapping", check_solver_options), "of `Simulation`, by name: " + ", ".join(SOLVER_OPTIONS)
+        ),
     ]
     reward_weights: Annotated[
         Mapping[str, float] | None,

@@ -1,5 +1,6 @@
 """A scene, its plan with a reason for every part, and the rover built from it."""
 
+import inspect
 import math
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
@@ -18,6 +19,7 @@ from rover_gym.core import (
     StepError,
     StepReport,
     Terrain,
+    accuracy_options,
 )
 from rover_gym.core.validation import flag, known_keys, refuse, vector
 from rover_gym.ground.maps.ground_lookup import as_terrain
@@ -27,18 +29,11 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 Accuracy: TypeAlias = Literal["fast", "balanced", "reference"] | float
 
-#: Keyword arguments of `Simulation` that a scene may set; the plan chooses the others.
-OPTIONS = (
-    "gravity",
-    "friction",
-    "restitution",
-    "theta",
-    "forecast",
-    "solver",
-    "max_iterations",
-    "budget",
-    "stabilisation",
-    "warm_start",
+#: Keyword arguments of `Simulation` that a scene may set; the plan chooses the others, partly by the accuracy.
+OPTIONS = tuple(
+    name
+    for name in inspect.signature(Simulation).parameters
+    if name not in ("model", "terrain", "materials", "accuracy", *accuracy_options("balanced"))
 )
 
 

@@ -8,7 +8,8 @@ use crate::arguments::{Named, number, refused};
 use crate::errors::{Kind, Result, Value};
 use crate::options::{VARIANTS, name_of};
 
-const PRESETS: [(&str, Accuracy); 3] = [
+/// Accuracies by name.
+pub const PRESETS: [(&str, Accuracy); 3] = [
     ("fast", Accuracy::FAST),
     ("balanced", Accuracy::BALANCED),
     ("reference", Accuracy::REFERENCE),

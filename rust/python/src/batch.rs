@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::scalar::instructions::Instructions;
 use rover_core::simulation::Batch;
+use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, at_least_one, below, flags, refused};
 use crate::arrays::{Array, array};
@@ -12,7 +13,7 @@ use crate::episode::{GivenSimulation, simulation};
 use crate::errors::{Kind, Result, Value};
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Open, Release, Shared, Watch};
-use crate::simulation::{Simulation, SimulationInputs};
+use crate::simulation::Simulation;
 
 /// Steps many rovers on several threads. Each gives the same bits as it would alone.
 ///
@@ -33,7 +34,7 @@ pub struct SimulationBatch(Shared<Inner>);
 
 struct Inner {
     inner: Batch,
-    origins: Vec<SimulationInputs>,
+    grounds: Vec<DrawnGround>,
 }
 
 /// (n,) truth values: which rovers move.
@@ -73,17 +74,17 @@ impl SimulationBatch {
         let items = simulations
             .try_iter()
             .map_err(|_| refused(simulations, Kind::Option, field, "simulations"))?;
-        let (mut rovers, mut origins) = (Vec::new(), Vec::new());
+        let (mut rovers, mut grounds) = (Vec::new(), Vec::new());
         for (i, item) in items.enumerate() {
             let item = item?;
             let one = simulation(&item, &format!("{field}[{i}]"))?.get();
             rovers.push(one.open()?.clone());
-            origins.push(one.origin().clone());
+            grounds.push(one.ground().clone());
         }
         let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
         let threads = threads.transpose()?;
         let inner = Batch::new(rovers, scan_points(scan)?, threads)?;
-        Ok(Self(Shared::new(Inner { inner, origins })))
+        Ok(Self(Shared::new(Inner { inner, grounds })))
     }
 
     /// Number of threads.
@@ -193,7 +194,7 @@ impl SimulationBatch {
         let mut held = self.0.open()?;
         let index = below(index, held.inner.rovers().len())?;
         held.inner.replace(index, rover, target)?;
-        held.origins[index] = one.origin().clone();
+        held.grounds[index] = one.ground().clone();
         Ok(())
     }
 
@@ -208,7 +209,7 @@ impl SimulationBatch {
         let held = self.0.open()?;
         let rovers = held.inner.rovers();
         let i = below(index, rovers.len())?;
-        let copy = Simulation::of(rovers[i].clone(), held.origins[i].clone());
+        let copy = Simulation::of(rovers[i].clone(), held.grounds[i].clone());
         Ok(Py::new(index.py(), copy)?)
     }
 

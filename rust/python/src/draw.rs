@@ -15,10 +15,9 @@ use crate::arrays::{Array, fresh_rows, two, vector};
 use crate::episode::{GivenRules, GivenSimulation};
 use crate::errors::{Kind, Result};
 use crate::generators::generators;
-use crate::options::SolverWords;
 use crate::reading::points;
 use crate::shared::{Release, Watch};
-use crate::simulation::{Simulation, SimulationInputs};
+use crate::simulation::Simulation;
 use crate::terrain::{self, Terrain};
 
 /// Distribution of the episodes of a task.
@@ -52,7 +51,6 @@ use crate::terrain::{self, Terrain};
 #[pyclass(module = "rover_gym.core", frozen)]
 pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
-    pub words: SolverWords,
     /// Constructor arguments, for pickling.
     given: ((GivenRules, Py<Simulation>), Py<PyDict>),
 }
@@ -61,7 +59,6 @@ pub struct EpisodeDistribution {
 #[pyclass(module = "rover_gym.core", frozen)]
 pub struct DrawnEpisodes {
     pub drawn: Vec<Beginning>,
-    pub words: SolverWords,
 }
 
 /// A range (low, high).
@@ -184,7 +181,6 @@ impl EpisodeDistribution {
         })?;
         Ok(DrawnEpisodes {
             drawn: watch.result(drawn)?.unwrap_or_default(),
-            words: self.words.clone(),
         })
     }
 }
@@ -245,7 +241,6 @@ impl EpisodeDistribution {
                 rules,
                 trunk_load_limit,
             },
-            words: made.origin().words.clone(),
             given: kept,
         })
     }
@@ -333,8 +328,7 @@ impl DrawnEpisodes {
     fn simulation(&self, index: &Bound<'_, PyAny>) -> Result<Py<Simulation>> {
         let one = self.at(index)?;
         let made = RoverSimulation::placed(one.scene.placement.clone())?;
-        let (terrain, words) = (one.scene.ground.clone(), self.words.clone());
-        let made = Simulation::of(made, SimulationInputs { terrain, words });
+        let made = Simulation::of(made, one.scene.ground.clone());
         Ok(Py::new(index.py(), made)?)
     }
 

@@ -17,10 +17,9 @@ use crate::episode::{EpisodeRun, GivenRules, GivenSimulation, actions};
 use crate::errors::{Kind, Result};
 use crate::generators::generators;
 use crate::infos::{InfoSource, info, infos};
-use crate::options::SolverWords;
 use crate::rover_grains::{RoverGrainSimulation, Together};
 use crate::shared::{Open, Release, Shared, Watch};
-use crate::simulation::{Simulation, SimulationInputs};
+use crate::simulation::Simulation;
 use crate::union;
 
 /// Observations, rewards, which episodes have ended, which have reached the time limit, and the
@@ -49,7 +48,7 @@ pub struct EpisodeBatch(Shared<Inner>);
 
 struct Inner {
     batch: CoreBatch,
-    origins: Vec<SimulationInputs>,
+    grounds: Vec<DrawnGround>,
     /// Simulations that Python has asked for.
     handed_out: Vec<Option<Py<Simulation>>>,
 }
@@ -60,13 +59,9 @@ impl Inner {
         Ok((self.batch.episode(index)?, self.batch.message(index)))
     }
 
-    /// Keeps the Python options of the simulation of an episode that has begun.
-    fn set_origin(&mut self, index: usize, words: &SolverWords) -> Result<()> {
-        let origin = self.batch.origin(index)?;
-        self.origins[index] = SimulationInputs {
-            terrain: origin.ground.clone(),
-            words: words.clone(),
-        };
+    /// Keeps the ground of an episode that has begun.
+    fn set_ground(&mut self, index: usize) -> Result<()> {
+        self.grounds[index] = self.batch.origin(index)?.ground.clone();
         self.handed_out[index] = None;
         Ok(())
     }
@@ -166,7 +161,7 @@ impl EpisodeBatch {
         let batch = CoreBatch::new(rules.0, &*one.open()?, n, max_steps, threads)?;
         Ok(Self(Shared::new(Inner {
             batch,
-            origins: vec![one.origin().clone(); n],
+            grounds: vec![one.ground().clone(); n],
             handed_out: (0..n).map(|_| None).collect(),
         })))
     }
@@ -346,7 +341,7 @@ impl EpisodeBatch {
         }
         for (&index, one) in places.iter().zip(&drawn.drawn) {
             held.batch.begin(index, one.clone())?;
-            held.set_origin(index, &drawn.words)?;
+            held.set_ground(index)?;
         }
         Ok(())
     }
@@ -380,7 +375,7 @@ impl EpisodeBatch {
         let one = simulation.0.get();
         let wrong = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
         let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy();
-        let origin = self::origin(origin, one.origin().terrain.clone())?;
+        let origin = self::origin(origin, one.ground().clone())?;
         let given = Named::keywords(indices.py(), options)?;
         let random = given.need("generator", |value, kind, field| {
             let rows = <[Pcg64; 1]>::try_from(generators(value)?);
@@ -398,7 +393,7 @@ impl EpisodeBatch {
             let (began, failure) = (origin.clone(), message.clone());
             held.batch
                 .resume(index, rover, whole, began, random, failure)?;
-            held.origins[index] = one.origin().clone();
+            held.grounds[index] = one.ground().clone();
             held.handed_out[index] = None;
         }
         Ok(())
@@ -492,9 +487,7 @@ impl EpisodeBatch {
     /// Args:
     ///     index: Index of the rover.
     fn terrain<'py>(&self, index: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>> {
-        self.one(index, |held, i| {
-            union::object(index.py(), &held.origins[i].terrain)
-        })
+        self.one(index, |held, i| union::object(index.py(), &held.grounds[i]))
     }
 
     /// The simulation of one rover, which moves with it until its next episode begins.
@@ -508,7 +501,7 @@ impl EpisodeBatch {
                 return Ok(known.clone_ref(py));
             }
             let rover = held.batch.rovers()[i].clone();
-            let made = Py::new(py, Simulation::shared(rover, held.origins[i].clone())?)?;
+            let made = Py::new(py, Simulation::shared(rover, held.grounds[i].clone())?)?;
             held.handed_out[i] = Some(made.clone_ref(py));
             Ok(made)
         })

@@ -4,14 +4,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::problem::{Dimension, FrictionContactProblem};
 use rover_core::solver::{
-    ContactLaw, Method, Rung, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
+    ContactLaw, Rung, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
 };
 
 use crate::arguments::{Given, Named, whole};
 use crate::arrays::Array;
 use crate::errors::{Kind, Result, Value};
 use crate::given_problem::{Delassus, coefficients, flat, with_hint};
-use crate::options::solver_options;
+use crate::options::{METHODS, checked, choice};
 use crate::shared::Release;
 
 /// Result report of the contact solver.
@@ -164,10 +164,14 @@ pub fn solve_friction_contact(
         }
     };
     let options = SolverOptions {
+        method: choice("solver", &solver, &METHODS)?,
+        tolerance,
+        max_sweeps: max_iterations,
         budget: given.read("budget", whole)?,
         keeps_history: given.flag("history", false)?,
-        ..solver_options(&solver, tolerance, max_iterations, &Method::ALL)?
+        ..SolverOptions::default()
     };
+    let options = checked(options)?;
     let initial = given.some("initial")?;
     given.finish()?;
     let W = Delassus::read(W, kind)?;

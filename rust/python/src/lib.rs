@@ -132,6 +132,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<beds::BedSimulation>()?;
     disks::register(module)?;
     balls::register(module)?;
+    options::register(module)?;
     rover_grains::register(module)?;
     Ok(())
 }

@@ -1,15 +1,20 @@
-//! Options of a simulation's steps: one table reads them from the arguments of every class and
-//! tells them again.
+//! Options of a simulation's steps, declared once: `step_options!` lists them. Arguments are read and
+//! told again, and docstrings, signatures and the types of the stub made, from this list.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
+use rover_core::law::materials::Materials;
 use rover_core::solver::{Method, SolverOptions};
 
+use crate::accuracy::PRESETS;
 use crate::arguments::{Named, count, flag, number, text, whole};
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::materials;
+use crate::planar::RULES;
+use crate::planar_machines::{BallSimulation, MirroredRoverSimulation, TwoWheelRoverSimulation};
+use crate::simulation::Simulation;
 
 /// The value that a word stands for.
 pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
@@ -49,131 +54,197 @@ pub const GRAIN_STABILISATIONS: [(&str, Stabilisation); 3] = [
     ("none", Stabilisation::None),
 ];
 
-/// What a simulation may step with: the solvers of Coulomb's law.
-const SIMULATION_SOLVERS: [Method; 5] = [
+/// Methods for the contact problem by name.
+pub const METHODS: [(&str, Method); 6] = by_name(Method::ALL);
+/// Methods that a simulation may step with: those for Coulomb's law.
+const SOLVERS: [(&str, Method); 5] = by_name([
     Method::Auto,
     Method::GaussSeidel,
     Method::Newton,
     Method::ProximalPoint,
     Method::Admm,
-];
+]);
 
-/// What was asked of the solver, in the words and numbers of the arguments:
-/// the core translates them.
-#[derive(Clone)]
-pub struct SolverWords {
-    pub solver: String,
-    pub max_iterations: usize,
+const fn by_name<const N: usize>(methods: [Method; N]) -> [(&'static str, Method); N] {
+    let mut named = [("", Method::Auto); N];
+    let mut i = 0;
+    while i < N {
+        named[i] = (methods[i].name(), methods[i]);
+        i += 1;
+    }
+    named
 }
 
-/// Options as arguments and as `settings` returns them.
-pub struct Options {
-    pub step: StepOptions,
-    words: SolverWords,
-}
+/// Largest number of iterations of the contact solver in a step, unless given.
+const MAX_ITERATIONS: usize = 1000;
 
-/// One option: its name, how it is read, and how `settings` returns it, if it was given.
+/// Every option but gravity, which is each class's own: its meaning, its name, whether `None` stands
+/// for its default, and its place in `StepOptions`. The type of the place tells how it is read; the
+/// core has its default and its range.
+///
+/// `rows` makes [`TABLE`] of them. `documented` makes the entries of a docstring, after its literal.
+macro_rules! step_options {
+    ($then:ident $($before:literal)?) => {
+        $crate::options::$then! {
+            $($before;)?
+            /// Coulomb's coefficient of every contact whose pair is not in `materials`.
+            friction => friction_coefficient;
+            /// Newton's coefficient of every contact whose pair is not in `materials`, in
+            /// [0, 1].
+            restitution => restitution;
+            /// Friction and restitution by pair of materials, in any order, such as
+            /// `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+            /// restitution). None by default.
+            materials | None => materials;
+            /// Time step, s, from 1e-9 to 1000; 0.005 by default.
+            time_step | None => time_step;
+            /// "linearised" evaluates the forces once in each step; "newton" solves for the forces
+            /// at its end. "linearised" by default.
+            variant | None => variant;
+            /// Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+            theta => theta;
+            /// A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+            /// its normal velocity; in [0, 1].
+            forecast => forecast;
+            /// Method for the contact problem, as in `solve_friction_contact`.
+            solver => solver.method;
+            /// Largest relative residual of the contact problem; 1e-12 by default.
+            tolerance | None => solver.tolerance;
+            /// Largest number of iterations of the contact solver in a step.
+            max_iterations => solver.max_sweeps;
+            /// Largest amount of work of the contact solver in a step, in the unit of
+            /// `solve_friction_contact` (operations, not time). By default it grows with the number of
+            /// contacts.
+            budget | None => solver.budget;
+            /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+            /// leaves them.
+            stabilisation => stabilisation;
+            /// Whether the contact solver starts from the last step's impulses.
+            warm_start => warm_start;
+        }
+    };
+}
+pub(crate) use step_options;
+
+/// Entries of a docstring's section "Args", without a line break at the end.
+macro_rules! documented {
+    ($before:literal; $(
+        #[doc = $first:literal] $(#[doc = $more:literal])*
+        $name:ident $(| $none:ident)? => $($place:ident).+;
+    )+) => {
+        concat!($before $(, "\n    ", stringify!($name), ":", $first $(, "\n       ", $more)*)+)
+    };
+}
+pub(crate) use documented;
+
+/// The rows of [`TABLE`].
+macro_rules! rows {
+    ($($(#[doc = $doc:literal])+ $name:ident $(| $none:ident)? => $($place:ident).+;)+) => {
+        &[$(Row {
+            name: stringify!($name),
+            takes_none: !concat!("", $(stringify!($none))?).is_empty(),
+            place: |step| &mut step.$($place).+,
+        }),+]
+    };
+}
+pub(crate) use rows;
+
+/// One option.
 struct Row {
     name: &'static str,
-    read: fn(&mut Options, &Bound<'_, PyAny>) -> Result<()>,
-    tell: fn(&Options, Python<'_>) -> PyResult<Option<Py<PyAny>>>,
+    takes_none: bool,
+    place: fn(&mut StepOptions) -> &mut dyn Argument,
 }
 
-/// An option that a function of the arguments reads, or a word for a value.
-macro_rules! row {
-    ($name:literal, word of $words:expr, $($place:ident).+) => {
-        Row {
-            name: $name,
-            read: |options, given| {
-                let word = text(given, Kind::Option, $name)?;
-                options.$($place).+ = choice($name, &word, &$words)?;
-                Ok(())
-            },
-            tell: |options, py| name_of(options.$($place).+, &$words).into_py_any(py).map(Some),
-        }
-    };
-    ($name:literal, $read:expr, $($place:ident).+) => {
-        Row {
-            name: $name,
-            read: |options, given| {
-                options.$($place).+ = $read(given, Kind::Option, $name)?;
-                Ok(())
-            },
-            tell: |options, py| options.$($place).+.clone().into_py_any(py).map(Some),
-        }
-    };
+const TABLE: &[Row] = step_options!(rows);
+
+/// The value of an option.
+trait Argument {
+    /// Takes what was given for the option of this name.
+    fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()>;
+    /// The value in Python, which is read again as this one.
+    fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>>;
+    /// Its type in Python.
+    fn python(&self) -> String;
 }
 
-/// Every option but gravity, which is each class's own.
-const TABLE: [Row; 13] = [
-    row!("friction", number, step.friction_coefficient),
-    row!("restitution", number, step.restitution),
-    Row {
-        name: "materials",
-        read: |options, given| {
-            options.step.materials = materials::parse(given)?;
-            Ok(())
-        },
-        tell: |options, py| {
-            let rows = materials::rows(py, &options.step.materials)?;
-            Ok((!rows.is_empty()).then(|| rows.into_any().unbind()))
-        },
-    },
-    row!("time_step", number, step.time_step),
-    row!("variant", word of VARIANTS, step.variant),
-    row!("theta", number, step.theta),
-    row!("forecast", number, step.forecast),
-    row!("solver", text, words.solver),
-    row!("tolerance", number, step.solver.tolerance),
-    row!("max_iterations", count, words.max_iterations),
-    Row {
-        name: "budget",
-        read: |options, given| {
-            options.step.solver.budget = Some(whole(given, Kind::Option, "budget")?);
-            Ok(())
-        },
-        tell: |options, py| {
-            let budget = options.step.solver.budget;
-            budget.map(|budget| budget.into_py_any(py)).transpose()
-        },
-    },
-    row!("stabilisation", word of STABILISATIONS, step.stabilisation),
-    row!("warm_start", flag, step.warm_start),
-];
-
-/// Options for which `None` stands for the default.
-const OPTIONAL: [&str; 5] = ["materials", "time_step", "variant", "tolerance", "budget"];
-
-impl Options {
-    /// No options given: the defaults of `step`.
-    pub fn of(step: StepOptions) -> Self {
-        let words = SolverWords {
-            solver: "auto".to_owned(),
-            max_iterations: 1000,
-        };
-        Self { step, words }
-    }
-
-    /// Reads all options that were given by their names.
-    pub fn read(mut self, given: &Named<'_>) -> Result<(StepOptions, SolverWords)> {
-        for row in &TABLE {
-            if let Some(value) = given.get(row.name)?.given()
-                && !(value.is_none() && OPTIONAL.contains(&row.name))
-            {
-                (row.read)(&mut self, &value)?;
+macro_rules! argument {
+    ($type:ty, $python:literal, $read:ident) => {
+        impl Argument for $type {
+            fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()> {
+                *self = $read(given, Kind::Option, name)?;
+                Ok(())
+            }
+            fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+                self.into_py_any(py)
+            }
+            fn python(&self) -> String {
+                $python.to_owned()
             }
         }
-        let SolverOptions {
-            tolerance, budget, ..
-        } = self.step.solver;
-        let SolverWords {
-            solver,
-            max_iterations,
-        } = &self.words;
-        let solver = solver_options(solver, tolerance, *max_iterations, &SIMULATION_SOLVERS)?;
-        self.step.solver = SolverOptions { budget, ..solver };
-        Ok((self.step, self.words))
+    };
+    ($type:ty, $words:ident) => {
+        impl Argument for $type {
+            fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()> {
+                *self = choice(name, &text(given, Kind::Option, name)?, &$words)?;
+                Ok(())
+            }
+            fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+                name_of(*self, &$words).into_py_any(py)
+            }
+            fn python(&self) -> String {
+                literal(&$words)
+            }
+        }
+    };
+}
+
+argument!(f64, "float", number);
+argument!(usize, "int", count);
+argument!(bool, "bool", flag);
+argument!(Variant, VARIANTS);
+argument!(Method, SOLVERS);
+argument!(Stabilisation, STABILISATIONS);
+
+impl Argument for Option<u64> {
+    fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()> {
+        *self = Some(whole(given, Kind::Option, name)?);
+        Ok(())
     }
+    fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        (*self).into_py_any(py)
+    }
+    fn python(&self) -> String {
+        "int".to_owned()
+    }
+}
+
+impl Argument for Materials {
+    fn read(&mut self, given: &Bound<'_, PyAny>, _: &str) -> Result<()> {
+        *self = materials::parse(given)?;
+        Ok(())
+    }
+    fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let rows = materials::rows(py, self)?;
+        (!rows.is_empty()).then_some(rows).into_py_any(py)
+    }
+    fn python(&self) -> String {
+        "_Materials".to_owned()
+    }
+}
+
+/// Reads all options that were given by their names.
+pub fn read(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
+    step.solver.max_sweeps = MAX_ITERATIONS;
+    for row in TABLE {
+        if let Some(value) = given.get(row.name)?.given()
+            && !(value.is_none() && row.takes_none)
+        {
+            (row.place)(&mut step).read(&value, row.name)?;
+        }
+    }
+    step.solver = checked(step.solver)?;
+    Ok(step)
 }
 
 /// The keyword arguments that make a simulation with these options.
@@ -182,48 +253,103 @@ impl Options {
 pub fn settings<'py>(
     gravity: &Bound<'py, PyAny>,
     step: &StepOptions,
-    words: &SolverWords,
 ) -> Result<Bound<'py, PyDict>> {
     let py = gravity.py();
     let settings = PyDict::new(py);
     settings.set_item("gravity", gravity)?;
-    let options = Options {
-        step: step.clone(),
-        words: words.clone(),
-    };
-    for row in &TABLE {
-        if let Some(value) = (row.tell)(&options, py)? {
+    let mut step = step.clone();
+    for row in TABLE {
+        let value = (row.place)(&mut step).tell(py)?;
+        if !value.is_none(py) {
             settings.set_item(row.name, value)?;
         }
     }
     Ok(settings)
 }
 
-/// Solver options of the public arguments; `known`: the methods that may be named.
-pub fn solver_options(
-    name: &str,
-    tolerance: f64,
-    max_iterations: usize,
-    known: &[Method],
-) -> Result<SolverOptions> {
+/// Solver options whose tolerance and number of iterations are in range, and hold for every method.
+pub fn checked(options: SolverOptions) -> Result<SolverOptions> {
+    let SolverOptions {
+        tolerance,
+        max_sweeps,
+        ..
+    } = options;
     if !(tolerance.is_finite() && tolerance > 0.0) {
         let message = format!("tolerance: must be finite and positive, is {tolerance}");
         return Err(Kind::Option.error("tolerance", message, Value::Number(tolerance)));
     }
-    if max_iterations == 0 {
+    if max_sweeps == 0 {
         let message = "max_iterations: must be at least 1, is 0".to_owned();
         return Err(Kind::Option.error("max_iterations", message, Value::Count(0)));
     }
-    let methods: Vec<_> = known
-        .iter()
-        .map(|method| (method.name(), *method))
-        .collect();
     Ok(SolverOptions {
-        method: choice("solver", name, &methods)?,
-        tolerance,
         velocity_tolerance: tolerance.max(1e-9),
-        max_newton_steps: max_iterations,
-        max_sweeps: max_iterations,
-        ..SolverOptions::default()
+        max_newton_steps: max_sweeps,
+        ..options
     })
+}
+
+/// The type of an argument that is one of these words, in Python.
+fn literal<T>(choices: &[(&str, T)]) -> String {
+    let words: Vec<_> = choices
+        .iter()
+        .map(|(word, _)| format!("{word:?}"))
+        .collect();
+    format!("Literal[{}]", words.join(", "))
+}
+
+/// Puts the options into the signatures of the classes that take them, and tells the writer of the
+/// stub their types and the words of other arguments.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    let types = PyDict::new(py);
+    let inspect = py.import("inspect")?;
+    let parameter = inspect.getattr("Parameter")?;
+    let (keyword, rest) = (
+        parameter.getattr("KEYWORD_ONLY")?,
+        parameter.getattr("VAR_KEYWORD")?,
+    );
+    let mut step = StepOptions::default();
+    step.solver.max_sweeps = MAX_ITERATIONS;
+    let mut options = Vec::new();
+    for row in TABLE {
+        let value = (row.place)(&mut step);
+        let (default, or_none) = if row.takes_none {
+            (py.None(), " | None")
+        } else {
+            (value.tell(py)?, "")
+        };
+        let default = [("default", default)].into_py_dict(py)?;
+        options.push(parameter.call((row.name, &keyword), Some(&default))?);
+        types.set_item(row.name, value.python() + or_none)?;
+    }
+    for class in [
+        py.get_type::<Simulation>(),
+        py.get_type::<BallSimulation>(),
+        py.get_type::<TwoWheelRoverSimulation>(),
+        py.get_type::<MirroredRoverSimulation>(),
+    ] {
+        let own = inspect.call_method1("signature", (&class,))?;
+        let mut all = Vec::new();
+        for one in own
+            .getattr("parameters")?
+            .call_method0("values")?
+            .try_iter()?
+        {
+            let one = one?;
+            let is_gravity = one.getattr("name")?.eq("gravity")?;
+            if one.getattr("kind")?.ne(&rest)? {
+                all.push(one);
+            }
+            if is_gravity {
+                all.extend_from_slice(&options);
+            }
+        }
+        class.setattr("__signature__", inspect.call_method1("Signature", (all,))?)?;
+    }
+    types.set_item("_Accuracy", literal(&PRESETS))?;
+    types.set_item("_ContactRule", literal(&RULES))?;
+    types.set_item("_GrainStabilisation", literal(&GRAIN_STABILISATIONS))?;
+    types.set_item("_Method", literal(&METHODS))?;
+    module.setattr("_types", types)
 }

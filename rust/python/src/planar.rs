@@ -12,15 +12,30 @@ use crate::arguments::{Named, text};
 use crate::arrays::{Array, fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::PlanarContacts;
 use crate::errors::{BorderError, Kind, Result, Value};
-use crate::options::{Options, SolverWords, choice, name_of, settings};
+use crate::options::{self, choice, name_of};
 use crate::planar_ground::parse;
 use crate::shared::{Open, Shared};
 use crate::stepping::{AnySimulation, Problem, problem};
 
-const RULES: [(&str, ContactRule); 2] = [
+/// Rules of contact by name.
+pub const RULES: [(&str, ContactRule); 2] = [
     ("nearest", ContactRule::Nearest),
     ("centre_height", ContactRule::CentreHeight),
 ];
+
+/// Entries of a docstring's section "Args": the options that all planar machines take.
+macro_rules! planar_options {
+    () => {
+        concat!(
+            $crate::options::step_options!(documented
+                "    gravity: Gravity, (2,), m/s²; (0, -9.81) by default."),
+            "\n    contact: \"nearest\", the contact is the point of the ground nearest to the disc's",
+            "\n        centre, or \"centre_height\", the rule of the 2010 report, by which the centre itself",
+            "\n        stops at the ground."
+        )
+    };
+}
+pub(crate) use planar_options;
 
 /// Base class of planar machines on a ground. It cannot be instantiated.
 #[pyclass(module = "rover_gym.core", extends = AnySimulation, subclass, frozen)]
@@ -28,7 +43,6 @@ pub struct PlanarSimulation {
     inner: Arc<Shared<Core>>,
     ground: Py<PyAny>,
     parameters: Py<PyDict>,
-    words: SolverWords,
 }
 
 /// Two numbers.
@@ -42,7 +56,7 @@ pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vector2
 }
 
 /// Reads the options that all planar simulations take.
-fn options(given: &Named<'_>) -> Result<(StepOptions, SolverWords, ContactRule)> {
+fn step_options(given: &Named<'_>) -> Result<(StepOptions, ContactRule)> {
     let mut step = StepOptions::default();
     if let Some(gravity) = given.read("gravity", pair)? {
         step.gravity = gravity.push(0.0);
@@ -51,8 +65,7 @@ fn options(given: &Named<'_>) -> Result<(StepOptions, SolverWords, ContactRule)>
         choice(field, &text(value, kind, field)?, &RULES)
     };
     let rule = given.read("contact", rule)?.unwrap_or(ContactRule::Nearest);
-    let (step, words) = Options::of(step).read(given)?;
-    Ok((step, words, rule))
+    Ok((options::read(step, given)?, rule))
 }
 
 impl PlanarSimulation {
@@ -68,14 +81,13 @@ impl PlanarSimulation {
         given: Named<'_>,
     ) -> Result<PyClassInitializer<Self>> {
         let terrain: Arc<dyn PlanarGround> = parse(ground)?;
-        let (step, words, rule) = options(&given)?;
+        let (step, rule) = step_options(&given)?;
         given.finish()?;
         let inner = Arc::new(Shared::new(Core::new(machine, terrain, rule, step)?));
         Ok(AnySimulation::base(inner.clone()).add_subclass(Self {
             inner,
             ground: ground.clone().unbind(),
             parameters: parameters.unbind(),
-            words,
         }))
     }
 }
@@ -130,9 +142,9 @@ impl PlanarSimulation {
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let inner = self.open()?;
-        let options = inner.options();
-        let gravity = (options.gravity.x, options.gravity.y).into_pyobject(py)?;
-        let settings = settings(&gravity, options, &self.words)?;
+        let step = inner.options();
+        let gravity = (step.gravity.x, step.gravity.y).into_pyobject(py)?;
+        let settings = options::settings(&gravity, step)?;
         settings.set_item("contact", name_of(inner.scene().rule, &RULES))?;
         Ok(settings)
     }

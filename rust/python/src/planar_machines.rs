@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::arguments::{Named, number};
 use crate::errors::{Kind, Result};
 use crate::model::RoverModel;
-use crate::planar::{PlanarSimulation, pair};
+use crate::planar::{PlanarSimulation, pair, planar_options};
 use crate::planar_ground::border;
 
 /// A disc on a ground: coordinates x, y of its centre, m, and its angle theta, rad.
@@ -20,10 +20,7 @@ use crate::planar_ground::border;
 ///     mass: Mass, kg.
 ///     radius: Radius, m.
 ///     inertia: Inertia about the centre, kg m²; the inertia of a homogeneous disc by default.
-///     **options: Options of `Simulation` from `gravity`, here (2,), to `warm_start`, and
-///         `contact`: "nearest", the contact is the point of the ground nearest to the disc's
-///         centre, or "centre_height", the rule of the 2010 report, by which the centre itself
-///         stops at the ground.
+#[doc = planar_options!()]
 ///
 /// Raises:
 ///     ModelError: `mass`, `radius` or `inertia` is not finite and positive.
@@ -36,7 +33,7 @@ pub struct BallSimulation;
 #[pymethods]
 impl BallSimulation {
     #[new]
-    #[pyo3(signature = (ground, **options), text_signature = "(ground, *, mass=3.0, radius=1.5, inertia=None, **options)")]
+    #[pyo3(signature = (ground, **options), text_signature = "(ground, *, mass=3.0, radius=1.5, inertia=None, gravity=None, contact='nearest', **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
         options: Option<&Bound<'_, PyDict>>,
@@ -76,7 +73,7 @@ impl BallSimulation {
 ///         default.
 ///     axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
 ///         default.
-///     **options: Options of `BallSimulation`.
+#[doc = planar_options!()]
 ///
 /// Raises:
 ///     ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
@@ -90,7 +87,7 @@ pub struct TwoWheelRoverSimulation;
 impl TwoWheelRoverSimulation {
     #[new]
     #[pyo3(signature = (ground, **options),
-        text_signature = "(ground, *, mass=130.0, inertia=None, wheel_mass=None, wheel_radius=None, wheel_inertia=None, axle_a=None, axle_b=None, **options)")]
+        text_signature = "(ground, *, mass=130.0, inertia=None, wheel_mass=None, wheel_radius=None, wheel_inertia=None, axle_a=None, axle_b=None, gravity=None, contact='nearest', **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
         options: Option<&Bound<'_, PyDict>>,
@@ -161,7 +158,7 @@ pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Res
 ///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.
 ///     model: The machine: an object, a name of the gallery or a file. It must be symmetric about
 ///         the trunk's x-y plane; the built-in rover by default.
-///     **options: Options of `BallSimulation`.
+#[doc = planar_options!()]
 ///
 /// Raises:
 ///     ModelError: The model is not symmetric.
@@ -179,7 +176,7 @@ pub struct MirroredRoverSimulation {
 #[pymethods]
 impl MirroredRoverSimulation {
     #[new]
-    #[pyo3(signature = (ground, **options), text_signature = "(ground, *, model=None, **options)")]
+    #[pyo3(signature = (ground, **options), text_signature = "(ground, *, model=None, gravity=None, contact='nearest', **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
         options: Option<&Bound<'_, PyDict>>,

@@ -23,7 +23,7 @@ use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::linearisation::{Linearisation, StepDerivatives, named_parameters, of_trajectory};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
-use crate::options::{Options, SolverWords, settings};
+use crate::options::{self, step_options};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::sand::sand_to_dict;
@@ -40,28 +40,8 @@ use crate::{terrain, union};
 ///     model: The machine, a name of the gallery, or a file; the built-in rover by default.
 ///     terrain: A terrain, the file of a map or a mesh, or a list of several; flat ground at height
 ///         0 by default.
-///     gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
-///     friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
-///     restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
-///         [0, 1].
-///     materials: Friction and restitution by pair of materials, in any order, such as
-///         `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
-///         restitution). None by default.
-///     time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
-///     variant: "linearised" evaluates the forces once in each step; "newton" solves for the forces
-///         at its end. "linearised" by default.
-///     theta: Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
-///     forecast: A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
-///         its normal velocity; in [0, 1].
-///     solver: Method for the contact problem, as in `solve_friction_contact`.
-///     tolerance: Largest relative residual of the contact problem; 1e-12 by default.
-///     max_iterations: Largest number of iterations of the contact solver in a step.
-///     budget: Largest amount of work of the contact solver in a step, in the unit of
-///         `solve_friction_contact` (operations, not time). By default it grows with the number of
-///         contacts.
-///     stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
-///         leaves them.
-///     warm_start: Whether the contact solver starts from the last step's impulses.
+#[doc = step_options!(documented
+    "    gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.")]
 ///     accuracy: Chooses `time_step`, `variant` and `tolerance` by `accuracy_options`: "fast",
 ///         "balanced", "reference", or the allowed error on a path of 20 m on flat ground, m. These
 ///         three options cannot be given beside it.
@@ -76,14 +56,7 @@ pub struct Simulation {
     pub inner: Arc<Shared<CoreSimulation>>,
     model: Arc<Model>,
     options: StepOptions,
-    origin: SimulationInputs,
-}
-
-/// What a simulation was made with and the core does not keep, for pickling.
-#[derive(Clone)]
-pub struct SimulationInputs {
-    pub terrain: DrawnGround,
-    pub words: SolverWords,
+    ground: DrawnGround,
 }
 
 fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
@@ -91,34 +64,34 @@ fn names(joints: &Bound<'_, PyAny>) -> Result<Vec<String>> {
 }
 
 impl Simulation {
-    /// A simulation and its constructor arguments.
-    pub fn of(inner: CoreSimulation, origin: SimulationInputs) -> PyClassInitializer<Self> {
+    /// A simulation and its ground.
+    pub fn of(inner: CoreSimulation, ground: DrawnGround) -> PyClassInitializer<Self> {
         let parts = (inner.model().clone(), inner.options().clone());
-        Self::with(Arc::new(Shared::new(inner)), parts, origin)
+        Self::with(Arc::new(Shared::new(inner)), parts, ground)
     }
 
     fn with(
         inner: Arc<Shared<CoreSimulation>>,
         (model, options): (Arc<Model>, StepOptions),
-        origin: SimulationInputs,
+        ground: DrawnGround,
     ) -> PyClassInitializer<Self> {
         AnySimulation::base(inner.clone()).add_subclass(Self {
             inner,
             model,
             options,
-            origin,
+            ground,
         })
     }
 
     /// A simulation that others hold, too.
     pub fn shared(
         inner: Arc<Shared<CoreSimulation>>,
-        origin: SimulationInputs,
+        ground: DrawnGround,
     ) -> Result<PyClassInitializer<Self>> {
         let open = inner.open()?;
         let parts = (open.model().clone(), open.options().clone());
         drop(open);
-        Ok(Self::with(inner, parts, origin))
+        Ok(Self::with(inner, parts, ground))
     }
 
     /// The simulation, for one call.
@@ -126,9 +99,9 @@ impl Simulation {
         self.inner.open()
     }
 
-    /// Origin of the simulation: what it was made with and the core does not keep.
-    pub fn origin(&self) -> &SimulationInputs {
-        &self.origin
+    /// The ground as it was given, of which the core keeps less.
+    pub fn ground(&self) -> &DrawnGround {
+        &self.ground
     }
 
     /// Commands, one for each wheel.
@@ -141,7 +114,7 @@ impl Simulation {
 impl Simulation {
     #[new]
     #[pyo3(signature = (model = Given::MISSING, terrain = None, **options),
-        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, materials=None, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, budget=None, stabilisation='projection', warm_start=True, accuracy=None)")]
+        text_signature = "(model=None, terrain=None, *, gravity=None, accuracy=None, **options)")]
     fn new(
         py: Python<'_>,
         model: Given<'_>,
@@ -158,7 +131,7 @@ impl Simulation {
             Some(given) => terrain::parse(given)?,
         };
         let chosen = accuracy::chosen(&given)?;
-        let options = Options::of(StepOptions {
+        let usual = StepOptions {
             gravity: checked_gravity(given.some("gravity")?.as_ref())?,
             time_step: chosen.time_step,
             variant: chosen.variant,
@@ -167,11 +140,11 @@ impl Simulation {
                 ..SolverOptions::default()
             },
             ..StepOptions::default()
-        });
-        let (options, words) = options.read(&given)?;
+        };
+        let options = options::read(usual, &given)?;
         given.finish()?;
         let inner = CoreSimulation::new(model, terrain.terrain(), options)?;
-        Ok(Self::of(inner, SimulationInputs { terrain, words }))
+        Ok(Self::of(inner, terrain))
     }
 
     /// The machine.
@@ -183,7 +156,7 @@ impl Simulation {
     /// The ground.
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
-        union::object(py, &self.origin.terrain)
+        union::object(py, &self.ground)
     }
 
     /// Forces, sinkage and ruts of the wheels on sand; None on rigid ground.
@@ -247,7 +220,7 @@ impl Simulation {
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let gravity = &self.options.gravity;
         let gravity = (gravity.x, gravity.y, gravity.z).into_pyobject(py)?;
-        settings(&gravity, &self.options, &self.origin.words)
+        options::settings(&gravity, &self.options)
     }
 
     /// Number of rovers that a batch steps together in one SIMD register of this computer.
