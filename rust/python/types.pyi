@@ -685,7 +685,6 @@ class GrainSimulation:
     spin: _Array
     terrain: Terrain | None
     vessel: Drum | Silo | None
-    settings: dict[str, Any]
 
     def set_state(position: npt.ArrayLike, velocity: npt.ArrayLike | None, spin: npt.ArrayLike | None): ...
     def exchange(
