@@ -1,5 +1,6 @@
 """Sensors from mappings, as the JSON of an environment's specification has them: `{"LaserScanner": {"rays": 90}}`."""
 
+import inspect
 from dataclasses import fields
 from importlib import import_module
 from typing import Any
@@ -9,16 +10,12 @@ from rover_gym.core.validation import known_keys, mapping, refuse
 from rover_gym.envs.sensors.sensor import Mount, Sensor
 from rover_gym.envs.spec_json import named_object
 
-#: The sensors that a mapping may name, and their modules.
-SENSORS = {
-    "ColourCamera": "colour_camera",
-    "DepthCamera": "depth_camera",
-    "HeadingSensor": "wheel_encoders",
-    "InertialUnit": "inertial_unit",
-    "LaserScanner": "depth_camera",
-    "MotorSensors": "wheel_encoders",
-    "WheelEncoders": "wheel_encoders",
-}
+
+def sensor_classes() -> dict[str, type[Sensor]]:
+    """The classes of sensors that this room offers, by name."""
+    room = import_module("rover_gym.envs.sensors")
+    offered = {name: getattr(room, name) for name in room.__all__ if name[0].isupper()}
+    return {name: cls for name, cls in offered.items() if issubclass(cls, Sensor) and not inspect.isabstract(cls)}
 
 
 def sensor_of(field: str, value: object) -> Sensor:
@@ -37,10 +34,10 @@ def sensor_of(field: str, value: object) -> Sensor:
     if found is None:
         refuse(OptionError, field, value, "must be a sensor of rover_gym.envs.sensors, or its class and fields")
     name, given = found
-    if name not in SENSORS:
-        refuse(OptionError, field, name, f"unknown class of a sensor; known are {', '.join(SENSORS)}")
-    made: type[Sensor] = getattr(import_module(f"rover_gym.envs.sensors.{SENSORS[name]}"), name)
-    return made(**_arguments(f"{field}.{name}", made, given))
+    known = sensor_classes()
+    if name not in known:
+        refuse(OptionError, field, name, f"unknown class of a sensor; known are {', '.join(known)}")
+    return known[name](**_arguments(f"{field}.{name}", known[name], given))
 
 
 def _arguments(field: str, cls: type[Sensor | Mount], value: object) -> dict[str, Any]:
