@@ -16,8 +16,8 @@ from types import FunctionType
 import pytest
 from house.test_tree import tracked_files
 
-from rover_gym import RoverEnv, _core, extras
-from rover_gym.core import PlanarSimulation, Simulation
+from rover_gym import RoverEnv, _core
+from rover_gym.core import PlanarSimulation, Simulation, extras
 from rover_gym.envs.arguments import SOLVER_OPTIONS
 from rover_gym.scenes.scene_plan import OPTIONS
 
