@@ -1,5 +1,5 @@
-//! Options of a simulation's steps, declared once: `step_options!` lists them. Arguments are read and
-//! told again, and docstrings, signatures and the types of the stub made, from this list.
+//! Options of a simulation's steps, declared once: `step_options!` lists them. Arguments are read
+//! and told again, and docstrings, signatures and the types of the stub made, from this list.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -78,51 +78,50 @@ const fn by_name<const N: usize>(methods: [Method; N]) -> [(&'static str, Method
 /// Largest number of iterations of the contact solver in a step, unless given.
 const MAX_ITERATIONS: usize = 1000;
 
-/// Every option but gravity, which is each class's own: its meaning, its name, whether `None` stands
-/// for its default, and its place in `StepOptions`. The type of the place tells how it is read; the
-/// core has its default and its range.
+/// Every option but gravity, which is each class's own: its meaning, its name, whether `None`
+/// stands for its default, and its place in `StepOptions`. The type of the place tells how it is
+/// read; the core has its default and its range.
 ///
-/// `rows` makes [`TABLE`] of them. `documented` makes the entries of a docstring, after its literal.
+/// `rows` makes [`TABLE`] of them. `documented` makes the entries of a docstring, after those that
+/// it is given.
 macro_rules! step_options {
-    ($then:ident $($before:literal)?) => {
-        $crate::options::$then! {
-            $($before;)?
-            /// Coulomb's coefficient of every contact whose pair is not in `materials`.
-            friction => friction_coefficient;
-            /// Newton's coefficient of every contact whose pair is not in `materials`, in
-            /// [0, 1].
-            restitution => restitution;
-            /// Friction and restitution by pair of materials, in any order, such as
-            /// `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
-            /// restitution). None by default.
-            materials | None => materials;
-            /// Time step, s, from 1e-9 to 1000; 0.005 by default.
-            time_step | None => time_step;
-            /// "linearised" evaluates the forces once in each step; "newton" solves for the forces
-            /// at its end. "linearised" by default.
-            variant | None => variant;
-            /// Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
-            theta => theta;
-            /// A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
-            /// its normal velocity; in [0, 1].
-            forecast => forecast;
-            /// Method for the contact problem, as in `solve_friction_contact`.
-            solver => solver.method;
-            /// Largest relative residual of the contact problem; 1e-12 by default.
-            tolerance | None => solver.tolerance;
-            /// Largest number of iterations of the contact solver in a step.
-            max_iterations => solver.max_sweeps;
-            /// Largest amount of work of the contact solver in a step, in the unit of
-            /// `solve_friction_contact` (operations, not time). By default it grows with the number of
-            /// contacts.
-            budget | None => solver.budget;
-            /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
-            /// leaves them.
-            stabilisation => stabilisation;
-            /// Whether the contact solver starts from the last step's impulses.
-            warm_start => warm_start;
-        }
-    };
+    ($then:ident $($before:literal)?) => { $crate::options::$then! {
+        $($before;)?
+        /// Coulomb's coefficient of every contact whose pair is not in `materials`.
+        friction => friction_coefficient;
+        /// Newton's coefficient of every contact whose pair is not in `materials`, in
+        /// [0, 1].
+        restitution => restitution;
+        /// Friction and restitution by pair of materials, in any order, such as
+        /// `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+        /// restitution). None by default.
+        materials | None => materials;
+        /// Time step, s, from 1e-9 to 1000; 0.005 by default.
+        time_step | None => time_step;
+        /// "linearised" evaluates the forces once in each step; "newton" solves for the forces
+        /// at its end. "linearised" by default.
+        variant | None => variant;
+        /// Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+        theta => theta;
+        /// A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+        /// its normal velocity; in [0, 1].
+        forecast => forecast;
+        /// Method for the contact problem, as in `solve_friction_contact`.
+        solver => solver.method;
+        /// Largest relative residual of the contact problem; 1e-12 by default.
+        tolerance | None => solver.tolerance;
+        /// Largest number of iterations of the contact solver in a step.
+        max_iterations => solver.max_sweeps;
+        /// Largest amount of work of the contact solver in a step, in the unit of
+        /// `solve_friction_contact` (operations, not time). By default it grows with the number of
+        /// contacts.
+        budget | None => solver.budget;
+        /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+        /// leaves them.
+        stabilisation => stabilisation;
+        /// Whether the contact solver starts from the last step's impulses.
+        warm_start => warm_start;
+    } };
 }
 pub(crate) use step_options;
 
