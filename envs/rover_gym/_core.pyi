@@ -2965,7 +2965,7 @@ class BedSimulation(AnySimulation):
     def contacts(self) -> GrainContacts:
         """The contacts of the last step."""
     def momentum(self) -> npt.NDArray[np.float64]:
-        """Momentum of the grains, kg m/s, then about the origin, kg m²/s: (3,) of disks, (6,) of balls.
+        """Momentum, kg m/s, then about the origin, kg m²/s: (3,) of disks, (6,) of balls.
 
         Grains with prescribed velocity are not included.
         """

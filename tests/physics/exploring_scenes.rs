@@ -1,7 +1,9 @@
-//! Drives of random policies: the record in `benchmarks/comparison/exploring.json`, ready to be played.
+//! Drives of random policies: the record in `benchmarks/comparison/exploring.json`, ready to be
+//! played.
 //!
 //! Torques and steering set-points change every 50 ms. One record serves every torque, which scales
-//! it. `benchmarks/comparison/exploring.py` says how the drives were recorded, and plays them in Python.
+//! it. `benchmarks/comparison/exploring.py` says how the drives were recorded, and plays them
+//! in Python.
 
 #![allow(dead_code, clippy::unwrap_used)] // each program uses some of them; the record is ours
 

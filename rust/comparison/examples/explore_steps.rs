@@ -6,8 +6,8 @@
 //! It plays the first DRIVES drives of `benchmarks/comparison/exploring.json` (GROUND: `plane`,
 //! `rocks`, `plane, wheels 0.20 m`, `plane, cylinders`, `plane, tori`) with torques of up to TORQUE
 //! N m, and counts every seventh step. Each part of a counted step ends with a call of `part_ends`,
-//! at which callgrind writes what the part took. The number of counted steps is printed, and the names of
-//! the parts in the same order, one a line. `make bench` adds them up.
+//! at which callgrind writes what the part took. The number of counted steps is printed, and the
+//! names of the parts in the same order, one a line. `make bench` adds them up.
 
 #![allow(clippy::print_stdout)] // its purpose
 

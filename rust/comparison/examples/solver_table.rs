@@ -2,7 +2,8 @@
 //! iterations, residual, velocity error, time (best of many).
 //!
 //! `cargo run --release -p rover-comparison --example solver_table -- [name filter] [method]
-//! [tolerance]`, where the method is `auto`, `nsgs`, `newton`, `proximal`, `admm`, `relaxed` or `all`.
+//! [tolerance]`, where the method is `auto`, `nsgs`, `newton`, `proximal`, `admm`, `relaxed` or
+//! `all`.
 #![allow(clippy::print_stdout)] // its purpose
 
 #[path = "../../../tests/solver/npz.rs"]

@@ -14,7 +14,7 @@ use rover_task::draw::DrawnGround;
 use crate::arguments::{Named, count, number, refused};
 use crate::arrays::{Array, vector};
 use crate::bed_arguments::{self, Described, Packed, grain_error, packed, rows};
-use crate::beds::{Bed, BedSimulation, columns};
+use crate::beds::{BedSimulation, SharedBed, columns};
 use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
 use crate::shared::{Open, Release};
@@ -87,7 +87,7 @@ const VELOCITIES: usize = body_velocities(3);
 ///     OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
 #[pyclass(module = "rover_gym.core", extends = BedSimulation, frozen)]
 pub struct GrainSimulation {
-    pub inner: Arc<Bed<3>>,
+    pub inner: Arc<SharedBed<3>>,
     terrain: Option<DrawnGround>,
     vessel: Option<Vessel>,
 }
@@ -235,7 +235,12 @@ impl GrainSimulation {
     #[getter]
     fn spin(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(columns(inner.v(), inner.description().grains.len(), VELOCITIES, 3))
+        Ok(columns(
+            inner.v(),
+            inner.description().grains.len(),
+            VELOCITIES,
+            3,
+        ))
     }
 
     /// The terrain below the balls, or None.

@@ -19,7 +19,7 @@ use crate::shared::{Open, Shared};
 use crate::stepping::{AnySimulation, Stepped};
 
 /// A bed of grains in D dimensions.
-pub type Bed<const D: usize> = Shared<GrainSimulation<D>>;
+pub type SharedBed<const D: usize> = Shared<GrainSimulation<D>>;
 
 /// Base class of beds of grains. It cannot be instantiated.
 ///
@@ -29,18 +29,18 @@ pub struct BedSimulation(AnyBed);
 
 /// A bed in the plane or in space.
 pub enum AnyBed {
-    Disks(Arc<Bed<2>>),
-    Balls(Arc<Bed<3>>),
+    Disks(Arc<SharedBed<2>>),
+    Balls(Arc<SharedBed<3>>),
 }
 
-impl From<Arc<Bed<2>>> for AnyBed {
-    fn from(bed: Arc<Bed<2>>) -> Self {
+impl From<Arc<SharedBed<2>>> for AnyBed {
+    fn from(bed: Arc<SharedBed<2>>) -> Self {
         Self::Disks(bed)
     }
 }
 
-impl From<Arc<Bed<3>>> for AnyBed {
-    fn from(bed: Arc<Bed<3>>) -> Self {
+impl From<Arc<SharedBed<3>>> for AnyBed {
+    fn from(bed: Arc<SharedBed<3>>) -> Self {
         Self::Balls(bed)
     }
 }
@@ -65,11 +65,11 @@ impl BedSimulation {
     /// The base of a class with this bed, and the bed.
     pub fn build<const D: usize>(
         given: Described<D>,
-    ) -> Result<(PyClassInitializer<Self>, Arc<Bed<D>>)>
+    ) -> Result<(PyClassInitializer<Self>, Arc<SharedBed<D>>)>
     where
         BodyPairs<D>: Swept<D>,
-        Bed<D>: Stepped,
-        AnyBed: From<Arc<Bed<D>>>,
+        SharedBed<D>: Stepped,
+        AnyBed: From<Arc<SharedBed<D>>>,
     {
         let Described {
             scene,
@@ -207,7 +207,7 @@ impl BedSimulation {
         opened!(self, bed => Ok(GrainContacts::of(bed)))
     }
 
-    /// Momentum of the grains, kg m/s, then about the origin, kg m²/s: (3,) of disks, (6,) of balls.
+    /// Momentum, kg m/s, then about the origin, kg m²/s: (3,) of disks, (6,) of balls.
     ///
     /// Grains with prescribed velocity are not included.
     fn momentum(&self) -> Result<Array> {

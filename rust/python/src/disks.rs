@@ -12,7 +12,7 @@ use rover_core::system::grains::Packing;
 use crate::arguments::{Given, Named, refused};
 use crate::arrays::{Array, fresh, fresh_rows, vector};
 use crate::bed_arguments::{Described, Packed, coordinates, grain_error, packed};
-use crate::beds::{Bed, BedSimulation};
+use crate::beds::{BedSimulation, SharedBed};
 use crate::errors::{Kind, Result, Value};
 use crate::planar::pair;
 use crate::planar_ground::{border, parse};
@@ -67,7 +67,7 @@ use crate::shared::Open;
 ///     TerrainError: A wall has no direction, or `ground` is not a ground.
 ///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
 #[pyclass(module = "rover_gym.core", extends = BedSimulation, frozen)]
-pub struct DiskSimulation(Arc<Bed<2>>);
+pub struct DiskSimulation(Arc<SharedBed<2>>);
 
 impl DiskSimulation {
     fn open(&self) -> Result<MutexGuard<'_, Core>> {

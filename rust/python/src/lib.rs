@@ -40,6 +40,7 @@ mod report;
 mod rover_grains;
 mod sand;
 mod shared;
+mod signatures;
 mod simulation;
 mod snapshot;
 mod soft_ground;
@@ -132,7 +133,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<beds::BedSimulation>()?;
     disks::register(module)?;
     balls::register(module)?;
-    options::register(module)?;
+    signatures::register(module)?;
     rover_grains::register(module)?;
     Ok(())
 }

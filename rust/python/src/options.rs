@@ -3,18 +3,14 @@
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyDict};
+use pyo3::types::PyDict;
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
 use rover_core::law::materials::Materials;
 use rover_core::solver::{Method, SolverOptions};
 
-use crate::accuracy::PRESETS;
 use crate::arguments::{Named, count, flag, number, text, whole};
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::materials;
-use crate::planar::RULES;
-use crate::planar_machines::{BallSimulation, MirroredRoverSimulation, TwoWheelRoverSimulation};
-use crate::simulation::Simulation;
 
 /// The value that a word stands for.
 pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
@@ -163,7 +159,7 @@ trait Argument {
     fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()>;
     /// The value in Python, which is read again as this one.
     fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>>;
-    /// Its type in Python.
+    /// Type of the option in Python.
     fn python(&self) -> String;
 }
 
@@ -289,7 +285,7 @@ pub fn checked(options: SolverOptions) -> Result<SolverOptions> {
 }
 
 /// The type of an argument that is one of these words, in Python.
-fn literal<T>(choices: &[(&str, T)]) -> String {
+pub fn literal<T>(choices: &[(&str, T)]) -> String {
     let words: Vec<_> = choices
         .iter()
         .map(|(word, _)| format!("{word:?}"))
@@ -297,58 +293,17 @@ fn literal<T>(choices: &[(&str, T)]) -> String {
     format!("Literal[{}]", words.join(", "))
 }
 
-/// Puts the options into the signatures of the classes that take them, and tells the writer of the
-/// stub their types and the words of other arguments.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let py = module.py();
-    let types = PyDict::new(py);
-    let inspect = py.import("inspect")?;
-    let parameter = inspect.getattr("Parameter")?;
-    let (keyword, rest) = (
-        parameter.getattr("KEYWORD_ONLY")?,
-        parameter.getattr("VAR_KEYWORD")?,
-    );
+/// Name, default and type of each option in Python.
+pub fn described(py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>, String)>> {
     let mut step = StepOptions::default();
     step.solver.max_sweeps = MAX_ITERATIONS;
-    let mut options = Vec::new();
-    for row in TABLE {
+    let described = TABLE.iter().map(|row| {
         let value = (row.place)(&mut step);
-        let (default, or_none) = if row.takes_none {
-            (py.None(), " | None")
+        Ok(if row.takes_none {
+            (row.name, py.None(), value.python() + " | None")
         } else {
-            (value.tell(py)?, "")
-        };
-        let default = [("default", default)].into_py_dict(py)?;
-        options.push(parameter.call((row.name, &keyword), Some(&default))?);
-        types.set_item(row.name, value.python() + or_none)?;
-    }
-    for class in [
-        py.get_type::<Simulation>(),
-        py.get_type::<BallSimulation>(),
-        py.get_type::<TwoWheelRoverSimulation>(),
-        py.get_type::<MirroredRoverSimulation>(),
-    ] {
-        let own = inspect.call_method1("signature", (&class,))?;
-        let mut all = Vec::new();
-        for one in own
-            .getattr("parameters")?
-            .call_method0("values")?
-            .try_iter()?
-        {
-            let one = one?;
-            let is_gravity = one.getattr("name")?.eq("gravity")?;
-            if one.getattr("kind")?.ne(&rest)? {
-                all.push(one);
-            }
-            if is_gravity {
-                all.extend_from_slice(&options);
-            }
-        }
-        class.setattr("__signature__", inspect.call_method1("Signature", (all,))?)?;
-    }
-    types.set_item("_Accuracy", literal(&PRESETS))?;
-    types.set_item("_ContactRule", literal(&RULES))?;
-    types.set_item("_GrainStabilisation", literal(&GRAIN_STABILISATIONS))?;
-    types.set_item("_Method", literal(&METHODS))?;
-    module.setattr("_types", types)
+            (row.name, value.tell(py)?, value.python())
+        })
+    });
+    described.collect()
 }

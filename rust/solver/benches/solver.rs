@@ -1,8 +1,8 @@
 //! Residual against iterations and time, for 1, 10 and 100 contacts and every method:
 //! `cargo bench -p friction-contact --bench solver`.
 //!
-//! It only reports. Name the machine when quoting. `rust/comparison/examples/solver_hot.rs` measures
-//! the hot path of a rover step, `solver_table.rs` the recorded problems.
+//! It only reports. Name the machine when quoting. `rust/comparison/examples/solver_hot.rs`
+//! measures the hot path of a rover step, `solver_table.rs` the recorded problems.
 #![allow(clippy::print_stdout)] // its purpose
 
 #[path = "../../../tests/solver/scenes.rs"]
