@@ -23,13 +23,15 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from rover_gym.core import BallSimulation, Line, Plane, RoverModel, Simulation, Sine, SphereField, Terrain
 from rover_gym.record.saved_runs import record_run
 from rover_gym.record.trajectory import Trajectory, read_trajectory
+
+ContactRule: TypeAlias = Literal["nearest", "centre_height"]
 
 BALL: dict[str, Any] = {
     "mass": 3.0,
@@ -49,7 +51,7 @@ def published() -> dict[str, Any]:
     return data["published"]  # type: ignore[no-any-return]
 
 
-def ball_on_incline(contact: str = "centre_height") -> tuple[BallSimulation, float]:
+def ball_on_incline(contact: ContactRule = "centre_height") -> tuple[BallSimulation, float]:
     """The ball of figures 3.2 and 3.3 in its initial state, and the duration of its run, s.
 
     Args:
@@ -60,7 +62,7 @@ def ball_on_incline(contact: str = "centre_height") -> tuple[BallSimulation, flo
     return sim, 12.0
 
 
-def ball_on_sine(contact: str = "centre_height") -> tuple[BallSimulation, float]:
+def ball_on_sine(contact: ContactRule = "centre_height") -> tuple[BallSimulation, float]:
     """The ball of figures 3.4 and 3.5 in its initial state, and the duration of its run, s.
 
     Args:
