@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from refusals import refused
 
-import rover_gym.envs.sensors
-import rover_gym.envs.vector
 from rover_gym import OptionError, StateError
-from rover_gym.envs.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner, SensorObservation
+from rover_gym.envs.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner
 
 SENSORS = [
     DepthCamera(width=6, height=4, noise=0.01, latency=(0.0, 0.1)),
@@ -148,12 +146,3 @@ def test_an_unknown_kind_of_image_is_refused() -> None:
     for kind in ("float", 1, ["uint8"]):
         with refused(OptionError, "image", "channels_first"):
             DepthCamera(image=kind)  # type: ignore[arg-type]
-
-
-def test_the_vectors_with_sensors_have_moved() -> None:
-    with pytest.warns(DeprecationWarning, match=r"rover_gym\.vector\.SensorVectorObservation"):
-        moved = rover_gym.envs.sensors.SensorVectorObservation
-    assert moved is rover_gym.envs.vector.SensorVectorObservation
-    with pytest.raises(AttributeError, match="Nothing"):
-        rover_gym.envs.sensors.Nothing  # noqa: B018 - what is not there
-    assert SensorObservation.__name__ in rover_gym.envs.sensors.__all__

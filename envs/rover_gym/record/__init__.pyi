@@ -5,7 +5,7 @@ from .grain_run import GrainRun, GrainSampler
 from .planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
 from .recorder import Recorder
 from .rover_run import RoverRun, read_run
-from .saved_runs import SavedRun, open_run, record_run
+from .saved_runs import open_run, record_run
 from .trajectory import Trajectory, read_frames, read_trajectory
 
 __all__ = [
@@ -20,7 +20,6 @@ __all__ = [
     "RecordingError",
     "RoverRun",
     "RoverSampler",
-    "SavedRun",
     "Trajectory",
     "describe",
     "is_planar",
