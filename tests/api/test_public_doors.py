@@ -22,7 +22,7 @@ from torture.hostile import hostile_values
 from rover_gym import PDPolicy, Plane, RoverGymError, RoverModel, Simulation
 from rover_gym.core import BallSimulation, DiskSimulation, GrainSimulation, Line, ball_packing, disk_packing
 from rover_gym.core.extras import MissingExtraError
-from rover_gym.ground.grains import settled_balls
+from rover_gym.ground.grains import Pull, settled_balls, settled_disks
 from rover_gym.ground.grains.lab import PlatePoint, ShearLaw, ShearPoint, WheelPoint
 from rover_gym.record import Channel, Recorder, RoverSampler, describe, read_run
 from rover_gym.record.saved_runs import open_run, record_run
@@ -34,8 +34,9 @@ FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 ROOMS = ("record", "ground.grains", "ground.grains.lab", "show.replay", "show.figures", "show.live", "exports")
 #: What only holds results, and is made by other functions.
 RESULTS = {
-    "BallBed", "BedEnergy", "GrainRun", "LiveState", "PitFill", "PlatePoint", "PressureLaw", "RoverRun", "ShearLaw",
-    "ShearPoint", "Strength", "SurfaceMap", "Trajectory", "WheelPoint", "WindowSnapshot",
+    "BallBed", "BedEnergy", "BedEstimate", "DiskBed", "DiskDrive", "DiskRun", "GrainRun", "LiveState", "PitFill",
+    "PlanarRun", "PlatePoint", "PressureLaw", "Pull", "RoverRun", "ShearLaw", "ShearPoint", "Strength", "SurfaceMap",
+    "Traction", "Trajectory", "WheelPoint", "WindowSnapshot",
 }  # fmt: skip
 
 
@@ -65,6 +66,7 @@ class World:
         disks = DiskSimulation(*disk_packing(6, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
         record_run(disks, 0.02, folder / "disks.h5", 50.0)
         self.disks = open_run(folder / "disks.h5")
+        self.disk_bed = settled_disks(60, 2)
         self.bed = settled_balls(20, 0.12, 0.12, radius_min=0.01, radius_max=0.012)
         self.rover = LiveRover()
         self.loop = LiveLoop(self.rover, folder)
@@ -97,6 +99,13 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "write_gltf": {"run": w.run, "path": out / "a.glb"},
         "write_page": {"run": w.run, "path": out / "a.html"},
         "write_vrml": {"run": w.run, "path": out / "a.wrl"},
+        "DiskSampler": {"sim": DiskSimulation(*disk_packing(6, width=0.2))},
+        "PlanarSampler": {"sim": BallSimulation(Line())},
+        "drawbar_pull": {"bed": w.disk_bed, "slip": 0.2, "run_in": 1e-3, "distance": 1e-3},
+        "drive_on_disks": {"bed": w.disk_bed, "torque": 1.0, "run_in": 1e-3, "duration": 1e-3},
+        "fit_traction": {"pulls": [[Pull(0.1 * k, 0.3, 2.0 * k, 10.0, 0.01)] * 2 for k in range(1, 7)]},
+        "over_beds": {"trial": lambda bed, value: (bed, value), "values": [1.0], "beds": [w.disk_bed]},
+        "rover_on_disks": {"bed": w.disk_bed},
         "GrainSampler": {"sim": fall()},
         "MovingWindow": {"rover": w.sim, "grains": fall()},
         "box_walls": {"width": 1.0, "depth": 1.0},

@@ -2,7 +2,7 @@ from .channels import Channel, RecordingError, RoverSampler, describe, row_count
 from .disk_run import DiskRun, DiskSampler
 from .grain_measures import outflow, penetration_depths, run_out, slopes
 from .grain_run import GrainRun, GrainSampler
-from .planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
+from .planar_run import PlanarRun, PlanarSampler
 from .recorder import Recorder
 from .rover_run import RoverRun, read_run
 from .saved_runs import open_run, record_run
@@ -22,11 +22,9 @@ __all__ = [
     "RoverSampler",
     "Trajectory",
     "describe",
-    "is_planar",
     "open_run",
     "outflow",
     "penetration_depths",
-    "planar_run_of",
     "read_frames",
     "read_run",
     "read_trajectory",

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import DiskSimulation
-from rover_gym.core.validation import refuse
+from rover_gym.core.validation import checked, refuse
 from rover_gym.ground.grains.disk_bed import surface_height
 from rover_gym.record.bed_run import Array, bed_channels, strongest_contacts
 from rover_gym.record.channels import TIME, Channel, RecordingError, Sampler, sound
@@ -54,6 +54,7 @@ class DiskSampler(Sampler):
         sim: The disks.
     """
 
+    @checked(sim="DiskSimulation")
     def __init__(self, sim: DiskSimulation) -> None:
         super().__init__(sim)
         n, wheels = len(sim.radius), len(sim.wheels)

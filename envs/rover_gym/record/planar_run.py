@@ -23,7 +23,7 @@ from rover_gym.core import (
     Sine,
     Spline,
 )
-from rover_gym.core.validation import refuse
+from rover_gym.core.validation import checked, refuse
 from rover_gym.record.channels import (
     RESIDUAL,
     TIME,
@@ -88,6 +88,7 @@ class PlanarSampler(Sampler):
         sim: The simulation.
     """
 
+    @checked(sim="PlanarSimulation")
     def __init__(self, sim: PlanarSimulation) -> None:
         super().__init__(sim)
         self.channels = planar_channels(len(sim.q), len(sim.centres))

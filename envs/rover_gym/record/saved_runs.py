@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, TypeVar, overload
 
 import numpy as np
 
-from rover_gym.core import DiskSimulation, PlanarSimulation, Simulation
+from rover_gym.core import DiskSimulation, OptionError, PlanarSimulation, Simulation
 from rover_gym.core.validation import checked, number, refuse
 from rover_gym.record.channels import RecordingError, RoverSampler, Sampler, row_count
 from rover_gym.record.disk_run import DiskRun, DiskSampler, disk_run_of, is_disks
@@ -115,9 +115,12 @@ def open_run(path: str | Path, kind: type[Any] = Run) -> Any:
         kind: The class that the run must have; any by default.
 
     Raises:
+        OptionError: `kind` is not a class.
         RecordingError: The file is not a trajectory, holds no samples, or is a run of another kind.
         OSError: The file does not exist or cannot be read.
     """
+    if not isinstance(kind, type):
+        refuse(OptionError, "kind", kind, "must be a class of runs")
     run = saved_run_of(read_trajectory(path), path)
     if not isinstance(run, kind):
         refuse(RecordingError, "path", str(path), f"contains a {type(run).__name__}, not a {kind.__name__}")

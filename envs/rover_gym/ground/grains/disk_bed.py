@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import DiskSimulation, OptionError, disk_packing
-from rover_gym.core.validation import number, refuse, vector
+from rover_gym.core.validation import checked, number, refuse, vector
 
 #: Reference disk: mean radius (m) and mass (kg). Other disks take its density.
 DISK_RADIUS, DISK_MASS = 0.01625, 0.7
@@ -151,6 +151,7 @@ WHEEL_RADIUS, HALF_LENGTH = 0.2, 0.4
 SETTLING = 0.2  # s, settling time of the rover at 9.81 m/s^2
 
 
+@checked(bed=("DiskBed", None), rover=(Mapping, None), start=float)
 def rover_on_disks(
     bed: DiskBed | None = None,
     *,

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import DiskSimulation, OptionError
-from rover_gym.core.validation import number, refuse
+from rover_gym.core.validation import checked, number, refuse
 from rover_gym.ground.grains.disk_bed import WHEEL_RADIUS, DiskBed, rover_on_disks, step_count
 
 __all__ = [
@@ -86,6 +86,7 @@ class Pull:
     sinkage: float
 
 
+@checked(bed="DiskBed", torque=float, run_in=float, duration=float)
 def drive_on_disks(
     bed: DiskBed, torque: float, *, run_in: float = 0.5, duration: float = 2.0, **options: Any
 ) -> DiskDrive:
@@ -137,6 +138,7 @@ def _is_at_the_end(sim: DiskSimulation, bed: DiskBed) -> bool:
     return bool(x + CLEAR_OF_WALLS * radius > bed.width)
 
 
+@checked(bed="DiskBed", slip=float, load=float, rim_speed=float, run_in=float, distance=float, radius=float)
 def drawbar_pull(
     bed: DiskBed,
     slip: float,
@@ -204,6 +206,7 @@ def drawbar_pull(
     return Pull(slip, travelled, float(pull), float(weight), float(np.mean(depths)))
 
 
+@checked(trial=callable, values=[float], beds=["DiskBed"], workers=(int, None), progress=callable)
 def over_beds(
     trial: Callable[[DiskBed, float], T],
     values: Sequence[float],
@@ -292,6 +295,7 @@ class Traction:
         return _curve(slips, self.limit.value, self.free_slip.value, self.scale.value)
 
 
+@checked(pulls=[["Pull"]], first=float)
 def fit_traction(pulls: Sequence[Sequence[Pull]], *, first: float = 0.5) -> Traction:
     """Fits the curve to the means over the beds by least squares, with jackknife standard errors over the beds.
 
@@ -302,6 +306,8 @@ def fit_traction(pulls: Sequence[Sequence[Pull]], *, first: float = 0.5) -> Trac
     Raises:
         OptionError: There are fewer than four slips, or fewer than two from `first` on.
     """
+    if not all(len(row) for row in pulls):
+        refuse(OptionError, "pulls", pulls, "must have at least one pull for each slip")
     slips = np.array([row[0].slip for row in pulls])
     ratios = np.array([[trial.pull / trial.weight for trial in row] for row in pulls])
     last = slips >= first
