@@ -163,7 +163,7 @@ trait Argument {
     fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()>;
     /// The value in Python, which is read again as this one.
     fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>>;
-    /// Its type in Python.
+    /// Type of the value in Python.
     fn python(&self) -> String;
 }
 
