@@ -149,7 +149,8 @@ def docstring(doc: str, indent: str) -> ast.Expr:
     """A docstring as it stands in a stub."""
     lines = inspect.cleandoc(doc).splitlines()
     end = [indent] if len(lines) > 1 else []
-    return ast.Expr(ast.Constant("\n".join([*lines[:1], *((indent + line).rstrip() for line in lines[1:]), *end])))
+    rest = [indent + line if line else "" for line in lines[1:]]
+    return ast.Expr(ast.Constant("\n".join([*lines[:1], *rest, *end])))
 
 
 if __name__ == "__main__":

@@ -299,7 +299,7 @@ def test_an_option_of_simulations_is_everywhere() -> None:
     options = [name for name in _core._types if not name.startswith("_")]
     for simulation in (Simulation, *PlanarSimulation.__subclasses__()):
         assert [name for name in inspect.signature(simulation).parameters if name in options] == options
-    assert set(options) - {"materials", "budget"} <= set(Simulation().settings)  # which are None by default
+    assert set(options) - {"materials", "budget"} <= set(Simulation().settings)
     assert {"friction", "restitution", "time_step", "materials", *SOLVER_OPTIONS} == set(options)
     assert {"time_step", "variant", "tolerance", "materials", *OPTIONS} == {"gravity", *options}
     row = next(row for row in RoverEnv.__doc__.splitlines() if row.strip().startswith("| solver_options"))

@@ -159,7 +159,7 @@ trait Argument {
     fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()>;
     /// The value in Python, which is read again as this one.
     fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>>;
-    /// Type of the option in Python.
+    /// Type of the value in Python.
     fn python(&self) -> String;
 }
 
