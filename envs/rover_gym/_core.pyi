@@ -2850,56 +2850,56 @@ class BedSimulation(AnySimulation):
 
     @property
     def radius(self) -> npt.NDArray[np.float64]:
-        """Radii of the disks, (n,), m."""
+        """Radii of the grains, (n,), m."""
     @property
     def mass(self) -> npt.NDArray[np.float64]:
-        """Masses of the disks, (n,), kg."""
+        """Masses of the grains, (n,), kg."""
     @property
     def position(self) -> npt.NDArray[np.float64]:
-        """Centres and angles of the disks, (n, 3), m and rad."""
+        """Centres of balls, (n, 3), m, or centres and angles of disks, (n, 3), m and rad."""
     @property
     def velocity(self) -> npt.NDArray[np.float64]:
-        """Rates of `position`, (n, 3), m/s and rad/s."""
+        """Velocities of the centres of balls, (n, 3), m/s, or rates of disks, (n, 3), m/s and rad/s."""
     @property
     def kinematic(self) -> npt.NDArray[np.bool_]:
-        """Which disks have a prescribed velocity, (n,)."""
+        """Which grains have a prescribed velocity, (n,)."""
     @property
     def asleep(self) -> npt.NDArray[np.bool_]:
-        """Which disks sleep, (n,); True for disks with a prescribed velocity."""
+        """Which grains sleep, (n,); True for grains with a prescribed velocity."""
     @property
     def walls(self) -> _Array:
-        """A point of each wall and the normal to its free side, (m, 4), m."""
+        """A point of each wall now and the normal to its free side, (m, 4) or (m, 6), m."""
     @property
     def settings(self) -> dict[str, Any]:
         """Options of contacts, gravity and solver, as keyword arguments."""
     def remove(self, which: npt.ArrayLike) -> None:
-        """Removes disks. The others keep their order.
+        """Removes grains. The others keep their order.
 
         Args:
-            which: Which disks to remove, (n,) booleans.
+            which: Which grains to remove, (n,) booleans.
 
         Raises:
-            ModelError: The number of booleans differs from that of the disks, or no disk would be
+            ModelError: The number of booleans differs from that of the grains, or no grain would be
                 left. Nothing has changed.
         """
     @property
     def contacts(self) -> GrainContacts:
         """The contacts of the last step."""
     def momentum(self) -> npt.NDArray[np.float64]:
-        """Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
+        """Momentum of the grains, kg m/s, then about the origin, kg m²/s: (3,) of disks, (6,) of balls.
 
-        Disks with prescribed velocity are not included.
+        Grains with prescribed velocity are not included.
         """
     def penetration(self) -> float:
         """Deepest overlap now, m."""
     def wake(self) -> None:
-        """Wakes all disks."""
+        """Wakes all grains."""
 
 @final
 class DiskSimulation(BedSimulation):
-    """A planar granular soil of disks, with an optional machine that drives on it.
+    """Grains in the plane: free disks with friction, contained by walls or on a ground.
 
-    The disks move freely and touch with friction. Walls or a ground contain them.
+    A machine may drive on them.
 
     Args:
         radius: Radii of the disks, (n,), m.
@@ -3370,9 +3370,9 @@ def disk_packing(
     bottom: float = 0.0,
     seed: int = 0,
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Initial state for a soil: disks in loose rows, without overlap.
+    """Initial state for a bed: disks in loose rows, without overlap.
 
-    The radii are drawn uniformly from their range. The defaults give the soil of the 2010 report:
+    The radii are drawn uniformly from their range. The defaults give the bed of the 2010 report:
     three layers of 74 disks.
 
     Args:
