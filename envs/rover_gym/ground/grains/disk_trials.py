@@ -306,7 +306,7 @@ def fit_traction(pulls: Sequence[Sequence[Pull]], *, first: float = 0.5) -> Trac
     Raises:
         OptionError: There are fewer than four slips, or fewer than two from `first` on.
     """
-    if len({len(row) for row in pulls}) != 1 or not pulls[0]:
+    if len({len(row) for row in pulls}) != 1 or len(pulls[0]) == 0:
         refuse(OptionError, "pulls", pulls, "must have as many pulls for each slip, at least one")
     slips = np.array([row[0].slip for row in pulls])
     ratios = np.array([[trial.pull / trial.weight for trial in row] for row in pulls])
