@@ -512,7 +512,7 @@ def test_removed_disks_leave_the_others_as_they_are() -> None:
         (lambda bed: drawbar_pull(bed, 0.1, rim_speed=0.0), "rim_speed"),
         (lambda bed: drawbar_pull(bed, 0.1, distance=3.0), "distance"),
         (lambda bed: drive_on_disks(bed, 50.0, duration=0.0), "duration"),
-        (lambda bed: drive_on_disks(bed, np.nan, start=0.61), "torques[0]"),
+        (lambda bed: drive_on_disks(bed, np.nan, start=0.61), "torque"),
         (lambda bed: rover_on_disks(bed, rover=[1]), "rover"),
         (lambda bed: rover_on_disks(bed, rover={"wheel_radius": "big"}), "rover.wheel_radius[0]"),
         (lambda bed: rover_on_disks(bed, rover={"axle_a": 3.0}), "rover.axle_a"),

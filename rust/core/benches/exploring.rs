@@ -4,7 +4,8 @@
 //! It only reports. The drives are those of `benchmarks/comparison/exploring.json`: random torques
 //! and set-points, redrawn every ten steps of 5 ms. A time is the median of eleven rounds; each
 //! plays all drives at both tolerances. A batch has 64 rovers, all drives eight times over with
-//! commands in another order; its time is a rover's. Steps that the general code took count as general.
+//! commands in another order; its time is a rover's. Steps that the general code took count as
+//! general.
 //! `-- --json GROUND TORQUE` measures one scene and prints JSON, for
 //! `make bench`, which sets other figures beside these.
 
