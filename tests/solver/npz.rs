@@ -84,7 +84,7 @@ fn read(path: &Path, name: String) -> Recorded {
 }
 
 /// `W = Hᵀ M̂⁻¹ H`, row by row, of free bodies that touch;
-/// `tests/shelf/free_bodies.py` tells the arrays' meaning.
+/// `tests/shelf/problem.py` tells the arrays' meaning.
 fn delassus_of_free_bodies(
     mass: &[f64],
     inertia_inverse: &[f64],
