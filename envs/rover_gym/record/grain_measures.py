@@ -11,7 +11,6 @@ from rover_gym.record.grain_run import GrainRun
 #: Share of a column's balls below its height, and share of the floor that balls cover at the edge of its deposit.
 HIGHEST, COVERED = 0.98, 0.5
 
-
 #: Share of a drum's radius about its axis in which the slope is measured, away from the wall.
 INNER = 0.6
 
