@@ -16,7 +16,7 @@ The package consists of the subpackages below. Each one may import those above i
     learn            training with stable-baselines3
     show.replay      saved runs for the browser, VRML and glTF
     show.figures     figures of saved runs
-    exports          runs, policies and simulations for other programs
+    exports          runs, policies, simulations and contact problems for other programs
     show.live        a rover that is driven in the browser
     cli              the command `rover`
 """
