@@ -1,8 +1,14 @@
-//! The channels of an observation: name, unit, size, scale and bounds of each field, declared once.
+//! The channels of an observation: name, unit, size, scale, bounds and value of each field,
+//! declared once.
 
 use std::ops::Range;
 
 use rover_core::multibody::Model;
+use rover_core::simulation::seen_from;
+
+use super::progress::Progress;
+use super::rules::Settings;
+use super::setting::EpisodeSetting;
 
 /// What the sizes and scales of an observation follow from.
 #[derive(Clone, Copy, Debug)]
@@ -77,6 +83,44 @@ impl Scale {
     }
 }
 
+/// An episode at the end of a control period.
+#[derive(Clone, Copy, Debug)]
+pub struct EpisodeMoment<'a> {
+    /// Settings of the task.
+    pub settings: &'a Settings,
+    /// Reading of the rover, without heights.
+    pub reading: &'a [f64],
+    /// What was drawn for the episode.
+    pub setting: &'a EpisodeSetting,
+    /// The episode's state outside the simulation.
+    pub progress: &'a Progress,
+}
+
+impl EpisodeMoment<'_> {
+    /// The goal after the present one, ahead and to the right of the trunk, m.
+    fn next_goal(&self) -> [f64; 2] {
+        let [x, z, heading] = [self.reading[0], self.reading[2], self.reading[4]];
+        let goal = self.setting.goal_at(self.progress.reached + 1);
+        let [ahead, right, _] = seen_from([x, z], heading, goal);
+        [ahead, right]
+    }
+}
+
+/// Where the entries of a channel come from. Channels stand in this order.
+#[derive(Clone, Copy, Debug)]
+pub enum ChannelValue {
+    /// The entries of the reading with the same indices.
+    Reading,
+    /// The last action.
+    Action,
+    /// A function of the episode and the entry's index in the channel.
+    Episode(fn(&EpisodeMoment<'_>, usize) -> f64),
+    /// Heights of the ground, which may come later.
+    Heights,
+}
+
+use ChannelValue::{Action, Episode, Heights, Reading};
+
 /// A field of an observation.
 #[derive(Debug)]
 pub struct Channel {
@@ -92,6 +136,8 @@ pub struct Channel {
     pub scale: Scale,
     /// Least and largest scaled entry.
     pub bounds: [f64; 2],
+    /// Where the entries come from.
+    pub value: ChannelValue,
 }
 
 impl Channel {
@@ -111,10 +157,10 @@ const ONE: Scale = Scale::Fixed(1.0);
 const GAP: Scale = Scale::Fixed(0.1);
 const GOAL: Scale = Scale::Fixed(10.0);
 
-/// Channels: name, unit, meaning, scale, bounds and size.
+/// Channels: name, unit, meaning, scale, bounds, size and value.
 macro_rules! channels {
     ($($name:literal [$unit:literal] $meaning:literal / $scale:expr, in $bounds:expr,
-        size $size:expr;)*) => {
+        size $size:expr, $value:expr;)*) => {
         &[$(Channel {
             name: $name,
             unit: $unit,
@@ -122,6 +168,7 @@ macro_rules! channels {
             size: $size,
             scale: $scale,
             bounds: $bounds,
+            value: $value,
         }),*]
     };
 }
@@ -130,35 +177,44 @@ macro_rules! channels {
 /// reading ([`rover_core::simulation::ReadingLayout`]).
 pub const CHANNELS: &[Channel] = channels! {
     "q" ["m, rad"] "trunk x, y, z, roll, heading, pitch; joint angles"
-        / ONE, in ANY, size |n| n.model.nv();
+        / ONE, in ANY, size |n| n.model.nv(), Reading;
     "velocity" ["m/s, rad/s"] "trunk linear and angular in the trunk frame; joint rates"
-        / Scale::Rates(10.0), in ANY, size |n| 6 + n.model.n_joints();
+        / Scale::Rates(10.0), in ANY, size |n| 6 + n.model.n_joints(), Reading;
     "wheel_gap" ["m"] "distance of each wheel to ground and rocks"
-        / GAP, in ANY, size |n| n.wheels();
+        / GAP, in ANY, size |n| n.wheels(), Reading;
     "wheel_contact" [""] "1 where the gap is at most 1 mm, else 0"
-        / ONE, in FLAG, size |n| n.wheels();
+        / ONE, in FLAG, size |n| n.wheels(), Reading;
     "normal_force" ["N"] "ground and rocks on wheel, along each contact's normal"
-        / Scale::WheelLoad, in ANY, size |n| n.wheels();
+        / Scale::WheelLoad, in ANY, size |n| n.wheels(), Reading;
     "tangential_force" ["N"] "the same, rolling then lateral, wheel by wheel"
-        / Scale::WheelLoad, in ANY, size |n| 2 * n.wheels();
+        / Scale::WheelLoad, in ANY, size |n| 2 * n.wheels(), Reading;
     "ground_normal" [""] "the normal of the ground, over 1 m, in the trunk frame"
-        / ONE, in UNIT, size |_| 3;
+        / ONE, in UNIT, size |_| 3, Reading;
     "goal" ["m"] "goal ahead and to the right of the trunk, horizontal"
-        / GOAL, in ANY, size |_| 2;
+        / GOAL, in ANY, size |_| 2, Reading;
     "goal_distance" ["m"] "horizontal distance from the trunk's origin to the goal"
-        / GOAL, in [0.0, f64::INFINITY], size |_| 1;
+        / GOAL, in [0.0, f64::INFINITY], size |_| 1, Reading;
     "previous_action" [""] "the action before this observation, 0 at reset"
-        / ONE, in UNIT, size |n| n.actions;
+        / ONE, in UNIT, size |n| n.actions, Action;
     "stuck" [""] "fraction of the time to high-centring that has passed"
-        / ONE, in FLAG, size |_| 1;
+        / ONE, in FLAG, size |_| 1,
+        Episode(|now, _| (now.progress.stuck_time / now.settings.stuck_time).min(1.0));
     "charge" [""] "fraction of the battery's charge"
-        / ONE, in FLAG, size |n| usize::from(n.has_battery);
+        / ONE, in FLAG, size |n| usize::from(n.has_battery),
+        Episode(|now, _| {
+            let battery = now.settings.battery.unwrap_or(f64::INFINITY);
+            (1.0 - now.progress.energy / battery).max(0.0)
+        });
     "next_goal" ["m"] "the goal after the present one, ahead and to the right of the trunk, horizontal"
-        / GOAL, in ANY, size |n| 2 * n.courses();
+        / GOAL, in ANY, size |n| 2 * n.courses(),
+        Episode(|now, i| now.next_goal()[i]);
     "waypoints_remaining" [""] "goals still to reach"
-        / Scale::Goals, in FLAG, size |n| n.courses();
+        / Scale::Goals, in FLAG, size |n| n.courses(),
+        Episode(|now, _| {
+            now.settings.goals.saturating_sub(now.progress.reached) as f64
+        });
     "height_scan" ["m"] "heights of ground and rocks over the trunk's origin, from the front, each row from the left"
-        / ONE, in ANY, size |n| n.points;
+        / ONE, in ANY, size |n| n.points, Heights;
 };
 
 /// A field of the observations of a task.

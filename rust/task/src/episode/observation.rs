@@ -7,47 +7,37 @@
 //! whose fields [`super::channels::CHANNELS`] declares, in order: spaces, layout and card follow
 //! from that table. Entries are never clipped.
 
-use super::progress::Progress;
+use super::channels::{ChannelValue, EpisodeMoment};
 use super::rules::Rules;
-use super::setting::EpisodeSetting;
-use rover_core::simulation::seen_from;
-
-/// Most entries between the previous action and the heights.
-const MOST_MARKS: usize = 5;
 
 /// Writes the entries before the heights and says whether all of them are finite.
 ///
-/// `reading`: one without heights; `normals`: a standard normal number for each entry, where there
-/// is noise.
+/// `normals`: a standard normal number for each entry, where there is noise.
 ///
 /// # Panics
 /// If a slice is too short.
 pub fn write_state(
     rules: &Rules,
-    reading: &[f64],
-    (setting, progress): (&EpisodeSetting, &Progress),
+    now: &EpisodeMoment<'_>,
     normals: Option<&[f64]>,
     out: &mut [f32],
 ) -> bool {
-    let settings = rules.settings();
-    let mut marks = [0.0; MOST_MARKS];
-    marks[0] = (progress.stuck_time / settings.stuck_time).min(1.0);
-    let mut n = 1;
-    if let Some(battery) = settings.battery {
-        marks[n] = (1.0 - progress.energy / battery).max(0.0);
-        n += 1;
+    let shared = now.reading[..rules.n_shared()].iter().copied();
+    let mut is_finite = write(rules, 0, shared, normals, out);
+    for (start, size, value) in rules.own_entries() {
+        is_finite &= match value {
+            ChannelValue::Action => {
+                let action = now.progress.previous_action.iter().copied();
+                write(rules, *start, action, normals, out)
+            }
+            ChannelValue::Episode(value) => {
+                let entries = (0..*size).map(|i| value(now, i));
+                write(rules, *start, entries, normals, out)
+            }
+            ChannelValue::Reading | ChannelValue::Heights => true,
+        };
     }
-    if settings.has_course() {
-        let [x, z, heading] = [reading[0], reading[2], reading[4]];
-        let [ahead, right, _] = seen_from([x, z], heading, setting.goal_at(progress.reached + 1));
-        let remaining = settings.goals.saturating_sub(progress.reached) as f64;
-        marks[n..][..3].copy_from_slice(&[ahead, right, remaining]);
-        n += 3;
-    }
-    let (shared, actions) = (rules.n_shared(), rules.n_actions());
-    write(rules, 0, &reading[..shared], normals, out)
-        & write(rules, shared, &progress.previous_action, normals, out)
-        & write(rules, shared + actions, &marks[..n], normals, out)
+    is_finite
 }
 
 /// Writes the entries of the heights and says whether all of them are finite; slices as for
@@ -61,7 +51,13 @@ pub fn write_heights(
     normals: Option<&[f64]>,
     out: &mut [f32],
 ) -> bool {
-    write(rules, rules.n_state(), heights, normals, out)
+    write(
+        rules,
+        rules.n_state(),
+        heights.iter().copied(),
+        normals,
+        out,
+    )
 }
 
 /// Writes values from entry `start` on.
@@ -69,7 +65,7 @@ pub fn write_heights(
 fn write(
     rules: &Rules,
     start: usize,
-    values: &[f64],
+    values: impl ExactSizeIterator<Item = f64>,
     normals: Option<&[f64]>,
     out: &mut [f32],
 ) -> bool {

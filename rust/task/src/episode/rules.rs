@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::channels::{Field, Sizes, fields};
+use super::channels::{ChannelValue, Field, Sizes, fields};
 use super::ending::Ending;
 use super::error::{EpisodeError, check_lengths};
 use super::progress::Progress;
@@ -116,6 +116,7 @@ pub struct Rules {
     inverse_scale: Vec<f64>,
     noise: Vec<f64>,
     places: ReadingIndices,
+    own_entries: Vec<(usize, usize, ChannelValue)>,
     sizes: [usize; 3],
     steering: Steering,
 }
@@ -182,7 +183,7 @@ impl Rules {
     /// `Length`, `OutOfRange`.
     ///
     /// # Panics
-    /// If an observation were not a reading, the action and the rest, in this order.
+    /// If an observation did not begin with a part of a reading, or end with the heights.
     pub fn new(model: Arc<Model>, settings: Settings) -> Result<Self, EpisodeError> {
         let layout = ReadingLayout::new(&model, 0);
         let place = |name: &str| {
@@ -202,12 +203,12 @@ impl Rules {
         } else {
             Steering::none(&model)
         };
-        let n_actions = n_wheels + steering.n_entries;
         check_lengths([("torque_limits", settings.torque_limits.len(), n_wheels)])?;
         settings.check(model.trees()[0].is_free)?;
         let mut rules = Self {
             inverse_scale: Vec::new(),
             noise: Vec::new(),
+            own_entries: Vec::new(),
             sizes: sizes(&model),
             model,
             settings,
@@ -215,12 +216,12 @@ impl Rules {
             steering,
         };
         for field in rules.observation() {
-            let first = match field.channel.name {
-                "previous_action" => shared,
-                "stuck" => shared + n_actions,
-                _ => field.entries.start,
-            };
-            assert_eq!(field.entries.start, first, "a reading, then the action");
+            let (start, size) = (field.entries.start, field.entries.len());
+            match field.channel.value {
+                ChannelValue::Reading => assert!(field.entries.end <= shared, "of the reading"),
+                ChannelValue::Heights => assert_eq!(size, rules.settings.scan.len(), "all heights"),
+                value => rules.own_entries.push((start, size, value)),
+            }
             let inverse = field.scale.iter().map(|scale| 1.0 / scale);
             rules.inverse_scale.extend(inverse);
             if rules.settings.noise > 0.0 {
@@ -228,6 +229,13 @@ impl Rules {
                 rules.noise.extend(field.entries.map(|_| deviation));
             }
         }
+        let own = rules.own_entries.iter();
+        let mut end = shared;
+        for (start, size, _) in own {
+            assert_eq!(*start, end, "a reading, then the episode's own");
+            end += size;
+        }
+        assert_eq!(end, rules.n_state(), "the heights last");
         Ok(rules)
     }
 
@@ -321,6 +329,12 @@ impl Rules {
     #[must_use]
     pub fn n_state(&self) -> usize {
         self.size() - self.settings.scan.len()
+    }
+
+    /// First entry, number and value of the fields after the reading and before the heights.
+    #[must_use]
+    pub fn own_entries(&self) -> &[(usize, usize, ChannelValue)] {
+        &self.own_entries
     }
 
     /// Leading entries that a reading and an observation share.

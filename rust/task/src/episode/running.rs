@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::action;
+use super::channels::EpisodeMoment;
 use super::error::{EpisodeError, check_lengths};
 use super::observation::{write_heights, write_state};
 use super::outcome::Outcome;
@@ -82,8 +83,13 @@ impl Episode {
         let now = Quantities::of(&reading[rules.places().scalars.clone()]);
         let progress = Progress::begin([reading[0], reading[2]], now.distance, rules.n_actions());
         let mut observation = vec![0.0; rules.size()];
-        let known = (&setting, &progress);
-        let is_finite = write_state(&rules, &reading, known, normals, &mut observation)
+        let begun = EpisodeMoment {
+            settings: rules.settings(),
+            reading: &reading,
+            setting: &setting,
+            progress: &progress,
+        };
+        let is_finite = write_state(&rules, &begun, normals, &mut observation)
             & write_heights(&rules, &heights, normals, &mut observation);
         Ok(is_finite.then(|| Self {
             rules,
@@ -274,8 +280,13 @@ impl Episode {
         }
 
         let normals = period.normals;
-        let known = (&self.setting, &self.progress);
-        let mut is_sound = write_state(rules, reading, known, normals, observation);
+        let ended = EpisodeMoment {
+            settings: rules.settings(),
+            reading,
+            setting: &self.setting,
+            progress: &self.progress,
+        };
+        let mut is_sound = write_state(rules, &ended, normals, observation);
         let n_state = rules.n_state();
         if period.heights.is_some() {
             is_sound &= write_heights(rules, heights, normals, observation);
