@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use super::section::{NO_DIRECTION, Section};
-use super::{NEAREST, PairPoint, SurfacePoint};
+use super::{NEAREST, SurfacePoint};
 use crate::geometry::{Roller, Sphere};
 use friction_contact::scalar::Vec3;
 
@@ -153,13 +153,6 @@ pub fn nearest_point(roller: &Roller, sphere: &Sphere, base: &Vector3<f64>) -> S
         gap: near.gap - sphere.radius,
         ..near
     }
-}
-
-/// Nearest points of a wheel and a ball that moves; n from the wheel to the ball.
-#[must_use]
-pub fn nearest_points(roller: &Roller, sphere: &Sphere) -> PairPoint {
-    let near = nearest_point(roller, sphere, &Vector3::zeros());
-    PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
 /// The wheel's point over the tangent plane (normal n) at the point `touch`
