@@ -51,7 +51,6 @@ struct Memory {
     gaps: Vec<f64>,
     mu: Vec<f64>,
     p: Vec<f64>,
-    change: Vec<f64>,
     solver: SolverWorkspace,
 }
 
@@ -133,12 +132,12 @@ impl<S: Whole> Integrator<S> for ProjectedToConvergence {
                 &mut memory.solver,
             );
             report.iterations += solved.iterations;
-            response(system, &memory.p, &mut memory.change);
-            if memory.change.iter().any(|x| !x.is_finite()) {
+            let change = response(system, &memory.p);
+            if change.iter().any(|x| !x.is_finite()) {
                 report.status = StepStatus::NotConverged;
                 break;
             }
-            system.advance(q, &memory.change, 1.0);
+            system.advance(q, &change, 1.0);
         }
         system.normalise(q);
         Ok(report)
