@@ -123,14 +123,11 @@ impl<S: Whole> Integrator<S> for ProjectedToConvergence {
             for (row, contact) in memory.gaps.chunks_exact_mut(d).zip(&contacts) {
                 row[0] = contact.gap();
             }
-            let solved = system.solve(
-                &memory.gaps,
-                &memory.mu,
-                &options.solver,
-                &mut memory.p,
-                &mut memory.u,
-                &mut memory.solver,
+            let (data, answer) = (
+                (&memory.gaps[..], &memory.mu[..]),
+                (&mut memory.p[..], &mut memory.u[..]),
             );
+            let solved = system.solve(None, data, &options.solver, answer, &mut memory.solver);
             report.iterations += solved.iterations;
             let change = response(system, &memory.p);
             if change.iter().any(|x| !x.is_finite()) {

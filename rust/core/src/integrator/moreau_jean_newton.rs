@@ -193,9 +193,7 @@ fn settle<S: MechanicalSystem>(
         s.list.leaves_open = !will_end && iteration + 2 < options.newton_max_iterations;
         last_change = change;
         if is_small || is_rounding {
-            let q = Local::flat(&problems.q);
-            let is_open = left_open && s.system.open_problem(q, &s.list.mu).is_some();
-            if is_open && iteration + 1 < options.newton_max_iterations {
+            if left_open && S::SETTLES && iteration + 1 < options.newton_max_iterations {
                 s.list.leaves_open = false;
                 continue;
             }

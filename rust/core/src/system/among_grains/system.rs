@@ -147,12 +147,6 @@ impl Dynamics for TreeAmongGrains<'_> {
         self.tree.machine().advance(&mut q.1, v_b, h);
     }
 
-    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Both, to: &mut Both) {
-        if lanes(0) {
-            to.clone_from(from);
-        }
-    }
-
     fn is_finite(&self, q: &Both) -> bool {
         self.bed.is_finite(&q.0) && self.tree.machine().is_finite(&q.1)
     }
@@ -526,47 +520,24 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     }
 
     fn solve(
-        &self,
-        q: &[f64],
-        mu: &[f64],
-        options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
-        workspace: &mut SolverWorkspace,
-    ) -> SolveReport {
-        let parts = &*self.parts;
-        if !parts.touches.is_empty() {
-            return self.bed.solve(q, mu, options, p, u, workspace);
-        }
-        let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
-        let ([q_a, q_b], [p_a, p_b]) = (parts.split(q), parts.split_mut(p));
-        let [u_a, u_b] = parts.split_mut(u);
-        harder(
-            &self.bed.solve(q_a, mu_a, options, p_a, u_a, workspace),
-            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
-        )
-    }
-
-    fn solve_step(
         &mut self,
-        (v, y): (&[f64], &[f64]),
+        free: Option<(&[f64], &[f64])>,
         (q, mu): (&[f64], &[f64]),
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        (p, u): (&mut [f64], &mut [f64]),
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        let free = (self.halves(v).0, self.halves(y).0);
+        let free = free.map(|(v, y)| (self.halves(v).0, self.halves(y).0));
         let parts = &*self.parts;
         if !parts.touches.is_empty() {
-            return (self.bed).solve_step(free, (q, mu), options, p, u, workspace);
+            return (self.bed).solve(free, (q, mu), options, (p, u), workspace);
         }
         let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
         let ([q_a, q_b], [p_a, p_b]) = (parts.split(q), parts.split_mut(p));
         let [u_a, u_b] = parts.split_mut(u);
         harder(
-            &(self.bed).solve_step(free, (q_a, mu_a), options, p_a, u_a, workspace),
-            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
+            &(self.bed).solve(free, (q_a, mu_a), options, (p_a, u_a), workspace),
+            &(self.tree).solve(None, (q_b, mu_b), options, (p_b, u_b), workspace),
         )
     }
 
