@@ -19,7 +19,7 @@ use nalgebra::Vector2;
 use super::error::PlanarError;
 use super::ground::{MAX_FACING, PlanarFacing, PlanarGround};
 use crate::geometry::Support;
-use crate::quantity::{AdmissibleRange, PLACES, QuantityError, finite, within};
+use crate::quantity::{AdmissibleRange, Demand, PLACES, QuantityError, finite, within};
 use crate::scalar::elementary::{hypot, sin_cos};
 
 /// Slopes, m/m.
@@ -146,12 +146,8 @@ impl Sine {
         let steepest = SLOPES.ends[1] / k;
         within(|| "amplitude".to_owned(), amplitude, PLACES)?;
         if amplitude.abs() > steepest {
-            return Err(QuantityError::OutOfRange {
-                field: "amplitude".to_owned(),
-                range: "at most 1000/2π of the wavelength either way",
-                value: amplitude,
-            }
-            .into());
+            let range = Demand::Within("at most 1000/2π of the wavelength either way");
+            return Err(QuantityError::new("amplitude", range, amplitude).into());
         }
         Ok(Self {
             amplitude,

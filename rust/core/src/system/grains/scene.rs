@@ -13,7 +13,7 @@ use crate::geometry::{Facing, Support};
 use crate::law::rolling::RollingFriction;
 use crate::multibody::fingerprint;
 use crate::planar::PlanarTree;
-use crate::quantity::{QuantityError, finite};
+use crate::quantity::{QuantityError, finite, not_negative};
 use crate::spatial::space::{body_velocities, length};
 
 /// Coulomb's μ of each kind of contact, and rolling friction.
@@ -49,12 +49,7 @@ impl GrainFriction {
             ("wall_friction", self.walls),
             ("wheel_friction", self.wheels),
         ] {
-            if finite(field, value)? < 0.0 {
-                return Err(QuantityError::Negative {
-                    field: field.to_owned(),
-                    value,
-                });
-            }
+            not_negative(field, value)?;
         }
         self.rolling.check()
     }
