@@ -15,7 +15,7 @@ use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, LargeSolver, Pr
 use super::pattern::Pattern;
 use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_CONTACTS, MAX_DENSE, MAX_DRY, block};
 use crate::problem::Residual;
-use crate::scalar::Lane;
+use crate::scalar::{Lane, inlined};
 use crate::solver::options::SolverOptions;
 
 pub use super::lane_solver::MAX_ITERATIONS;
@@ -304,35 +304,35 @@ impl<T: Lane> Queue<T> {
             n_others,
         };
         match kind {
-            Kind::Few => T::vectorize(
+            Kind::Few => inlined!(
+                T::vectorize,
                 token,
-                #[inline(always)]
-                || (self.few).run(token, problems, tolerances, &mut line),
+                (self.few).run(token, problems, tolerances, &mut line)
             ),
-            Kind::Many => T::vectorize(
+            Kind::Many => inlined!(
+                T::vectorize,
                 token,
-                #[inline(always)]
-                || (self.many).run(token, problems, tolerances, &mut line),
+                (self.many).run(token, problems, tolerances, &mut line)
             ),
-            Kind::Dry => T::vectorize(
+            Kind::Dry => inlined!(
+                T::vectorize,
                 token,
-                #[inline(always)]
-                || (self.dry).run(token, problems, tolerances, &mut line),
+                (self.dry).run(token, problems, tolerances, &mut line)
             ),
             Kind::Large => {
                 let large = self
                     .large
                     .get_or_insert_with(|| Box::new(LargeSolver::new(token)));
-                T::vectorize(
+                inlined!(
+                    T::vectorize,
                     token,
-                    #[inline(always)]
-                    || large.run(token, problems, tolerances, &mut line),
+                    large.run(token, problems, tolerances, &mut line)
                 );
             }
-            Kind::Factored(place) => T::vectorize(
+            Kind::Factored(place) => inlined!(
+                T::vectorize,
                 token,
-                #[inline(always)]
-                || (self.factored[place].1).run(token, problems, tolerances, &mut line),
+                (self.factored[place].1).run(token, problems, tolerances, &mut line)
             ),
         }
     }
