@@ -22,8 +22,8 @@
 //! No other chapter.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
-/// Calls a function, as [`Lane::vectorize`], with a token and a closure of the last argument that
-/// is inlined into it.
+/// Calls a function, as [`Lane::vectorize`](crate::scalar::Lane::vectorize), with a token and a
+/// closure of the last argument that is inlined into it.
 #[macro_export]
 macro_rules! inlined {
     ($run:path, $token:expr, $body:expr) => {
