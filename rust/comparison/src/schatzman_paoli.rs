@@ -199,10 +199,7 @@ impl<S: Whole> Integrator<S> for SchatzmanPaoli {
         };
         let mut touching = Touching::<S>::new(contacts, q);
         warm_start.recall(&touching.contacts, d, &mut touching.p);
-        let start = StepStart {
-            configuration: q,
-            v: before,
-        };
+        let start = StepStart::at(q, before);
         let solver = &mut memory.solver;
         let v_end = iterate(system, options, start, &mut touching, solver, &mut report);
         let mut q_end = q.clone();

@@ -934,10 +934,7 @@ impl<T: Lane> ContactSlots<T> {
                 half,
                 rounding,
             };
-            let ball = Sphere {
-                centre: sphere.centre.get(lane).into(),
-                radius: sphere.radius.get(lane),
-            };
+            let ball = Sphere::new(sphere.centre.get(lane).into(), sphere.radius.get(lane));
             let base = Vector3::from(input.middle.origin_of(wheel.tree).get(lane));
             let touch = touch_of_wheel(&own, &ball, &base, &half_way.get(lane).into());
             if touch.is_some() {

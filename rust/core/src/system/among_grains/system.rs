@@ -66,14 +66,8 @@ impl TreeAmongGrains<'_> {
         StepStart<'q, LaneConfiguration<f64>>,
     ) {
         let ((q_a, q_b), (v_a, v_b)) = (start.configuration, self.halves(start.v));
-        let of_grains = StepStart {
-            configuration: q_a,
-            v: v_a,
-        };
-        let of_tree = StepStart {
-            configuration: q_b,
-            v: v_b,
-        };
+        let of_grains = StepStart::at(q_a, v_a);
+        let of_tree = StepStart::at(q_b, v_b);
         (of_grains, of_tree)
     }
 

@@ -118,10 +118,7 @@ mod tests {
 
     #[test]
     fn on_a_crest_the_flat_bottom_touches_above_the_crest() {
-        let sphere = Sphere {
-            centre: Vector3::new(0.1, 0.0, -0.2),
-            radius: 0.5,
-        };
+        let sphere = Sphere::new(Vector3::new(0.1, 0.0, -0.2), 0.5);
         let solid = OrientedBox {
             centre: Vector3::new(0.0, 0.69, 0.0),
             R: nalgebra::Matrix3::identity(),

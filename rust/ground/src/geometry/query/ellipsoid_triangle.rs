@@ -60,9 +60,6 @@ fn lean(solid: &Ellipsoid, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) 
 /// The point nearest to a vertex, wherever it is.
 #[must_use]
 pub fn nearest_at_vertex(solid: &Ellipsoid, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
-    let point = Sphere {
-        centre: vertex.place,
-        radius: 0.0,
-    };
+    let point = Sphere::new(vertex.place, 0.0);
     ellipsoid_sphere::nearest_point(solid, &point, base)
 }

@@ -250,10 +250,7 @@ mod tests {
             rim * 0.5 + wheel.axle * 1e-13,
         ];
         for place in places {
-            let sphere = Sphere {
-                centre: wheel.centre + place,
-                radius: 0.05,
-            };
+            let sphere = Sphere::new(wheel.centre + place, 0.05);
             let near = nearest_point(&Roller::thin(wheel), &sphere, &Vector3::zeros());
             assert!((near.n.norm() - 1.0).abs() < 1e-12);
             assert!(near.gap.is_finite() && near.point.iter().all(|x| x.is_finite()));

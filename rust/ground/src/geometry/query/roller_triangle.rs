@@ -103,10 +103,7 @@ pub fn point_at_edge(
 
 /// The ball at an end of a capsule.
 fn end_of_capsule(roller: &Roller, k: usize) -> Sphere {
-    Sphere {
-        centre: roller.circle(k).centre,
-        radius: roller.rounding,
-    }
+    Sphere::new(roller.circle(k).centre, roller.rounding)
 }
 
 fn of_end(k: usize, point: SurfacePoint) -> SurfacePoint {

@@ -45,9 +45,6 @@ pub fn nearest_at_edge(sphere: &Sphere, edge: &Edge, base: &Vector3<f64>) -> Sur
 #[inline]
 #[must_use]
 pub fn nearest_at_vertex(sphere: &Sphere, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
-    let point = Sphere {
-        centre: vertex.place,
-        radius: 0.0,
-    };
+    let point = Sphere::new(vertex.place, 0.0);
     sphere_sphere::nearest_point(sphere, &point, base)
 }

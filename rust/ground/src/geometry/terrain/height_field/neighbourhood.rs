@@ -253,10 +253,7 @@ mod tests {
                 R,
                 half_size: Vector3::new(0.2, 0.05, 0.1),
             }),
-            PlacedShape::Sphere(Sphere {
-                centre,
-                radius: 0.12,
-            }),
+            PlacedShape::Sphere(Sphere::new(centre, 0.12)),
             PlacedShape::Cylinder(Roller::new(disc(0.15), 0.2, 0.0)),
             PlacedShape::Cylinder(Roller::new(disc(0.06), 0.3, 0.06)),
             PlacedShape::Ellipsoid(Ellipsoid {
