@@ -6,7 +6,7 @@ use nalgebra::{SVector, Vector2};
 
 use super::bodies::{COORDINATES, Grains, noun};
 use super::contact::GrainContact;
-use super::error::GrainError;
+use super::error::{GrainError, check_length};
 use super::grid::Grid;
 use super::wall::Wall;
 use crate::geometry::{Facing, Support};
@@ -162,13 +162,7 @@ impl<const D: usize> GrainScene<D> {
     pub fn check_configuration(&self, q: &[f64]) -> Result<(), GrainError> {
         let n = self.grains.len();
         let (radius, kinematic) = (self.grains.radius(), self.grains.kinematic());
-        if q.len() != self.nq() {
-            return Err(GrainError::Length {
-                field: "position",
-                expected: self.nq(),
-                count: q.len(),
-            });
-        }
+        check_length("position", self.nq(), q.len())?;
         self.check_finite("position", "machine", q, COORDINATES)?;
         let allowed = -OVERLAP * self.grains.smallest();
         let mut grid = Grid::<D>::default();

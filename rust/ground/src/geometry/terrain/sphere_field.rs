@@ -79,14 +79,8 @@ impl SphereField {
         let spheres: Vec<Sphere> = (0..50)
             .flat_map(|i| (0..25).map(move |j| (0.6 * f64::from(i), 0.6 * f64::from(j))))
             .map(|(x, z)| {
-                Sphere::new(
-                    Vector3::new(
-                        x,
-                        -0.5 + 0.5 * sin_cos(x / 5.0 + std::f64::consts::FRAC_PI_2).0,
-                        z,
-                    ),
-                    0.5,
-                )
+                let y = -0.5 + 0.5 * sin_cos(x / 5.0 + std::f64::consts::FRAC_PI_2).0;
+                Sphere::new(Vector3::new(x, y, z), 0.5)
             })
             .collect();
         Self {
