@@ -15,7 +15,7 @@ use super::lane_solver::{DenseSolver, DrySolver, FactoredSolver, LargeSolver, Pr
 use super::pattern::Pattern;
 use super::problem::{ContactProblem, DENSE_BLOCKS, MAX_CONTACTS, MAX_DENSE, MAX_DRY, block};
 use crate::problem::Residual;
-use crate::scalar::{Lane, inlined};
+use crate::scalar::Lane;
 use crate::solver::options::SolverOptions;
 
 pub use super::lane_solver::MAX_ITERATIONS;
@@ -304,36 +304,19 @@ impl<T: Lane> Queue<T> {
             n_others,
         };
         match kind {
-            Kind::Few => inlined!(
-                T::vectorize,
-                token,
-                (self.few).run(token, problems, tolerances, &mut line)
-            ),
-            Kind::Many => inlined!(
-                T::vectorize,
-                token,
-                (self.many).run(token, problems, tolerances, &mut line)
-            ),
-            Kind::Dry => inlined!(
-                T::vectorize,
-                token,
-                (self.dry).run(token, problems, tolerances, &mut line)
-            ),
+            Kind::Few => self.few.run(token, problems, tolerances, &mut line),
+            Kind::Many => self.many.run(token, problems, tolerances, &mut line),
+            Kind::Dry => self.dry.run(token, problems, tolerances, &mut line),
             Kind::Large => {
                 let large = self
                     .large
                     .get_or_insert_with(|| Box::new(LargeSolver::new(token)));
-                inlined!(
-                    T::vectorize,
-                    token,
-                    large.run(token, problems, tolerances, &mut line)
-                );
+                large.run(token, problems, tolerances, &mut line);
             }
-            Kind::Factored(place) => inlined!(
-                T::vectorize,
-                token,
-                (self.factored[place].1).run(token, problems, tolerances, &mut line)
-            ),
+            Kind::Factored(place) => {
+                let own = &mut self.factored[place].1;
+                own.run(token, problems, tolerances, &mut line);
+            }
         }
     }
 }
