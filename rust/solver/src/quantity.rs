@@ -118,29 +118,26 @@ pub struct AdmissibleRange {
     pub words: &'static str,
 }
 
+impl AdmissibleRange {
+    /// From the smallest to the largest size, with its description in words.
+    #[must_use]
+    pub const fn new(ends: [f64; 2], words: &'static str) -> Self {
+        Self { ends, words }
+    }
+}
+
 /// Masses, kg.
-pub const MASSES: AdmissibleRange = AdmissibleRange {
-    ends: [1e-9, 1e12],
-    words: "from 1e-9 to 1e12 kg",
-};
+pub const MASSES: AdmissibleRange = AdmissibleRange::new([1e-9, 1e12], "from 1e-9 to 1e12 kg");
 
 /// Lengths, m.
-pub const LENGTHS: AdmissibleRange = AdmissibleRange {
-    ends: [1e-6, 1e6],
-    words: "from 1e-6 to 1e6 m",
-};
+pub const LENGTHS: AdmissibleRange = AdmissibleRange::new([1e-6, 1e6], "from 1e-6 to 1e6 m");
 
 /// Inertias, kg m².
-pub const INERTIAS: AdmissibleRange = AdmissibleRange {
-    ends: [1e-24, 1e24],
-    words: "from 1e-24 to 1e24 kg m²",
-};
+pub const INERTIAS: AdmissibleRange =
+    AdmissibleRange::new([1e-24, 1e24], "from 1e-24 to 1e24 kg m²");
 
 /// Places, m.
-pub const PLACES: AdmissibleRange = AdmissibleRange {
-    ends: [-1e6, 1e6],
-    words: "at most 1e6 m either way",
-};
+pub const PLACES: AdmissibleRange = AdmissibleRange::new([-1e6, 1e6], "at most 1e6 m either way");
 
 /// `value`, if it is within a range; positive where the range is. `field`: its name.
 ///

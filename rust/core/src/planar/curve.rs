@@ -23,22 +23,13 @@ use crate::quantity::{AdmissibleRange, Demand, PLACES, QuantityError, finite, wi
 use crate::scalar::elementary::{hypot, sin_cos};
 
 /// Slopes, m/m.
-const SLOPES: AdmissibleRange = AdmissibleRange {
-    ends: [-1e3, 1e3],
-    words: "at most 1000 either way",
-};
+const SLOPES: AdmissibleRange = AdmissibleRange::new([-1e3, 1e3], "at most 1000 either way");
 
 /// Wavelengths, m: shorter ones are mere roughness to a disc.
-const WAVELENGTHS: AdmissibleRange = AdmissibleRange {
-    ends: [1e-3, 1e9],
-    words: "from 1e-3 to 1e9 m",
-};
+const WAVELENGTHS: AdmissibleRange = AdmissibleRange::new([1e-3, 1e9], "from 1e-3 to 1e9 m");
 
 /// Phases, rad.
-const PHASES: AdmissibleRange = AdmissibleRange {
-    ends: [-1e6, 1e6],
-    words: "at most 1e6 rad either way",
-};
+const PHASES: AdmissibleRange = AdmissibleRange::new([-1e6, 1e6], "at most 1e6 rad either way");
 
 /// Most points of a curve.
 pub const MAX_POINTS: usize = 2_000_000;
