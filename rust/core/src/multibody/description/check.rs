@@ -311,11 +311,11 @@ fn check_width(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result
     }
     not_negative(&at("rounding"), rounding)?;
     let radius = wheel.contact_radius.unwrap_or(wheel.radius);
-    for (most, range) in [
+    for (is_within, range) in [
         (rounding <= 0.5 * width, "at most half the wheel's width"),
         (rounding < radius, "smaller than the wheel's radius"),
     ] {
-        within(most, &at("rounding"), rounding, range)?;
+        within(is_within, &at("rounding"), rounding, range)?;
     }
     let height = wheel.grouser_height.unwrap_or(0.0);
     not_negative(&at("grouser_height"), height)?;
