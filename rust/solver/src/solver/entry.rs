@@ -395,10 +395,11 @@ fn report_on<const D: usize>(
         residual,
     }: StageResult,
 ) -> SolveReport {
-    let Attempt { p, u, scratch, .. } = &mut *attempt;
+    let iterations = attempt.iterations;
+    let Attempt { p, u, scratch, .. } = attempt;
     let mut report = SolveReport {
         status,
-        iterations: attempt.iterations,
+        iterations,
         work: scratch.work.spent,
         residual: residual.relative,
         velocity_error: residual.velocity,
