@@ -5,7 +5,7 @@
 
 use crate::whole::Whole;
 use rover_core::contact::Activation;
-use rover_core::integrator::{StepError, StepOptions, StepStart};
+use rover_core::integrator::{StateMut, StepError, StepOptions, StepStart};
 use rover_core::solver::{SolveReport, SolverWorkspace, solve};
 
 /// Largest displacement of any cluster, m, that `y` (nv) causes away from the contact points.
@@ -41,6 +41,19 @@ pub(crate) fn find<S: Whole>(
     system.relocate(out);
 }
 
+/// Factors M where the middle of the step is placed.
+pub(crate) fn factorise<S: Whole>(
+    system: &mut S,
+    options: &StepOptions,
+    time: f64,
+) -> Result<(), StepError> {
+    system.update_mass_matrix(options, true, true);
+    if system.factorise(options) {
+        return Ok(());
+    }
+    Err(StepError::SingularMassMatrix { time })
+}
+
 /// `a = M⁻¹ F(q, v)`, m/s² and rad/s²; the factor of M(q) stays in the system.
 pub(crate) fn free_acceleration<S: Whole>(
     system: &mut S,
@@ -48,25 +61,17 @@ pub(crate) fn free_acceleration<S: Whole>(
     q: &S::Configuration,
     v: &[f64],
     time: f64,
-    a: &mut Vec<f64>,
-) -> Result<(), StepError> {
+) -> Result<Vec<f64>, StepError> {
     system.place_middle(q);
-    system.update_mass_matrix(options, true, true);
-    if !system.factorise(options) {
-        return Err(StepError::SingularMassMatrix { time });
-    }
-    a.resize(v.len(), 0.0);
-    let start = StepStart {
-        configuration: q,
-        v,
-    };
-    system.load(options, start, v, a);
-    system.half_solve(a);
-    system.half_solve_back(a);
-    for a in a {
+    factorise(system, options, time)?;
+    let mut a = vec![0.0; v.len()];
+    system.load(options, StepStart::at(q, v), v, &mut a);
+    system.half_solve(&mut a);
+    system.half_solve_back(&mut a);
+    for a in &mut a {
         *a /= options.time_step;
     }
-    Ok(())
+    Ok(a)
 }
 
 /// `b = d/dt (Hᵀ(q(t)) v)` along q ⊕ t v, m/s²; leaves the contacts placed
@@ -108,28 +113,52 @@ pub(crate) fn friction<S: Whole>(
     contacts.iter().map(mu).collect()
 }
 
-/// Solves the contact law on the assembled operator from `p`; `u = W p + q_free`.
+/// Solves the contact law on the assembled operator from `p`; returns `u = W p + free` too.
 pub(crate) fn solve_law<S: Whole>(
     system: &S,
     options: &StepOptions,
     contacts: &[S::Contact],
-    q_free: &[f64],
+    free: &[f64],
     p: &mut [f64],
-    u: &mut Vec<f64>,
     workspace: &mut SolverWorkspace,
-) -> SolveReport {
-    u.resize(q_free.len(), 0.0);
+) -> (SolveReport, Vec<f64>) {
+    let mut u = vec![0.0; free.len()];
     let mu = friction(system, options, contacts);
-    let problem = system.problem(q_free, &mu);
-    solve(&problem, &options.solver, p, u, workspace)
+    let problem = system.problem(free, &mu);
+    let report = solve(&problem, &options.solver, p, &mut u, workspace);
+    (report, u)
 }
 
-/// `change = M⁻¹ H p`.
-pub(crate) fn response<S: Whole>(system: &S, p: &[f64], change: &mut Vec<f64>) {
-    change.clear();
-    change.resize(system.nv(), 0.0);
-    system.add_impulses(p, change);
-    system.half_solve_back(change);
+/// `M⁻¹ H p`.
+pub(crate) fn response<S: Whole>(system: &S, p: &[f64]) -> Vec<f64> {
+    let mut change = vec![0.0; system.nv()];
+    system.add_impulses(p, &mut change);
+    system.half_solve_back(&mut change);
+    change
+}
+
+/// Adds `M⁻¹ H p` to `v`.
+pub(crate) fn add_response<S: Whole>(system: &S, p: &[f64], v: &mut [f64]) {
+    for (v, change) in v.iter_mut().zip(response(system, p)) {
+        *v += change;
+    }
+}
+
+/// Makes (q, v) the state at the end of a step of h seconds, unless they are not finite.
+pub(crate) fn accept<S: Whole>(
+    system: &S,
+    (mut q, v): (S::Configuration, &[f64]),
+    h: f64,
+    state: StateMut<'_, S::Configuration>,
+) -> Result<(), StepError> {
+    if !system.is_finite(&q) || v.iter().any(|x| !x.is_finite()) {
+        return Err(StepError::NonFinite { time: *state.time });
+    }
+    system.normalise(&mut q);
+    *state.configuration = q;
+    state.v.copy_from_slice(v);
+    *state.time += h;
+    Ok(())
 }
 
 /// Acceleration with the reactions of these contacts: those that act over
@@ -145,8 +174,7 @@ pub(crate) fn smooth_acceleration<S: Whole>(
     workspace: &mut SolverWorkspace,
 ) -> Result<Vec<f64>, StepError> {
     let (q, v, time) = state;
-    let mut a = Vec::new();
-    free_acceleration(system, options, q, v, time, &mut a)?;
+    let mut a = free_acceleration(system, options, q, v, time)?;
     if contacts.is_empty() {
         return Ok(a);
     }
@@ -160,11 +188,7 @@ pub(crate) fn smooth_acceleration<S: Whole>(
         *b += u / options.time_step;
     }
     let mut force = vec![0.0; b.len()];
-    solve_law(system, options, contacts, &b, &mut force, &mut u, workspace);
-    let mut change = Vec::new();
-    response(system, &force, &mut change);
-    for (a, change) in a.iter_mut().zip(&change) {
-        *a += change;
-    }
+    solve_law(system, options, contacts, &b, &mut force, workspace);
+    add_response(system, &force, &mut a);
     Ok(a)
 }

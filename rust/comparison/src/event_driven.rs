@@ -32,8 +32,8 @@ use rover_core::problem::{Dimension, Operator};
 use rover_core::solver::SolverWorkspace;
 
 use crate::acceleration::{
-    convective_acceleration, find, free_acceleration, friction, largest_displacement, response,
-    solve_law,
+    accept, add_response, convective_acceleration, factorise, find, free_acceleration, friction,
+    largest_displacement, response, solve_law,
 };
 
 /// Speed below which a contact neither approaches nor parts nor slides, m/s.
@@ -191,8 +191,7 @@ impl<S: Whole> Run<'_, S> {
                 mu: Vec::new(),
             });
         }
-        let mut a = Vec::new();
-        free_acceleration(self.system, self.options, q, v, self.time, &mut a)?;
+        let a = free_acceleration(self.system, self.options, q, v, self.time)?;
         let mut b = Vec::new();
         convective_acceleration(self.system, &mut contacts, q, v, &mut u, &mut b);
         self.system.add_local_of_velocity(&contacts, &a, &mut b);
@@ -211,19 +210,7 @@ impl<S: Whole> Run<'_, S> {
                 b[1] = sign * large;
             }
         }
-        let mut force = vec![0.0; b.len()];
-        let solved = solve_law(
-            self.system,
-            self.options,
-            &contacts,
-            &b,
-            &mut force,
-            &mut u,
-            self.solver,
-        );
-        if !solved.is_converged() {
-            self.status = StepStatus::NotConverged;
-        }
+        let (force, u) = self.solve(&contacts, &b);
         let scale = b.iter().step_by(2).fold(1e-3_f64, |m, b| m.max(b.abs()));
         let mut modes = Vec::new();
         let mut local = force.chunks_exact(2).zip(u.chunks_exact(2)).zip(&slips);
@@ -257,8 +244,7 @@ impl<S: Whole> Run<'_, S> {
         v: &[f64],
         u: &mut Vec<f64>,
     ) -> Result<(Vec<f64>, Vec<f64>), StepError> {
-        let mut a = Vec::new();
-        free_acceleration(self.system, self.options, q, v, self.time, &mut a)?;
+        let mut a = free_acceleration(self.system, self.options, q, v, self.time)?;
         let n = 2 * motion.contacts.len();
         if n == 0 {
             u.clear();
@@ -281,12 +267,19 @@ impl<S: Whole> Run<'_, S> {
             }
         }
         let force = self.solve_linear(A, &rhs)?;
-        let mut change = Vec::new();
-        response(self.system, &force, &mut change);
-        for (a, change) in a.iter_mut().zip(&change) {
-            *a += change;
-        }
+        add_response(self.system, &force, &mut a);
         Ok((a, force))
+    }
+
+    /// Impulses, or forces, of the contact law and the local velocities, from a free velocity.
+    fn solve(&mut self, contacts: &[S::Contact], free: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut p = vec![0.0; free.len()];
+        let (system, solver) = (&*self.system, &mut *self.solver);
+        let (solved, u) = solve_law(system, self.options, contacts, free, &mut p, solver);
+        if !solved.is_converged() {
+            self.status = StepStatus::NotConverged;
+        }
+        (p, u)
     }
 
     fn solve_linear(&self, A: DMatrix<f64>, rhs: &DVector<f64>) -> Result<Vec<f64>, StepError> {
@@ -343,13 +336,9 @@ impl<S: Whole> Run<'_, S> {
             return Ok(());
         }
         let mut u = vec![0.0; n];
-        let mut change = Vec::new();
         for iteration in 0..4 {
             self.system.place_middle(q);
-            self.system.update_mass_matrix(self.options, true, true);
-            if !self.system.factorise(self.options) {
-                return Err(StepError::SingularMassMatrix { time: self.time });
-            }
+            factorise(self.system, self.options, self.time)?;
             self.system.place_end(q);
             self.system.relocate(&mut motion.contacts);
             self.system.assemble(&motion.contacts, v, &mut u);
@@ -368,12 +357,10 @@ impl<S: Whole> Run<'_, S> {
                 }
             }
             let p = self.solve_linear(A, &rhs)?;
-            response(self.system, &p, &mut change);
             if is_last {
-                for (v, change) in v.iter_mut().zip(&change) {
-                    *v += change;
-                }
+                add_response(self.system, &p, v);
             } else {
+                let change = response(self.system, &p);
                 self.system.advance(q, &change, 1.0);
             }
         }
@@ -423,34 +410,14 @@ impl<S: Whole> Run<'_, S> {
     fn strike(&mut self, q: &S::Configuration, v: &mut [f64]) -> Result<(), StepError> {
         let mut contacts = Vec::new();
         find(self.system, q, v, TOUCHING, f64::INFINITY, &mut contacts);
-        self.system.update_mass_matrix(self.options, true, true);
-        if !self.system.factorise(self.options) {
-            return Err(StepError::SingularMassMatrix { time: self.time });
-        }
-        let mut q_free = vec![0.0; 2 * contacts.len()];
-        self.system.assemble(&contacts, v, &mut q_free);
-        for u in q_free.chunks_exact_mut(2) {
+        factorise(self.system, self.options, self.time)?;
+        let mut free = vec![0.0; 2 * contacts.len()];
+        self.system.assemble(&contacts, v, &mut free);
+        for u in free.chunks_exact_mut(2) {
             u[0] += rebound(self.options.restitution, u[0]);
         }
-        let mut p = vec![0.0; q_free.len()];
-        let mut u = Vec::new();
-        let solved = solve_law(
-            self.system,
-            self.options,
-            &contacts,
-            &q_free,
-            &mut p,
-            &mut u,
-            self.solver,
-        );
-        if !solved.is_converged() {
-            self.status = StepStatus::NotConverged;
-        }
-        let mut change = Vec::new();
-        response(self.system, &p, &mut change);
-        for (v, change) in v.iter_mut().zip(&change) {
-            *v += change;
-        }
+        let (p, _) = self.solve(&contacts, &free);
+        add_response(self.system, &p, v);
         Ok(())
     }
 }
@@ -522,13 +489,7 @@ impl<S: Whole> Integrator<S> for EventDriven {
             n_contacts = n_contacts.max(motion.contacts.len());
         }
         let status = run.status;
-        if !run.system.is_finite(&q) || v.iter().any(|x| !x.is_finite()) {
-            return Err(StepError::NonFinite { time });
-        }
-        run.system.normalise(&mut q);
-        *state.configuration = q;
-        state.v.copy_from_slice(&v);
-        *state.time += h;
+        accept(&*run.system, (q, &v), h, state)?;
         Ok(StepReport {
             steps: 1,
             status,

@@ -299,12 +299,6 @@ impl Dynamics for SphereSystem<'_> {
         }
     }
 
-    fn take(&self, lanes: impl Fn(usize) -> bool, from: &BodyPlacement, to: &mut BodyPlacement) {
-        if lanes(0) {
-            to.clone_from(from);
-        }
-    }
-
     fn is_finite(&self, q: &BodyPlacement) -> bool {
         let turn = q.turn.coords.iter();
         q.centres

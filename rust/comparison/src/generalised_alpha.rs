@@ -28,7 +28,7 @@ use rover_core::integrator::{
 use rover_core::law::newton_impact::rebound;
 use rover_core::solver::{SolveReport, SolverWorkspace};
 
-use crate::acceleration::{find, response, smooth_acceleration, solve_law};
+use crate::acceleration::{accept, factorise, find, response, smooth_acceleration, solve_law};
 
 /// Change of h ã⁺, relative to 1 m/s and to the largest velocity, below
 /// which the iteration has settled.
@@ -102,7 +102,6 @@ struct Iterate<S: Whole> {
     v_mean: Vec<f64>,
     w: Vec<f64>,
     p: Vec<f64>,
-    u: Vec<f64>,
     u_before: Vec<f64>,
 }
 
@@ -119,7 +118,6 @@ impl<S: Whole> Iterate<S> {
             v_mean: vec![0.0; nv],
             w: vec![0.0; nv],
             p: Vec::new(),
-            u: Vec::new(),
             u_before: Vec::new(),
         }
     }
@@ -156,30 +154,18 @@ impl<S: Whole> Iterate<S> {
         system.place_middle(&self.q);
         system.place_end(&self.q);
         system.relocate(&mut self.contacts);
-        system.update_mass_matrix(options, true, true);
-        if !system.factorise(options) {
-            return Err(StepError::SingularMassMatrix { time });
-        }
+        factorise(system, options, time)?;
         self.u_before.resize(d * self.contacts.len(), 0.0);
         system.assemble(&self.contacts, v, &mut self.u_before);
-        let mut q_free = vec![0.0; self.u_before.len()];
-        system.add_local_of_velocity(&self.contacts, &self.v, &mut q_free);
-        for (q, u) in q_free
-            .chunks_exact_mut(d)
-            .zip(self.u_before.chunks_exact(d))
-        {
+        let mut free = vec![0.0; self.u_before.len()];
+        system.add_local_of_velocity(&self.contacts, &self.v, &mut free);
+        let rows = free.chunks_exact_mut(d);
+        for (q, u) in rows.zip(self.u_before.chunks_exact(d)) {
             q[0] += rebound(options.restitution, u[0]);
         }
-        let solved = solve_law(
-            system,
-            options,
-            &self.contacts,
-            &q_free,
-            &mut self.p,
-            &mut self.u,
-            solver,
-        );
-        response(system, &self.p, &mut self.w);
+        let contacts = &self.contacts;
+        let (solved, _) = solve_law(system, options, contacts, &free, &mut self.p, solver);
+        self.w = response(system, &self.p);
         for (v, w) in self.v.iter_mut().zip(&self.w) {
             *v += w;
         }
@@ -254,15 +240,9 @@ impl<S: Whole> Integrator<S> for GeneralisedAlpha {
                 break;
             }
         }
-        if !system.is_finite(&end.q) || end.v.iter().any(|x| !x.is_finite()) {
-            return Err(StepError::NonFinite { time });
-        }
-        system.normalise(&mut end.q);
-        *state.configuration = end.q;
-        state.v.copy_from_slice(&end.v);
-        *state.time += h;
+        accept(system, (end.q, &end.v), h, state)?;
         warm_start.remember(&end.contacts, d, &end.p);
-        memory.time = *state.time;
+        memory.time = time + h;
         memory.v = end.v;
         memory.rate = end.rate;
         memory.a = end.a;

@@ -16,7 +16,7 @@ use rover_core::integrator::{
     UnilateralContact, WarmStart,
 };
 
-use crate::acceleration::{find, free_acceleration, friction, response};
+use crate::acceleration::{accept, add_response, find, free_acceleration, friction};
 
 /// Stiffness, damping, regularisation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,8 +63,7 @@ impl<S: Whole> Integrator<S> for Penalty {
         let (q, v) = (&*state.configuration, &*state.v);
         let mut contacts = Vec::new();
         find(system, q, v, 0.0, 0.0, &mut contacts);
-        let mut a = Vec::new();
-        free_acceleration(system, options, q, v, time, &mut a)?;
+        let mut a = free_acceleration(system, options, q, v, time)?;
         if !contacts.is_empty() {
             let mut u = vec![0.0; d * contacts.len()];
             system.assemble(&contacts, v, &mut u);
@@ -78,22 +77,12 @@ impl<S: Whole> Integrator<S> for Penalty {
                     *u *= share;
                 }
             }
-            let mut change = Vec::new();
-            response(system, &u, &mut change);
-            for (a, change) in a.iter_mut().zip(&change) {
-                *a += change;
-            }
+            add_response(system, &u, &mut a);
         }
         let v_end: Vec<f64> = v.iter().zip(&a).map(|(v, a)| v + h * a).collect();
         let mut q_end = q.clone();
         system.set_moved(q, &v_end, h, &mut q_end);
-        if !system.is_finite(&q_end) || v_end.iter().any(|x| !x.is_finite()) {
-            return Err(StepError::NonFinite { time });
-        }
-        system.normalise(&mut q_end);
-        *state.configuration = q_end;
-        state.v.copy_from_slice(&v_end);
-        *state.time += h;
+        accept(system, (q_end, &v_end), h, state)?;
         Ok(StepReport {
             steps: 1,
             n_contacts: contacts.len(),

@@ -51,7 +51,6 @@ struct Memory {
     gaps: Vec<f64>,
     mu: Vec<f64>,
     p: Vec<f64>,
-    change: Vec<f64>,
     solver: SolverWorkspace,
 }
 
@@ -124,21 +123,18 @@ impl<S: Whole> Integrator<S> for ProjectedToConvergence {
             for (row, contact) in memory.gaps.chunks_exact_mut(d).zip(&contacts) {
                 row[0] = contact.gap();
             }
-            let solved = system.solve(
-                &memory.gaps,
-                &memory.mu,
-                &options.solver,
-                &mut memory.p,
-                &mut memory.u,
-                &mut memory.solver,
+            let (data, answer) = (
+                (&memory.gaps[..], &memory.mu[..]),
+                (&mut memory.p[..], &mut memory.u[..]),
             );
+            let solved = system.solve(None, data, &options.solver, answer, &mut memory.solver);
             report.iterations += solved.iterations;
-            response(system, &memory.p, &mut memory.change);
-            if memory.change.iter().any(|x| !x.is_finite()) {
+            let change = response(system, &memory.p);
+            if change.iter().any(|x| !x.is_finite()) {
                 report.status = StepStatus::NotConverged;
                 break;
             }
-            system.advance(q, &memory.change, 1.0);
+            system.advance(q, &change, 1.0);
         }
         system.normalise(q);
         Ok(report)

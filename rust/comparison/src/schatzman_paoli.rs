@@ -28,7 +28,8 @@ use rover_core::integrator::{
 use rover_core::solver::{SolveReport, SolverWorkspace};
 
 use crate::acceleration::{
-    find, free_acceleration, largest_displacement, response, smooth_acceleration, solve_law,
+    factorise, find, free_acceleration, largest_displacement, response, smooth_acceleration,
+    solve_law,
 };
 
 /// Change of the velocity, relative to 1 m/s and to the largest, below
@@ -60,7 +61,6 @@ struct Touching<S: Whole> {
     /// Where their gaps are measured.
     q_star: S::Configuration,
     p: Vec<f64>,
-    u: Vec<f64>,
     u_guess: Vec<f64>,
     /// Change of the velocity by the impulses.
     change: Vec<f64>,
@@ -73,7 +73,6 @@ impl<S: Whole> Touching<S> {
             contacts,
             q_star: q.clone(),
             p: vec![0.0; n],
-            u: Vec::new(),
             u_guess: vec![0.0; n],
             change: Vec::new(),
         }
@@ -94,22 +93,15 @@ impl<S: Whole> Touching<S> {
         system.place_end(&self.q_star);
         system.relocate(&mut self.contacts);
         system.assemble(&self.contacts, guess, &mut self.u_guess);
-        let mut q_free = vec![0.0; self.p.len()];
-        system.add_local_of_velocity(&self.contacts, free, &mut q_free);
-        let rows = q_free.chunks_exact_mut(d).zip(self.u_guess.chunks_exact(d));
+        let mut q = vec![0.0; self.p.len()];
+        system.add_local_of_velocity(&self.contacts, free, &mut q);
+        let rows = q.chunks_exact_mut(d).zip(self.u_guess.chunks_exact(d));
         for (contact, (q, u)) in self.contacts.iter().zip(rows) {
             q[0] += (1.0 + e) * contact.gap() / h - u[0];
         }
-        let solved = solve_law(
-            system,
-            options,
-            &self.contacts,
-            &q_free,
-            &mut self.p,
-            &mut self.u,
-            solver,
-        );
-        response(system, &self.p, &mut self.change);
+        let contacts = &self.contacts;
+        let (solved, _) = solve_law(system, options, contacts, &q, &mut self.p, solver);
+        self.change = response(system, &self.p);
         solved
     }
 }
@@ -198,10 +190,7 @@ impl<S: Whole> Integrator<S> for SchatzmanPaoli {
         let reach = 3.0 * h * largest_displacement(system, before) + 2.0 * g * h * h;
         find(system, q, before, reach, f64::INFINITY, &mut contacts);
         system.place_middle(q);
-        system.update_mass_matrix(options, true, true);
-        if !system.factorise(options) {
-            return Err(StepError::SingularMassMatrix { time });
-        }
+        factorise(system, options, time)?;
         let mut report = StepReport {
             steps: 1,
             status: StepStatus::NotConverged,
@@ -210,10 +199,7 @@ impl<S: Whole> Integrator<S> for SchatzmanPaoli {
         };
         let mut touching = Touching::<S>::new(contacts, q);
         warm_start.recall(&touching.contacts, d, &mut touching.p);
-        let start = StepStart {
-            configuration: q,
-            v: before,
-        };
+        let start = StepStart::at(q, before);
         let solver = &mut memory.solver;
         let v_end = iterate(system, options, start, &mut touching, solver, &mut report);
         let mut q_end = q.clone();
@@ -224,8 +210,7 @@ impl<S: Whole> Integrator<S> for SchatzmanPaoli {
         system.normalise(&mut q_end);
         let mut shown = v_end.clone();
         if touching.p.iter().all(|p| *p == 0.0) {
-            let mut a = Vec::new();
-            free_acceleration(system, options, &q_end, &v_end, time, &mut a)?;
+            let a = free_acceleration(system, options, &q_end, &v_end, time)?;
             for i in 0..shown.len() {
                 shown[i] += 0.5 * h * a[i];
             }

@@ -274,22 +274,21 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
     }
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3ExitInitializationMode(instance: *mut Instance) -> Status {
-    // SAFETY: the importer's instance.
-    unsafe { answer(instance, |it| it.unit.begin_steps().map(|()| Status::Ok)) }
+/// Functions without arguments, each a method of the unit.
+macro_rules! of_unit {
+    ($($name:ident: $method:ident;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(instance: *mut Instance) -> Status {
+            // SAFETY: the importer's instance.
+            unsafe { answer(instance, |it| it.unit.$method().map(|()| Status::Ok)) }
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Terminate(instance: *mut Instance) -> Status {
-    // SAFETY: the importer's instance.
-    unsafe { answer(instance, |it| it.unit.terminate().map(|()| Status::Ok)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Reset(instance: *mut Instance) -> Status {
-    // SAFETY: the importer's instance.
-    unsafe { answer(instance, |it| it.unit.reset().map(|()| Status::Ok)) }
+of_unit! {
+    fmi3ExitInitializationMode: begin_steps;
+    fmi3Terminate: terminate;
+    fmi3Reset: reset;
 }
 
 #[unsafe(no_mangle)]
@@ -323,87 +322,62 @@ pub unsafe extern "C" fn fmi3DoStep(
     }
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFloat64(
-    instance: *mut Instance,
-    references: *const u32,
-    n_references: usize,
-    values: *mut f64,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer's instance and arrays.
-    unsafe {
-        answer(instance, |it| {
-            let references = slice("valueReferences", references, n_references)?;
-            let values = slice_mut("values", values, n_values)?;
-            it.unit.numbers(references, values).map(|()| Status::Ok)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFloat64(
-    instance: *mut Instance,
-    references: *const u32,
-    n_references: usize,
-    values: *const f64,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer's instance and arrays.
-    unsafe {
-        answer(instance, |it| {
-            let references = slice("valueReferences", references, n_references)?;
-            let values = slice("values", values, n_values)?;
-            it.unit.set_numbers(references, values).map(|()| Status::Ok)
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetString(
-    instance: *mut Instance,
-    references: *const u32,
-    n_references: usize,
-    values: *mut Text,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer's instance and arrays; the texts stay until the next call.
-    unsafe {
-        answer(instance, |it| {
-            let references = slice("valueReferences", references, n_references)?;
-            let values = slice_mut("values", values, n_values)?;
-            count(references.len(), values.len())?;
-            it.texts.clear();
-            for (&reference, value) in references.iter().zip(values) {
-                let text = it.unit.text(reference)?.replace('\0', " ");
-                it.texts.push(CString::new(text).unwrap_or_default());
-                *value = it.texts.last().map_or(c"".as_ptr(), |text| text.as_ptr());
+/// Reads and writes of variables, with a slice of their references and one of their values.
+macro_rules! of_variables {
+    ($(
+        $name:ident($values:ty, $slice:ident)
+        |$it:ident, $references:ident, $entries:ident| $call:expr;
+    )*) => {$(
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            instance: *mut Instance,
+            references: *const u32,
+            n_references: usize,
+            values: $values,
+            n_values: usize,
+        ) -> Status {
+            // SAFETY: the importer's instance, arrays and texts.
+            unsafe {
+                answer(instance, |$it| {
+                    let $references = slice("valueReferences", references, n_references)?;
+                    let $entries = $slice("values", values, n_values)?;
+                    $call.map(|()| Status::Ok)
+                })
             }
-            Ok(Status::Ok)
-        })
-    }
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetString(
-    instance: *mut Instance,
-    references: *const u32,
-    n_references: usize,
-    values: *const Text,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer's instance, arrays and texts.
-    unsafe {
-        answer(instance, |it| {
-            let references = slice("valueReferences", references, n_references)?;
-            let values = slice("values", values, n_values)?;
-            count(references.len(), values.len())?;
-            for (&reference, &value) in references.iter().zip(values) {
-                it.unit.set_text(reference, text("values", value)?)?;
-            }
-            Ok(Status::Ok)
-        })
+of_variables! {
+    fmi3GetFloat64(*mut f64, slice_mut) |it, references, values| it.unit.numbers(references, values);
+    fmi3SetFloat64(*const f64, slice) |it, references, values| it.unit.set_numbers(references, values);
+    fmi3GetString(*mut Text, slice_mut) |it, references, values| texts(it, references, values);
+    fmi3SetString(*const Text, slice) |it, references, values| set_texts(it, references, values);
+}
+
+/// Hands out texts, which stay until the next call.
+fn texts(it: &mut Instance, references: &[u32], values: &mut [Text]) -> Result<(), Refusal> {
+    count(references.len(), values.len())?;
+    it.texts.clear();
+    for (&reference, value) in references.iter().zip(values) {
+        let text = it.unit.text(reference)?.replace('\0', " ");
+        it.texts.push(CString::new(text).unwrap_or_default());
+        *value = it.texts.last().map_or(c"".as_ptr(), |text| text.as_ptr());
     }
+    Ok(())
+}
+
+/// Takes over texts.
+///
+/// SAFETY: as [`text`].
+unsafe fn set_texts(it: &mut Instance, references: &[u32], values: &[Text]) -> Result<(), Refusal> {
+    count(references.len(), values.len())?;
+    for (&reference, &value) in references.iter().zip(values) {
+        // SAFETY: see above.
+        it.unit
+            .set_text(reference, unsafe { text("values", value) }?)?;
+    }
+    Ok(())
 }
 
 /// Writes a state over the one that a place holds, or into a new one where it holds none.

@@ -20,6 +20,18 @@ const STEP_ROUNDING: f64 = 1e-6;
 /// Most time steps of a communication step.
 const MOST_STEPS: f64 = 1e9;
 
+/// States in which variables can be read, and in which they can be set.
+const READABLE: [UnitMode; 3] = [
+    UnitMode::InitializationMode,
+    UnitMode::StepMode,
+    UnitMode::Terminated,
+];
+const SETTABLE: [UnitMode; 3] = [
+    UnitMode::Instantiated,
+    UnitMode::InitializationMode,
+    UnitMode::StepMode,
+];
+
 /// A unit.
 pub struct Unit {
     scene: SceneFile,
@@ -160,14 +172,7 @@ impl Unit {
 
     /// Values of variables.
     pub fn numbers(&self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
-        self.demand(
-            "fmi3GetFloat64",
-            &[
-                UnitMode::InitializationMode,
-                UnitMode::StepMode,
-                UnitMode::Terminated,
-            ],
-        )?;
+        self.demand("fmi3GetFloat64", &READABLE)?;
         count(references.len(), values.len())?;
         let gravity = self.parameters.gravity;
         let reading = Reading::new(&self.rover, &self.last, gravity);
@@ -190,12 +195,7 @@ impl Unit {
 
     /// Sets variables: all, or none.
     pub fn set_numbers(&mut self, references: &[u32], values: &[f64]) -> Result<(), Refusal> {
-        let modes = [
-            UnitMode::Instantiated,
-            UnitMode::InitializationMode,
-            UnitMode::StepMode,
-        ];
-        self.demand("fmi3SetFloat64", &modes)?;
+        self.demand("fmi3SetFloat64", &SETTABLE)?;
         count(references.len(), values.len())?;
         let (mut parameters, mut inputs) = (self.parameters.clone(), self.inputs.clone());
         for (&reference, &value) in references.iter().zip(values) {
@@ -230,14 +230,7 @@ impl Unit {
 
     /// The text of a variable.
     pub fn text(&self, reference: u32) -> Result<&str, Refusal> {
-        self.demand(
-            "fmi3GetString",
-            &[
-                UnitMode::InitializationMode,
-                UnitMode::StepMode,
-                UnitMode::Terminated,
-            ],
-        )?;
+        self.demand("fmi3GetString", &READABLE)?;
         match self.variable(reference)?.channel {
             VariableKind::Model => Ok(&self.parameters.model),
             _ => Err(Refusal::NoVariable { reference }),
@@ -246,12 +239,7 @@ impl Unit {
 
     /// Sets the text of a variable.
     pub fn set_text(&mut self, reference: u32, value: &str) -> Result<(), Refusal> {
-        let modes = [
-            UnitMode::Instantiated,
-            UnitMode::InitializationMode,
-            UnitMode::StepMode,
-        ];
-        self.demand("fmi3SetString", &modes)?;
+        self.demand("fmi3SetString", &SETTABLE)?;
         let variable = self.variable(reference)?;
         if variable.channel != VariableKind::Model {
             return Err(Refusal::NoVariable { reference });

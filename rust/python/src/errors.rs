@@ -14,7 +14,7 @@ use rover_core::caught::Fault;
 use rover_core::contact::placement::PlacementError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
-use rover_core::multibody::{ModelError, StateError};
+use rover_core::multibody::{ModelError, ModelFault, StateError};
 use rover_core::problem::ProblemError;
 use rover_core::quantity::legible;
 use rover_core::simulation::{BatchError, CommandError, SnapshotError};
@@ -231,31 +231,38 @@ pub fn entry(field: &str, index: Option<&usize>) -> String {
     index.map_or_else(|| field.to_owned(), |index| format!("{field}[{index}]"))
 }
 
+/// What a field of a model held.
+fn value_of(fault: &ModelFault) -> Value {
+    use ModelFault as F;
+    match fault {
+        F::DuplicateName(name)
+        | F::UnknownParent(name)
+        | F::UnknownName(name)
+        | F::NotADisc(name)
+        | F::UnknownModel { name, .. }
+        | F::MaterialName(name)
+        | F::SteeringNotAbove(name) => Value::Text(name.clone()),
+        F::NotFinite(value)
+        | F::NotPositive(value)
+        | F::Negative(value)
+        | F::NotASign(value)
+        | F::NotBelow { value, .. }
+        | F::OutOfRange { value, .. }
+        | F::MassesContradict { value, .. }
+        | F::RadiusContradictsShape { value, .. } => Value::Number(*value),
+        #[allow(clippy::cast_precision_loss)] // a number to show
+        F::UnknownFormat(format) => Value::Number(*format as f64),
+        F::TooMany { count, .. } => Value::Count(*count),
+        F::NoDirection(value) | F::ImpossibleInertia(value) => Value::Numbers(value.to_vec()),
+        _ => Value::Nothing,
+    }
+}
+
 impl From<ModelError> for BorderError {
     fn from(e: ModelError) -> Self {
-        use ModelError as E;
         let value = match &e {
-            E::DuplicateName { name, .. }
-            | E::UnknownParent { name, .. }
-            | E::UnknownName { name, .. }
-            | E::NotADisc { solid: name, .. }
-            | E::UnknownModel { name, .. }
-            | E::MaterialName { name, .. }
-            | E::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
-            E::NotFinite { value, .. }
-            | E::NotPositive { value, .. }
-            | E::NotBelow { value, .. }
-            | E::Negative { value, .. }
-            | E::OutOfRange { value, .. }
-            | E::MassesContradict { value, .. }
-            | E::RadiusContradictsShape { value, .. }
-            | E::NotASign { value, .. } => Value::Number(*value),
-            #[allow(clippy::cast_precision_loss)] // a number to show
-            E::UnknownFormat { format } => Value::Number(*format as f64),
-            E::TooMany { count, .. } => Value::Count(*count),
-            E::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
-            E::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
-            _ => Value::Nothing,
+            ModelError::Unreadable { .. } => Value::Nothing,
+            ModelError::Invalid { fault, .. } => value_of(fault),
         };
         Kind::Model.of(&e, e.field(), value)
     }

@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
+use rover_core::quantity::{Demand, QuantityError};
 use rover_core::sand::{
     Bekker, Flow, Interface, OperatingPoint, Resistive, SandState, SandWheel, Soil, StressLaw,
     Sunk, TestBed, WheelPerformance,
@@ -224,11 +225,7 @@ impl WheelBed {
             ),
         ] {
             if !(0.0..=high).contains(&value) {
-                let error = rover_core::quantity::QuantityError::OutOfRange {
-                    field: field.to_owned(),
-                    range,
-                    value,
-                };
+                let error = QuantityError::new(field, Demand::Within(range), value);
                 return Err(quantity(Kind::Option, &error).into());
             }
         }

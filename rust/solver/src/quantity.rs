@@ -5,96 +5,108 @@ use thiserror::Error;
 
 /// An inadmissible number.
 #[derive(Clone, Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum QuantityError {
-    /// NaN or infinite.
-    #[error("{field}: must be finite, is {value}")]
-    NotFinite {
-        /// Name of the argument.
-        field: String,
-        /// What was given.
-        value: f64,
-    },
-    /// Zero or negative where that has no meaning.
-    #[error("{field}: must be positive, is {value}")]
-    NotPositive {
-        /// Name of the argument.
-        field: String,
-        /// What was given.
-        value: f64,
-    },
-    /// Negative.
-    #[error("{field}: must not be negative, is {value}")]
-    Negative {
-        /// Name of the argument.
-        field: String,
-        /// What was given.
-        value: f64,
-    },
-    /// So large or so small that the mechanics would overflow or underflow.
-    #[error("{field}: must be {range}, is {value}")]
-    OutOfRange {
-        /// Name of the argument.
-        field: String,
-        /// Admissible values, in words.
-        range: &'static str,
-        /// What was given.
-        value: f64,
-    },
+#[error("{field}: must {demand}, is {value}")]
+pub struct QuantityError {
+    field: String,
+    demand: Demand,
+    value: f64,
+}
+
+/// What a number must be.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum Demand {
+    /// Neither NaN nor infinite.
+    #[error("be finite")]
+    Finite,
+    /// Neither zero nor negative.
+    #[error("be positive")]
+    Positive,
+    /// Zero or positive.
+    #[error("not be negative")]
+    NotNegative,
+    /// Neither so large nor so small that the mechanics would overflow or underflow: within this
+    /// range, in words.
+    #[error("be {0}")]
+    Within(&'static str),
 }
 
 impl QuantityError {
+    /// An argument's `value` that does not meet a demand.
+    #[must_use]
+    pub fn new(field: impl Into<String>, demand: Demand, value: f64) -> Self {
+        Self {
+            field: field.into(),
+            demand,
+            value,
+        }
+    }
+
     /// Name of the argument that is wrong.
     #[must_use]
     pub fn field(&self) -> &str {
-        match self {
-            Self::NotFinite { field, .. }
-            | Self::NotPositive { field, .. }
-            | Self::Negative { field, .. }
-            | Self::OutOfRange { field, .. } => field,
-        }
+        &self.field
     }
 
     /// What was given.
     #[must_use]
     pub fn value(&self) -> f64 {
-        match self {
-            Self::NotFinite { value, .. }
-            | Self::NotPositive { value, .. }
-            | Self::Negative { value, .. }
-            | Self::OutOfRange { value, .. } => *value,
-        }
+        self.value
     }
+}
+
+/// `value`, if `meets` says that it meets a demand.
+fn checked(meets: bool, field: &str, demand: Demand, value: f64) -> Result<f64, QuantityError> {
+    meets
+        .then_some(value)
+        .ok_or_else(|| QuantityError::new(field, demand, value))
 }
 
 /// `value`, if it is finite.
 ///
 /// # Errors
-/// [`QuantityError::NotFinite`].
+/// NaN or infinite.
 pub fn finite(field: &str, value: f64) -> Result<f64, QuantityError> {
-    if value.is_finite() {
-        Ok(value)
-    } else {
-        Err(QuantityError::NotFinite {
-            field: field.to_owned(),
-            value,
-        })
-    }
+    checked(value.is_finite(), field, Demand::Finite, value)
 }
 
 /// `value`, if it is finite and positive.
 ///
 /// # Errors
-/// [`QuantityError::NotFinite`] or [`QuantityError::NotPositive`].
+/// Not finite, zero or negative.
 pub fn positive(field: &str, value: f64) -> Result<f64, QuantityError> {
-    if finite(field, value)? > 0.0 {
-        Ok(value)
-    } else {
-        Err(QuantityError::NotPositive {
-            field: field.to_owned(),
-            value,
-        })
-    }
+    checked(finite(field, value)? > 0.0, field, Demand::Positive, value)
+}
+
+/// `value`, if it is finite and not negative.
+///
+/// # Errors
+/// Not finite, or negative.
+pub fn not_negative(field: &str, value: f64) -> Result<f64, QuantityError> {
+    checked(
+        finite(field, value)? >= 0.0,
+        field,
+        Demand::NotNegative,
+        value,
+    )
+}
+
+/// `value`, if it is finite and between two ends; `range` says so in words.
+///
+/// # Errors
+/// Not finite, or beyond the ends.
+pub fn between(
+    field: &str,
+    value: f64,
+    [low, high]: [f64; 2],
+    range: &'static str,
+) -> Result<f64, QuantityError> {
+    let value = finite(field, value)?;
+    checked(
+        (low..=high).contains(&value),
+        field,
+        Demand::Within(range),
+        value,
+    )
 }
 
 /// Admissible numbers of an argument, with their description in words.
@@ -106,34 +118,31 @@ pub struct AdmissibleRange {
     pub words: &'static str,
 }
 
+impl AdmissibleRange {
+    /// From the smallest to the largest size, with its description in words.
+    #[must_use]
+    pub const fn new(ends: [f64; 2], words: &'static str) -> Self {
+        Self { ends, words }
+    }
+}
+
 /// Masses, kg.
-pub const MASSES: AdmissibleRange = AdmissibleRange {
-    ends: [1e-9, 1e12],
-    words: "from 1e-9 to 1e12 kg",
-};
+pub const MASSES: AdmissibleRange = AdmissibleRange::new([1e-9, 1e12], "from 1e-9 to 1e12 kg");
 
 /// Lengths, m.
-pub const LENGTHS: AdmissibleRange = AdmissibleRange {
-    ends: [1e-6, 1e6],
-    words: "from 1e-6 to 1e6 m",
-};
+pub const LENGTHS: AdmissibleRange = AdmissibleRange::new([1e-6, 1e6], "from 1e-6 to 1e6 m");
 
 /// Inertias, kg m².
-pub const INERTIAS: AdmissibleRange = AdmissibleRange {
-    ends: [1e-24, 1e24],
-    words: "from 1e-24 to 1e24 kg m²",
-};
+pub const INERTIAS: AdmissibleRange =
+    AdmissibleRange::new([1e-24, 1e24], "from 1e-24 to 1e24 kg m²");
 
 /// Places, m.
-pub const PLACES: AdmissibleRange = AdmissibleRange {
-    ends: [-1e6, 1e6],
-    words: "at most 1e6 m either way",
-};
+pub const PLACES: AdmissibleRange = AdmissibleRange::new([-1e6, 1e6], "at most 1e6 m either way");
 
 /// `value`, if it is within a range; positive where the range is. `field`: its name.
 ///
 /// # Errors
-/// [`QuantityError::NotFinite`], [`QuantityError::NotPositive`] or [`QuantityError::OutOfRange`].
+/// Not finite, not positive, or out of the range.
 pub fn within(
     field: impl Fn() -> String,
     value: f64,
@@ -150,11 +159,7 @@ pub fn within(
     if low > 0.0 {
         positive(&field(), value)?;
     }
-    Err(QuantityError::OutOfRange {
-        field: field(),
-        range: words,
-        value,
-    })
+    Err(QuantityError::new(field(), Demand::Within(words), value))
 }
 
 /// Longest number that a message writes out: a double with all its digits is no longer.

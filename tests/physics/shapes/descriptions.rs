@@ -1,6 +1,8 @@
 //! Descriptions of shapes: round trips, models, and errors that name the field.
 
-use rover_core::multibody::{Model, ModelDescription, ModelError, Shape, ShapeDescription};
+use rover_core::multibody::{
+    Model, ModelDescription, ModelError, ModelFault, Shape, ShapeDescription,
+};
 use rover_core::nalgebra::{Rotation3, Vector3};
 
 use super::machines::body;
@@ -109,5 +111,8 @@ fn of_several_shapes_the_wheels_disc_takes_another_radius() {
     }
     let tilted = Model::from_description(without).unwrap();
     let refused = tilted.with_wheel_radius(0.4).unwrap_err();
-    assert!(matches!(refused, ModelError::NotADisc { .. }), "{refused}");
+    let ModelError::Invalid { fault, .. } = &refused else {
+        panic!("{refused}");
+    };
+    assert!(matches!(fault, ModelFault::NotADisc(_)), "{refused}");
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use crate::law::newton_impact::{hovering_height, slow_approach};
-use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::scalar::{Lane, LaneMask, Vec3, inlined};
 
 /// A candidate is active if `gap + lead · u_N ≤ 0`, or if it is nearly at rest within `hover`.
 ///
@@ -25,19 +25,15 @@ impl<T: Lane> Activation<T> {
     /// after its start; `forecast`: γ.
     #[must_use]
     pub fn of_step(gravity: Vec3<T>, h: f64, forecast: f64, measured: f64) -> Self {
-        T::vectorize(
-            gravity.x.token(),
-            #[inline(always)]
-            || {
-                let g = gravity.norm();
-                let h_all = g.like(h);
-                Self {
-                    lead: forecast * h - measured,
-                    hover: hovering_height(g, h_all),
-                    slow: slow_approach(g, h_all),
-                }
-            },
-        )
+        inlined!(T::vectorize, gravity.x.token(), {
+            let g = gravity.norm();
+            let h_all = g.like(h);
+            Self {
+                lead: forecast * h - measured,
+                hover: hovering_height(g, h_all),
+                slow: slow_approach(g, h_all),
+            }
+        })
     }
 
     /// The activation in one lane.

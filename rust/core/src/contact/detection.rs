@@ -424,14 +424,8 @@ fn touch<S: BodyMotion>(
         PlacedShape::Sphere(sphere) => {
             let middle = ground.centre - base - sphere.centre;
             let distance = |x: &Vector3<f64>| {
-                let ball = Sphere {
-                    centre: *x,
-                    radius: 0.0,
-                };
-                let own = Sphere {
-                    centre: Vector3::zeros(),
-                    radius: sphere.radius,
-                };
+                let ball = Sphere::new(*x, 0.0);
+                let own = Sphere::new(Vector3::zeros(), sphere.radius);
                 let near = sphere_sphere::nearest_point(&own, &ball, &Vector3::zeros());
                 (near.n, near.gap)
             };
@@ -447,10 +441,7 @@ fn touch<S: BodyMotion>(
             let from_end = ground.centre - machine.end.origin(placed.body) - r_end;
             let last = r + R * R_end.tr_mul(&from_end);
             let distance = |x: &Vector3<f64>| {
-                let place = Sphere {
-                    centre: *x,
-                    radius: 0.0,
-                };
+                let place = Sphere::new(*x, 0.0);
                 let near = dispatch::point_on_sphere(shape, &place, &Vector3::zeros());
                 (near.n, near.gap)
             };
@@ -470,10 +461,7 @@ pub(crate) fn touch_of_wheel(
 ) -> Option<Vector3<f64>> {
     let middle = ground.centre - base - wheel.core.centre;
     let distance = |x: &Vector3<f64>| {
-        let ball = Sphere {
-            centre: x + wheel.core.centre,
-            radius: 0.0,
-        };
+        let ball = Sphere::new(x + wheel.core.centre, 0.0);
         let near = roller_sphere::nearest_point(wheel, &ball, &Vector3::zeros());
         (near.n, near.gap)
     };

@@ -129,10 +129,7 @@ mod tests {
             let out = spoke * phi.cos() + axle.cross(&spoke) * phi.sin();
             let at = |share: f64| {
                 let centre = disc.centre + out * (disc.radius * share) + axle * 0.1;
-                let ground = Sphere {
-                    centre,
-                    radius: 0.05,
-                };
+                let ground = Sphere::new(centre, 0.05);
                 let near = nearest_point(&Roller::thin(disc), &ground, &Vector3::zeros());
                 (
                     near,

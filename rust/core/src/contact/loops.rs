@@ -39,7 +39,7 @@ use crate::multibody::{
     Configuration, Factor, Inertias, Kinematics, LaneConfiguration, LoopGap, MassMatrix, Mechanism,
     Model, Poses,
 };
-use crate::scalar::{Lane, LaneMask, Single};
+use crate::scalar::{Lane, LaneMask, Single, inlined};
 
 /// Gap of a closed loop at the end of a step above which the step has not converged, m or rad.
 pub(crate) const MOST_OPEN: f64 = 1e-6;
@@ -303,10 +303,10 @@ impl<T: Lane> Loops<T> {
 
     /// The basis at the midpoint, once M̂ is factored, for `n` contacts.
     pub(crate) fn begin(&mut self, placed: &Placed<'_, T>, factor: &Factor<T>, n: usize) {
-        T::vectorize(
+        inlined!(
+            T::vectorize,
             self.token,
-            #[inline(always)]
-            || self.middle.update(&self.closures, placed, factor),
+            self.middle.update(&self.closures, placed, factor)
         );
         self.set_size(n);
     }
@@ -510,11 +510,7 @@ impl<T: Lane> Loops<T> {
         let mut moving = with.lanes;
         for iteration in 0..=most {
             self.poses.update(with.mechanism, with.inertias, q);
-            let gap = T::vectorize(
-                token,
-                #[inline(always)]
-                || self.look(with, q),
-            );
+            let gap = inlined!(T::vectorize, token, self.look(with, q));
             let is_stuck = (gap.like(0.5) * last).le(gap) & gap.lt(gap.like(MOST_OPEN));
             let is_closed = gap.le(gap.like(TIGHT)) | is_stuck;
             let may_stop = if iteration < self.least {
@@ -529,11 +525,7 @@ impl<T: Lane> Loops<T> {
                 break;
             }
             last = gap;
-            T::vectorize(
-                token,
-                #[inline(always)]
-                || self.approach(with, moving, q),
-            );
+            inlined!(T::vectorize, token, self.approach(with, moving, q));
         }
         left
     }

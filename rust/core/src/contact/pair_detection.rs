@@ -90,10 +90,7 @@ pub(crate) fn detect_pairs_of(
             lead if lead > 0.0 => lead * fastest_way(&part.place_at(model, (&R, &r)), body, motion),
             _ => 0.0,
         };
-        Sphere {
-            centre: r + R * part.centre(model) + shift,
-            radius: part.bound(model) + way,
-        }
+        Sphere::new(r + R * part.centre(model) + shift, part.bound(model) + way)
     }));
     let is_wanted = |i: usize, j: usize| can_touch(model, parts[i], parts[j]);
     for &(i, j) in sweep.pairs(balls, reach, is_wanted) {

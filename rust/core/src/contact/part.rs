@@ -224,10 +224,7 @@ impl Part {
             }
             Self::Collider(i) => place_collider(&model.colliders()[i], centre, R),
             Self::Wheel(_) | Self::Sphere(_) | Self::Limit(..) | Self::Friction(_) => {
-                PlacedShape::Sphere(Sphere {
-                    centre,
-                    radius: self.bound(model),
-                })
+                PlacedShape::Sphere(Sphere::new(centre, self.bound(model)))
             }
         }
     }

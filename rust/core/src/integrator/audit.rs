@@ -39,7 +39,7 @@ use super::local::Local;
 use super::systems::Systems;
 use super::work::Work;
 use super::yielding::find_tread_energies;
-use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::scalar::{Lane, LaneMask, Vec3, inlined};
 
 /// Finds the energies at the start of a step where they are not known.
 pub(crate) fn note_energies<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
@@ -63,30 +63,22 @@ pub(super) fn judge<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &S::Prob
     }
     find_energies_and_work(s, d);
     let token = d.token;
-    let is_corrected = S::run(
-        token,
-        #[inline(always)]
-        || {
-            let (is_lost, is_corrected) = audit(s, d, AuditLimits::USUAL, |_| S::T::mask(token, 0));
-            if is_corrected.any() {
-                correct(s, d, problems);
-            }
-            d.fall_back(Obstacle::Energy, is_lost);
-            is_corrected
-        },
-    );
+    let is_corrected = inlined!(S::run, token, {
+        let (is_lost, is_corrected) = audit(s, d, AuditLimits::USUAL, |_| S::T::mask(token, 0));
+        if is_corrected.any() {
+            correct(s, d, problems);
+        }
+        d.fall_back(Obstacle::Energy, is_lost);
+        is_corrected
+    });
     if is_corrected.any() {
         find_energies(s, d);
     }
-    S::run(
-        token,
-        #[inline(always)]
-        || {
-            for balance in &d.balances {
-                balance.report(&mut d.reports);
-            }
-        },
-    );
+    inlined!(S::run, token, {
+        for balance in &d.balances {
+            balance.report(&mut d.reports);
+        }
+    });
 }
 
 /// Energies at the end of the step, and the work of the systems' own forces.

@@ -1,7 +1,7 @@
 //! The dynamics of systems: configurations, poses, the mass matrix and its factor, closed loops.
 
 use super::options::StepOptions;
-use crate::scalar::{Lane, Vec3};
+use crate::scalar::{Lane, LaneMask, Vec3};
 
 /// Penetration that is tolerated by default, m, of a system without a size of its own.
 const TOLERATED: f64 = 1e-8;
@@ -57,13 +57,18 @@ pub trait Dynamics {
     /// `q ⊕= h v`.
     fn advance(&self, q: &mut Self::Configuration, v: &[Self::T], h: f64);
 
-    /// Takes the coordinates of each cluster from another configuration in the lanes of its mask.
+    /// Takes the coordinates of each cluster from another configuration in the lanes of its mask;
+    /// by default for one cluster in one lane.
     fn take(
         &self,
         lanes: impl Fn(usize) -> DynamicsMask<Self>,
         from: &Self::Configuration,
         to: &mut Self::Configuration,
-    );
+    ) {
+        if lanes(0).any() {
+            to.clone_from(from);
+        }
+    }
 
     /// Whether every entry of a configuration is finite.
     fn is_finite(&self, q: &Self::Configuration) -> DynamicsMask<Self>;

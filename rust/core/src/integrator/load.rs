@@ -11,7 +11,7 @@ use super::dynamics::Dynamics;
 use super::forces::{Forces, StepStart};
 use super::systems::Systems;
 use super::yielding::add_shifts;
-use crate::scalar::{Lane, LaneMask};
+use crate::scalar::{Lane, LaneMask, inlined};
 
 /// The free change of the velocity, `d.y` in factor coordinates, and the contacts' free velocity
 /// `d.u`: first with the forces at v, then with those at the mean velocity that follows from them
@@ -20,19 +20,15 @@ pub(super) fn load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     let persists = d.any(&d.persists);
     let is_any = (persists & d.going).any();
     if is_any {
-        S::run(
+        inlined!(
+            S::run,
             d.token,
-            #[inline(always)]
-            || s.generalized_impulse(persists, &d.p_last, &mut d.pushed),
+            s.generalized_impulse(persists, &d.p_last, &mut d.pushed)
         );
     }
     let start = StepStart::at(&d.start, &d.v[..]);
     (s.machine_mut()).begin_load(&d.options, start, &mut d.y);
-    S::run(
-        d.token,
-        #[inline(always)]
-        || find_mean(s, d, is_any),
-    );
+    inlined!(S::run, d.token, find_mean(s, d, is_any));
     if d.is_any_implicit() {
         let start = StepStart::at(&d.start, &d.v[..]);
         let (v_mean, foreseen) = (&d.v_mean, &d.foreseen);
@@ -45,22 +41,14 @@ pub(super) fn load<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
         (s.machine_mut()).load(&d.options, start, &d.v_mean, &mut d.y);
         correct(s, d, is_any);
     }
-    S::run(
-        d.token,
-        #[inline(always)]
-        || finish_load(s, d),
-    );
+    inlined!(S::run, d.token, finish_load(s, d));
 }
 
 /// What the impulse `d.y` has besides the forces at the mean velocity.
 #[inline(always)]
 fn correct<S: Systems>(s: &mut S, d: &mut DataOf<S>, is_any: bool) {
     s.machine().add_given(&d.options, &mut d.y);
-    S::run(
-        d.token,
-        #[inline(always)]
-        || correct_impulse(s, d, is_any),
-    );
+    inlined!(S::run, d.token, correct_impulse(s, d, is_any));
 }
 
 /// The mean velocity that follows from the forces at v and the impulses that persist. With implicit

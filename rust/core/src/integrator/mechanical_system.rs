@@ -168,47 +168,26 @@ pub trait MechanicalSystem {
     }
 
     /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c),
-    /// m/s, out, as [`solve`] takes them.
+    /// m/s, out, as [`solve`] takes them. `free`: the velocity (nv) to which the step without
+    /// contacts leads is `v + F⁻¹ y` (y in factor coordinates); none where positions are projected.
     ///
-    /// A system of very many bodies overrides this with a method that needs no W.
+    /// A system of very many bodies overrides this with a method that needs no W. A system whose
+    /// contacts bear more than an impulse, such as moments of rolling friction, finds these here
+    /// and keeps them for [`Self::add_moments`].
     fn solve(
-        &self,
-        q: &[f64],
-        mu: &[f64],
+        &mut self,
+        _free: Option<(&[f64], &[f64])>,
+        (q, mu): (&[f64], &[f64]),
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        (p, u): (&mut [f64], &mut [f64]),
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
         solve(&self.problem(q, mu), options, p, u, workspace)
     }
 
-    /// Solves the problem of the step that leads to the velocity `v + F⁻¹ y` without contacts
-    /// (`v`, nv; y in factor coordinates), as [`Self::solve`] does.
-    ///
-    /// A system whose contacts bear more than an impulse, such as moments of rolling friction,
-    /// finds these here and keeps them for [`Self::add_moments`].
-    fn solve_step(
-        &mut self,
-        _free: (&[f64], &[f64]),
-        (q, mu): (&[f64], &[f64]),
-        options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
-        workspace: &mut SolverWorkspace,
-    ) -> SolveReport {
-        self.solve(q, mu, options, p, u, workspace)
-    }
-
-    /// The step's problem, if its impulses are settled where the motion leaves some open: that of
-    /// few contacts with a dense W. By default they stay as the solver finds them.
-    fn open_problem<'a>(
-        &'a self,
-        _q: &'a [f64],
-        _mu: &'a [f64],
-    ) -> Option<FrictionContactProblem<'a>> {
-        None
-    }
+    /// Whether the impulses of a step are settled where the motion leaves some open: those of few
+    /// contacts with a dense W. By default they stay as the solver finds them.
+    const SETTLES: bool = false;
 
     /// Called before the iterations of a Newton variant: stores what [`Self::residual`] needs of
     /// the start. By default nothing.
@@ -227,7 +206,7 @@ pub trait MechanicalSystem {
         (self.machine_mut()).balance(options, start, v_end, v_mean, scratch, impulse);
     }
 
-    /// `y +=` the effect of what [`Self::solve_step`] found besides p. By default there is nothing.
+    /// `y +=` the effect of what [`Self::solve`] found besides p. By default there is nothing.
     fn add_moments(&self, _y: &mut [f64]) {}
 
     /// What a unit of a contact's gap counts as where it is compared with lengths, m: of a stop, in

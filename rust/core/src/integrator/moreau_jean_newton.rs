@@ -193,9 +193,7 @@ fn settle<S: MechanicalSystem>(
         s.list.leaves_open = !will_end && iteration + 2 < options.newton_max_iterations;
         last_change = change;
         if is_small || is_rounding {
-            let q = Local::flat(&problems.q);
-            let is_open = left_open && s.system.open_problem(q, &s.list.mu).is_some();
-            if is_open && iteration + 1 < options.newton_max_iterations {
+            if left_open && S::SETTLES && iteration + 1 < options.newton_max_iterations {
                 s.list.leaves_open = false;
                 continue;
             }
@@ -221,10 +219,7 @@ fn begin_iteration<S: MechanicalSystem>(s: &mut Listed<'_, S>, d: &mut ListedDat
     d.shares.clear();
     d.is_gyroscopic.fill(false);
     s.machine_mut().choose_branches(&d.v);
-    s.system.begin_residual(StepStart {
-        configuration: &d.start,
-        v: &d.v,
-    });
+    s.system.begin_residual(StepStart::at(&d.start, &d.v));
     d.v_end.copy_from_slice(&d.v);
 }
 
@@ -273,10 +268,7 @@ fn iterate<S: MechanicalSystem>(
     probe.end(Phase::Detection);
     s.machine_mut().update_mass_matrix(options, true, true);
     probe.end(Phase::MassMatrix);
-    let start = StepStart {
-        configuration: &d.start,
-        v: &d.v,
-    };
+    let start = StepStart::at(&d.start, &d.v);
     let (v_end, v_mean) = (&d.v_end, &d.v_mean);
     (s.system).residual(options, start, v_end, v_mean, &mut d.foreseen, &mut d.y);
     probe.end(Phase::Bias);

@@ -21,7 +21,7 @@ use super::forces::{Forces, StepStart};
 use super::grouped::Grouped;
 use super::local::Local;
 use super::systems::{MaskOf, Systems};
-use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::scalar::{Lane, LaneMask, Vec3, inlined};
 
 /// Largest displacement, as a multiple of the deepest penetration; the rest is left to the next
 /// steps.
@@ -86,20 +86,16 @@ fn gap_at_end<S: Systems>(s: &S, d: &DataOf<S>, place: usize) -> S::T {
 
 /// Turns the problems into those of the position projection; none where nothing penetrates.
 pub(crate) fn set_gaps<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &mut S::Problems) {
-    S::run(
-        d.token,
-        #[inline(always)]
-        || {
-            let zero = d.number(0.0);
-            for place in s.contacts().used() {
-                let mut gap = S::Local::splat(zero);
-                gap[0] = gap_at_end(s, d, place);
-                d.gaps[place] = gap;
-                d.pushes[place] = S::Local::splat(zero);
-            }
-            s.pose_gaps(&d.gaps, &d.is_deep, &mut d.pushes, problems);
-        },
-    );
+    inlined!(S::run, d.token, {
+        let zero = d.number(0.0);
+        for place in s.contacts().used() {
+            let mut gap = S::Local::splat(zero);
+            gap[0] = gap_at_end(s, d, place);
+            d.gaps[place] = gap;
+            d.pushes[place] = S::Local::splat(zero);
+        }
+        s.pose_gaps(&d.gaps, &d.is_deep, &mut d.pushes, problems);
+    });
 }
 
 /// Moves the penetrating lanes by the displacement that the problems found.
@@ -120,11 +116,7 @@ pub(super) fn project<S: Systems>(s: &mut S, d: &mut DataOf<S>, problems: &mut S
     let stored = &mut d.energies.stored[0];
     stored.fill(S::T::splat(d.token, 0.0));
     s.machine().stored(&d.end, stored);
-    S::run(
-        d.token,
-        #[inline(always)]
-        || displace(s, d, problems),
-    );
+    inlined!(S::run, d.token, displace(s, d, problems));
     close_moved(s, d, d.any(&d.is_deep) & d.going);
     carry_velocity(s, d);
 }
@@ -212,11 +204,7 @@ pub(super) fn carry_velocity<S: Systems>(s: &mut S, d: &mut DataOf<S>) {
     let work = (s.machine_mut()).work_of_displacement(&d.options, start, &d.v_end, &d.y);
     let work = work.unwrap_or(d.number(0.0));
     find_projected_energies(s, d);
-    S::run(
-        d.token,
-        #[inline(always)]
-        || scale_carried(s, d),
-    );
+    inlined!(S::run, d.token, scale_carried(s, d));
     let zero = d.number(0.0);
     let own = &mut d.energies;
     let lifted = &mut own.lifted;

@@ -43,7 +43,7 @@ use super::projection::{measure, project};
 use super::report::StepReport;
 use super::systems::Systems;
 use super::yielding::{forget_bounces, remove_shifts, yield_under_load};
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, inlined};
 
 /// What follows `conclude`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,11 +67,7 @@ pub(crate) fn prepare<S: Systems>(
     d.obstacles = [None; MAX_LANES];
     d.n_retaken = [0; MAX_LANES];
     d.shares.clear();
-    S::run(
-        d.token,
-        #[inline(always)]
-        || predict(s, d),
-    );
+    inlined!(S::run, d.token, predict(s, d));
     s.machine_mut().place_middle(&d.middle);
     s.machine_mut().place_end(&d.end);
     probe.end(Phase::Kinematics);
@@ -126,11 +122,7 @@ pub(crate) fn set_up<S: Systems>(
 ) {
     let machine = s.machine_mut();
     if is_first {
-        S::run(
-            d.token,
-            #[inline(always)]
-            || machine.choose_branches(&d.v),
-        );
+        inlined!(S::run, d.token, machine.choose_branches(&d.v));
     }
     machine.update_mass_matrix(&d.options, d.going, is_first);
     probe.end(Phase::MassMatrix);
@@ -139,14 +131,10 @@ pub(crate) fn set_up<S: Systems>(
     probe.end(Phase::Factor);
     s.assemble(&d.v);
     if is_first || S::RELISTS {
-        S::run(
-            d.token,
-            #[inline(always)]
-            || {
-                s.read_start(problems, &mut d.p_last);
-                yield_under_load(s, d, false);
-            },
-        );
+        inlined!(S::run, d.token, {
+            s.read_start(problems, &mut d.p_last);
+            yield_under_load(s, d, false);
+        });
     }
     if s.yields() {
         s.soften(&d.laws);
@@ -179,11 +167,7 @@ pub(crate) fn conclude<S: Systems>(
     judge(s, d, problems);
     probe.end(Phase::Update);
     let is_deep = d.options.stabilisation == Stabilisation::Projection
-        && S::run(
-            d.token,
-            #[inline(always)]
-            || measure(s, d),
-        );
+        && inlined!(S::run, d.token, measure(s, d));
     if is_deep { Next::Project } else { Next::Finish }
 }
 
@@ -207,11 +191,7 @@ pub(super) fn take_answers<S: Systems>(
     let solved = s.take_answers(&d.options, d.going, problems, reports, memories);
     forget_bounces(s, d);
     d.fall_back(Obstacle::Solver, !solved);
-    S::run(
-        d.token,
-        #[inline(always)]
-        || move_on(s, d, problems),
-    );
+    inlined!(S::run, d.token, move_on(s, d, problems));
     close_end(s, d, d.going);
     s.machine().may_revise() && revise(s, d, problems, probe)
 }
@@ -298,11 +278,7 @@ pub(crate) fn finish<S: Systems>(
         project(s, d, problems);
     }
     probe.end(Phase::Projection);
-    S::run(
-        d.token,
-        #[inline(always)]
-        || accept(s, d),
-    );
+    inlined!(S::run, d.token, accept(s, d));
     let going = d.going.bits();
     for lane in 0..S::T::LANES {
         if going >> lane & 1 == 1 {

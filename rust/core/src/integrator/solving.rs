@@ -125,13 +125,11 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         let Posed { q, p, u, .. } = problems;
         let q = Local::flat(q);
         let (p, u) = (Local::flat_mut(p), Local::flat_mut(u));
-        let mut solved =
-            (self.system).solve_step(free, (q, &list.mu), &options, p, u, &mut list.solver);
+        let (data, answer) = ((q, &list.mu[..]), (&mut *p, &mut *u));
+        let mut solved = (self.system).solve(Some(free), data, &options, answer, &mut list.solver);
         list.work_spent += solved.work;
-        if solved.is_converged()
-            && !list.leaves_open
-            && let Some(problem) = self.system.open_problem(q, &list.mu)
-        {
+        if solved.is_converged() && !list.leaves_open && S::SETTLES {
+            let problem = self.system.problem(q, &list.mu);
             let tolerance = self.options.solver.tolerance;
             settle(
                 &mut list.redundancy,
@@ -173,9 +171,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
             Level::Velocity => 0.0,
             Level::Position(compliance) => compliance,
         };
-        let is_settled = matches!(level, Level::Velocity)
-            && !list.leaves_open
-            && self.system.open_problem(q, &list.mu).is_some();
+        let is_settled = matches!(level, Level::Velocity) && !list.leaves_open && S::SETTLES;
         let redundancy = is_settled.then_some(&mut list.redundancy);
         let report = list.island.solve(
             &problem,
@@ -286,8 +282,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
             let softer = FrictionContactProblem::from_assembled(S::DIMENSION, &W, q, &list.mu);
             solve(&softer, &options, p, u, &mut list.solver)
         } else {
-            self.system
-                .solve(q, &list.mu, &options, p, u, &mut list.solver)
+            (self.system).solve(None, (q, &list.mu), &options, (p, u), &mut list.solver)
         };
         list.work_spent += solved.work;
         solved

@@ -9,7 +9,7 @@ use super::inertias::{Inertia, Inertias};
 use super::joint::{Joint, JointModel, Motion, Screw, free};
 use super::mechanism::{BASE, Link, Mechanism};
 use super::poses::{Pose, Poses};
-use crate::scalar::{Lane, Vec3};
+use crate::scalar::{Lane, Vec3, inlined};
 
 /// Scratch of the bias.
 #[derive(Clone, Debug)]
@@ -57,69 +57,65 @@ pub fn bias<T: Lane>(
     scratch: &mut BiasScratch<T>,
     out: &mut [T],
 ) {
-    T::vectorize(
-        scratch.token,
-        #[inline(always)]
-        || {
-            let n = mechanism.links.len();
-            let (links, inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
-            let motions = &poses.motions[..mechanism.n_motions()];
-            let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
-            let world = Moved::at_rest(-gravity);
-            for tree in &mechanism.trees {
-                let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
-                moved[root] = if tree.is_free {
-                    let v = &v[tree.velocities.start..][..BASE];
-                    Moved {
-                        omega: free::velocity(v).axis,
-                        ..world
-                    }
+    inlined!(T::vectorize, scratch.token, {
+        let n = mechanism.links.len();
+        let (links, inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
+        let motions = &poses.motions[..mechanism.n_motions()];
+        let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
+        let world = Moved::at_rest(-gravity);
+        for tree in &mechanism.trees {
+            let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
+            moved[root] = if tree.is_free {
+                let v = &v[tree.velocities.start..][..BASE];
+                Moved {
+                    omega: free::velocity(v).axis,
+                    ..world
+                }
+            } else {
+                world.carry_root(&links[root], motions, poses[root].lever, v)
+            };
+            moved[root].load(&links[root], &inertias[root], &poses[root]);
+            for b in root + 1..end {
+                let (before, own) = moved.split_at_mut(b);
+                let (link, pose) = (&links[b], &poses[b]);
+                let carrier = &mut before[link.parent];
+                let mut body = if let Joint::Revolute(joint) = &link.joint {
+                    carrier.carry(joint, link, motions, pose.lever, v)
                 } else {
-                    world.carry_root(&links[root], motions, poses[root].lever, v)
+                    carrier.carry(&link.joint, link, motions, pose.lever, v)
                 };
-                moved[root].load(&links[root], &inertias[root], &poses[root]);
-                for b in root + 1..end {
-                    let (before, own) = moved.split_at_mut(b);
-                    let (link, pose) = (&links[b], &poses[b]);
-                    let carrier = &mut before[link.parent];
-                    let mut body = if let Joint::Revolute(joint) = &link.joint {
-                        carrier.carry(joint, link, motions, pose.lever, v)
-                    } else {
-                        carrier.carry(&link.joint, link, motions, pose.lever, v)
-                    };
-                    body.load(link, &inertias[b], pose);
-                    if link.is_plain_leaf {
-                        body.share(link, motions, |k, x| out[k] = x);
-                        body.rest_on(carrier, pose);
-                    } else {
-                        own[0] = body;
-                    }
-                }
-                for b in (root + 1..end).rev() {
-                    let link = &links[b];
-                    if link.is_plain_leaf {
-                        continue;
-                    }
-                    let (before, own) = moved.split_at_mut(b);
-                    own[0].rest_on(&mut before[link.parent], &poses[b]);
-                    if !link.is_coupled() {
-                        own[0].share(link, motions, |k, x| out[k] = x);
-                    }
-                }
-                let Moved { force, moment, .. } = moved[root];
-                if tree.is_free {
-                    let own = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-                    out[tree.velocities.start..][..BASE].copy_from_slice(&own);
+                body.load(link, &inertias[b], pose);
+                if link.is_plain_leaf {
+                    body.share(link, motions, |k, x| out[k] = x);
+                    body.rest_on(carrier, pose);
                 } else {
-                    moved[root].share(&links[root], motions, |k, x| out[k] = x);
+                    own[0] = body;
                 }
             }
-            // A coupled joint adds to the joint that it follows.
-            for &b in &mechanism.coupled {
-                moved[b].share(&links[b], motions, |k, x| out[k] += x);
+            for b in (root + 1..end).rev() {
+                let link = &links[b];
+                if link.is_plain_leaf {
+                    continue;
+                }
+                let (before, own) = moved.split_at_mut(b);
+                own[0].rest_on(&mut before[link.parent], &poses[b]);
+                if !link.is_coupled() {
+                    own[0].share(link, motions, |k, x| out[k] = x);
+                }
             }
-        },
-    );
+            let Moved { force, moment, .. } = moved[root];
+            if tree.is_free {
+                let own = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+                out[tree.velocities.start..][..BASE].copy_from_slice(&own);
+            } else {
+                moved[root].share(&links[root], motions, |k, x| out[k] = x);
+            }
+        }
+        // A coupled joint adds to the joint that it follows.
+        for &b in &mechanism.coupled {
+            moved[b].share(&links[b], motions, |k, x| out[k] += x);
+        }
+    });
 }
 
 impl<T: Lane> Moved<T> {

@@ -18,7 +18,12 @@ use super::state::{Configuration, components, rotation_of};
 use crate::scalar::elementary::sin_cos;
 use crate::spatial::{CardanReport, HeadingPitchRoll};
 
-fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), StateError> {
+/// Checks that there are `expected` finite entries.
+pub(crate) fn check(
+    field: &'static str,
+    values: &[f64],
+    expected: usize,
+) -> Result<(), StateError> {
     if values.len() != expected {
         return Err(StateError::Length {
             field,

@@ -37,7 +37,7 @@ use super::joint::{Joint, JointModel, Motion};
 use super::mechanism::{BASE, Mechanism};
 use super::path_matrix::PathMatrix;
 use super::poses::Poses;
-use crate::scalar::{Lane, Mat3, Vec3};
+use crate::scalar::{Lane, Mat3, Vec3, inlined};
 
 /// Scratch of [`coriolis_matrix`].
 #[derive(Clone, Debug)]
@@ -86,14 +86,10 @@ pub(crate) fn coriolis_matrix<T: Lane>(
     scratch: &mut CoriolisScratch<T>,
     (C, G): (&mut PathMatrix<T>, &mut [T]),
 ) {
-    T::vectorize(
-        scratch.token,
-        #[inline(always)]
-        || {
-            scratch.find_rates(mechanism, poses, v);
-            scratch.multiply(mechanism, (inertias, poses), gravity, (C, G));
-        },
-    );
+    inlined!(T::vectorize, scratch.token, {
+        scratch.find_rates(mechanism, poses, v);
+        scratch.multiply(mechanism, (inertias, poses), gravity, (C, G));
+    });
 }
 
 impl<T: Lane> CoriolisScratch<T> {

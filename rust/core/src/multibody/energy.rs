@@ -5,7 +5,7 @@ use super::joint::{Free, Joint, JointModel, JointPlacement, Motion, free};
 use super::lane_configuration::LaneConfiguration;
 use super::mechanism::{BASE, Link, Mechanism};
 use super::poses::{JointAngles, NextAngle};
-use crate::scalar::{Lane, Mat3, Vec3};
+use crate::scalar::{Lane, Mat3, Vec3, inlined};
 
 /// Kinetic and potential energy, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -147,61 +147,56 @@ pub fn energies<'a, T: Lane>(
     scratch: &'a mut EnergyScratch<T>,
 ) -> &'a [EnergyOfCluster<T>] {
     let token = scratch.token;
-    T::vectorize(
-        token,
-        #[inline(always)]
-        || {
-            let n = mechanism.links.len();
-            let (links, own_inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
-            let bodies = &mut scratch.bodies[..n];
-            let world = Moving::of_world(scratch.token);
-            let mut angles = scratch.angles.of(mechanism, q);
-            let zero = T::splat(scratch.token, 0.0);
-            scratch.sums.fill(Sums::new(scratch.token));
-            for (tree, &mass) in mechanism.trees.iter().zip(&inertias.trees) {
-                let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
-                let mut sums = scratch.sums[tree.cluster];
-                bodies[root] = if tree.is_free {
-                    let free = Free { pose: tree.pose };
-                    sums.fall += gravity.dot(*q.pose(tree.pose).0) * mass;
-                    let Motion { axis, swing } =
-                        free::velocity(&v[tree.velocities.start..][..BASE]);
-                    Moving {
-                        R: free.place(&world.R, q, || None).R,
-                        velocity: swing,
-                        omega: axis,
-                        fall: zero,
-                    }
-                } else {
-                    world.carry_root(&links[root], (q, v, gravity), &mut angles)
-                };
-                sums.add(&links[root], &own_inertias[root], &bodies[root], gravity);
-                for b in root + 1..end {
-                    let (before, own) = bodies.split_at_mut(b);
-                    let link = &links[b];
-                    let carrier = &before[link.parent];
-                    let state = (q, v, gravity);
-                    let body = if let Joint::Revolute(joint) = &link.joint {
-                        carrier.carry(joint, link, state, &mut angles)
-                    } else {
-                        carrier.carry(&link.joint, link, state, &mut angles)
-                    };
-                    sums.add(link, &own_inertias[b], &body, gravity);
-                    if !link.is_leaf {
-                        own[0] = body;
-                    }
+    inlined!(T::vectorize, token, {
+        let n = mechanism.links.len();
+        let (links, own_inertias) = (&mechanism.links[..n], &inertias.bodies[..n]);
+        let bodies = &mut scratch.bodies[..n];
+        let world = Moving::of_world(scratch.token);
+        let mut angles = scratch.angles.of(mechanism, q);
+        let zero = T::splat(scratch.token, 0.0);
+        scratch.sums.fill(Sums::new(scratch.token));
+        for (tree, &mass) in mechanism.trees.iter().zip(&inertias.trees) {
+            let (root, end) = (tree.bodies.start, tree.bodies.end.min(n)); // below n: no checks
+            let mut sums = scratch.sums[tree.cluster];
+            bodies[root] = if tree.is_free {
+                let free = Free { pose: tree.pose };
+                sums.fall += gravity.dot(*q.pose(tree.pose).0) * mass;
+                let Motion { axis, swing } = free::velocity(&v[tree.velocities.start..][..BASE]);
+                Moving {
+                    R: free.place(&world.R, q, || None).R,
+                    velocity: swing,
+                    omega: axis,
+                    fall: zero,
                 }
-                scratch.sums[tree.cluster] = sums;
+            } else {
+                world.carry_root(&links[root], (q, v, gravity), &mut angles)
+            };
+            sums.add(&links[root], &own_inertias[root], &bodies[root], gravity);
+            for b in root + 1..end {
+                let (before, own) = bodies.split_at_mut(b);
+                let link = &links[b];
+                let carrier = &before[link.parent];
+                let state = (q, v, gravity);
+                let body = if let Joint::Revolute(joint) = &link.joint {
+                    carrier.carry(joint, link, state, &mut angles)
+                } else {
+                    carrier.carry(&link.joint, link, state, &mut angles)
+                };
+                sums.add(link, &own_inertias[b], &body, gravity);
+                if !link.is_leaf {
+                    own[0] = body;
+                }
             }
-            for (&joint, &inertia) in mechanism.rotors.iter().zip(&inertias.rotors) {
-                let own = &mechanism.joints[joint];
-                let rate = v[own.velocity];
-                scratch.sums[own.cluster].twice_kinetic += inertia * (rate * rate);
-            }
-            scratch.found.clear();
-            scratch.found.extend(scratch.sums.iter().map(Sums::energy));
-        },
-    );
+            scratch.sums[tree.cluster] = sums;
+        }
+        for (&joint, &inertia) in mechanism.rotors.iter().zip(&inertias.rotors) {
+            let own = &mechanism.joints[joint];
+            let rate = v[own.velocity];
+            scratch.sums[own.cluster].twice_kinetic += inertia * (rate * rate);
+        }
+        scratch.found.clear();
+        scratch.found.extend(scratch.sums.iter().map(Sums::energy));
+    });
     &scratch.found
 }
 

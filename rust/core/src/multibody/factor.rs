@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::composite::BLOCK;
 use super::mechanism::{BASE, Mechanism, TreeSpan};
-use crate::scalar::Lane;
+use crate::scalar::{Lane, inlined};
 
 /// A symmetric matrix or its factor along the paths of a mechanism; see
 /// [`super::mass_matrix`].
@@ -135,11 +135,7 @@ impl<T: Lane> Factor<T> {
         let mut is_positive = T::mask(token, u32::MAX >> (32 - T::LANES));
         for t in 0..mechanism.trees.len() {
             // The loop is out here: in the closure, registers are moved in circles.
-            let of_tree = T::vectorize(
-                token,
-                #[inline(always)]
-                || self.update_tree(mechanism, t),
-            );
+            let of_tree = inlined!(T::vectorize, token, self.update_tree(mechanism, t));
             is_positive = is_positive & of_tree;
         }
         is_positive

@@ -20,7 +20,7 @@ use super::inertias::Inertias;
 use super::mechanism::{Mechanism, TreeSpan};
 use super::path_matrix::{PathMatrix, product};
 use super::poses::Poses;
-use crate::scalar::Lane;
+use crate::scalar::{Lane, inlined};
 
 /// The mass matrix; kg, kg m, kg m².
 #[derive(Clone, Debug)]
@@ -50,10 +50,10 @@ impl<T: Lane> MassMatrix<T> {
     /// # Panics
     /// If an argument is of another mechanism.
     pub fn update(&mut self, mechanism: &Mechanism, inertias: &Inertias<T>, poses: &Poses<T>) {
-        T::vectorize(
+        inlined!(
+            T::vectorize,
             self.token,
-            #[inline(always)]
-            || self.update_here(mechanism, inertias, poses),
+            self.update_here(mechanism, inertias, poses)
         );
     }
 

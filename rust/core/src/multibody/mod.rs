@@ -73,7 +73,7 @@ pub use description::{
     SolidDescription, Spring, TagDescription, TrackDescription, WheelDescription,
 };
 pub use energy::{Energy, EnergyScratch};
-pub use error::{ModelError, StateError};
+pub use error::{ModelError, ModelFault, StateError};
 pub use factor::Factor;
 pub use inertias::Inertias;
 pub use joint::{FreePose, Joint, JointAxis, JointModel, Motion};

@@ -16,6 +16,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::description::check_values::within;
 use super::error::ModelError;
 use crate::scalar::{Lane, LaneMask, Single};
 
@@ -57,22 +58,17 @@ impl Motor {
     /// # Errors
     /// The first number out of its range.
     pub fn check(&self, at: impl Fn(&str) -> String) -> Result<(), ModelError> {
-        if !TORQUES.contains(&self.stall_torque) {
-            return Err(ModelError::OutOfRange {
-                field: at("stall_torque"),
-                range: "from 1e-9 to 1e9 N m",
-                value: self.stall_torque,
-            });
-        }
-        let speed = self.no_load_speed;
-        if !(SPEEDS.contains(&speed) || speed.is_infinite() && speed > 0.0) {
-            return Err(ModelError::OutOfRange {
-                field: at("no_load_speed"),
-                range: "from 1e-6 to 1e9 rad/s, or infinite",
-                value: speed,
-            });
-        }
-        Ok(())
+        let (torque, speed) = (self.stall_torque, self.no_load_speed);
+        let range = "from 1e-9 to 1e9 N m";
+        within(
+            TORQUES.contains(&torque),
+            &at("stall_torque"),
+            torque,
+            range,
+        )?;
+        let is_within = SPEEDS.contains(&speed) || speed.is_infinite() && speed > 0.0;
+        let range = "from 1e-6 to 1e9 rad/s, or infinite";
+        within(is_within, &at("no_load_speed"), speed, range)
     }
 
     /// Slope of the line, N m s/rad.

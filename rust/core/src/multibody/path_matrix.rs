@@ -7,7 +7,7 @@
 
 use super::factor::{PathFactor, split_base, subtract};
 use super::mechanism::{BASE, Mechanism};
-use crate::scalar::Lane;
+use crate::scalar::{Lane, inlined};
 
 /// A matrix (nv, nv) without entries between velocities of which none moves the other's body.
 #[derive(Clone, Debug)]
@@ -82,11 +82,7 @@ impl<T: Lane> PathMatrix<T> {
         mut each: impl FnMut(usize, T::Mask),
     ) {
         for (t, tree) in mechanism.trees.iter().enumerate() {
-            let of_tree = T::vectorize(
-                token,
-                #[inline(always)]
-                || self.solve_tree(mechanism, t, b),
-            );
+            let of_tree = inlined!(T::vectorize, token, self.solve_tree(mechanism, t, b));
             each(tree.cluster, of_tree);
         }
     }

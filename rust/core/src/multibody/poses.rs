@@ -9,7 +9,7 @@ use super::joint::{Free, Joint, JointModel, JointPlacement, Motion};
 use super::lane_configuration::LaneConfiguration;
 use super::mechanism::{Link, Mechanism};
 use crate::scalar::elementary::{sin_cos, sines_cosines};
-use crate::scalar::{Lane, Mat3, Vec3};
+use crate::scalar::{Lane, Mat3, Vec3, inlined};
 
 /// Poses of all bodies.
 #[derive(Clone, Debug)]
@@ -92,10 +92,10 @@ impl<T: Lane> Poses<T> {
         inertias: &Inertias<T>,
         q: &LaneConfiguration<T>,
     ) {
-        T::vectorize(
+        inlined!(
+            T::vectorize,
             self.token,
-            #[inline(always)]
-            || self.update_here(mechanism, inertias, q),
+            self.update_here(mechanism, inertias, q)
         );
     }
 

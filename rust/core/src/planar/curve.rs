@@ -19,26 +19,17 @@ use nalgebra::Vector2;
 use super::error::PlanarError;
 use super::ground::{MAX_FACING, PlanarFacing, PlanarGround};
 use crate::geometry::Support;
-use crate::quantity::{AdmissibleRange, PLACES, QuantityError, finite, within};
+use crate::quantity::{AdmissibleRange, Demand, PLACES, QuantityError, finite, within};
 use crate::scalar::elementary::{hypot, sin_cos};
 
 /// Slopes, m/m.
-const SLOPES: AdmissibleRange = AdmissibleRange {
-    ends: [-1e3, 1e3],
-    words: "at most 1000 either way",
-};
+const SLOPES: AdmissibleRange = AdmissibleRange::new([-1e3, 1e3], "at most 1000 either way");
 
 /// Wavelengths, m: shorter ones are mere roughness to a disc.
-const WAVELENGTHS: AdmissibleRange = AdmissibleRange {
-    ends: [1e-3, 1e9],
-    words: "from 1e-3 to 1e9 m",
-};
+const WAVELENGTHS: AdmissibleRange = AdmissibleRange::new([1e-3, 1e9], "from 1e-3 to 1e9 m");
 
 /// Phases, rad.
-const PHASES: AdmissibleRange = AdmissibleRange {
-    ends: [-1e6, 1e6],
-    words: "at most 1e6 rad either way",
-};
+const PHASES: AdmissibleRange = AdmissibleRange::new([-1e6, 1e6], "at most 1e6 rad either way");
 
 /// Most points of a curve.
 pub const MAX_POINTS: usize = 2_000_000;
@@ -146,12 +137,8 @@ impl Sine {
         let steepest = SLOPES.ends[1] / k;
         within(|| "amplitude".to_owned(), amplitude, PLACES)?;
         if amplitude.abs() > steepest {
-            return Err(QuantityError::OutOfRange {
-                field: "amplitude".to_owned(),
-                range: "at most 1000/2π of the wavelength either way",
-                value: amplitude,
-            }
-            .into());
+            let range = Demand::Within("at most 1000/2π of the wavelength either way");
+            return Err(QuantityError::new("amplitude", range, amplitude).into());
         }
         Ok(Self {
             amplitude,

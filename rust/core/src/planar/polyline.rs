@@ -6,7 +6,7 @@ use super::curve::{check_points, keep_nearest};
 use super::error::PlanarError;
 use super::ground::{PlanarFacing, PlanarGround, keep_few, keep_if};
 use crate::geometry::Support;
-use crate::quantity::{PLACES, QuantityError, within};
+use crate::quantity::{Demand, PLACES, QuantityError, within};
 use crate::scalar::elementary::hypot;
 
 /// Straight pieces between points, continued beyond the ends with the slope
@@ -54,11 +54,7 @@ impl Polyline {
         within(|| "x".to_owned(), x, PLACES)?;
         within(|| "height".to_owned(), height, PLACES)?;
         if height.abs() <= 0.0 {
-            return Err(QuantityError::NotPositive {
-                field: "height".to_owned(),
-                value: height,
-            }
-            .into());
+            return Err(QuantityError::new("height", Demand::Positive, height).into());
         }
         Self::new(&[x - 1.0, x, x, x + 1.0], &[0.0, 0.0, height, height])
     }

@@ -327,10 +327,7 @@ impl Differentiator {
         let directions = self.directions(state, parameters, &numbers);
         let (nv, nx) = (self.nv(), state.len());
         let sim = &mut self.sim;
-        let start = StepStart {
-            configuration: &begin,
-            v: &v,
-        };
+        let start = StepStart::at(&begin, &v);
         let (command, memory) = (&sim.command, &mut sim.memory);
         let mut system = (sim.scene).system(&sim.options, command, memory, &mut sim.parts);
         let held = system.hold(&sim.options, start, &sim.scratch, &numbers);

@@ -16,6 +16,7 @@ use crate::quantity::finite;
 use crate::solver::{SolverOptions, Swept};
 use crate::spatial::space::body_velocities;
 use crate::system::grains::contact::WALL;
+use crate::system::grains::error::check_length;
 use crate::system::grains::{
     self, COORDINATES, GrainContact, GrainError, GrainParts, GrainScene, GrainSystem, Grains,
     Moments, Renumbering, Sleep, SleepOptions,
@@ -291,13 +292,7 @@ where
     /// As [`Self::new`]; nothing is changed then.
     pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), GrainError> {
         self.description().check_configuration(q)?;
-        if v.len() != self.description().nv() {
-            return Err(GrainError::Length {
-                field: "velocity",
-                expected: self.description().nv(),
-                count: v.len(),
-            });
-        }
+        check_length("velocity", self.description().nv(), v.len())?;
         let width = body_velocities(D);
         let description = self.description();
         description.check_finite("velocity", "machine_rate", v, width)?;
@@ -314,13 +309,7 @@ where
     /// A wrong number of marks, or no grain left. Nothing is changed then.
     pub fn remove(&mut self, marked: &[bool]) -> Result<(), GrainError> {
         let n = self.description().grains.len();
-        if marked.len() != n {
-            return Err(GrainError::Length {
-                field: "which",
-                expected: n,
-                count: marked.len(),
-            });
-        }
+        check_length("which", n, marked.len())?;
         let renumbering = Renumbering::without(marked);
         let grains = self.description().grains.without(&renumbering)?;
         let q = renumbering.keep(&self.state.configuration, COORDINATES);
@@ -355,13 +344,7 @@ where
             ("velocity", body_velocities(D) * n, v.len()),
             ("before", n, before.len()),
         ] {
-            if count != expected {
-                return Err(GrainError::Length {
-                    field,
-                    expected,
-                    count,
-                });
-            }
+            check_length(field, expected, count)?;
         }
         for (field, values, width) in [
             ("position", q, COORDINATES),
@@ -417,13 +400,7 @@ where
     /// Wrong length or an entry that is not finite; nothing is changed then.
     pub fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), GrainError> {
         let own = &mut self.command.torques;
-        if inputs.len() != own.len() {
-            return Err(GrainError::Length {
-                field: "torques",
-                expected: own.len(),
-                count: inputs.len(),
-            });
-        }
+        check_length("torques", own.len(), inputs.len())?;
         for (k, value) in inputs.iter().enumerate() {
             finite(&format!("torques[{k}]"), *value)?;
         }

@@ -9,7 +9,7 @@ use super::scene::{DenseOperator, Scene, Snapshot};
 use super::state::State;
 use super::stepping::Simulation;
 use crate::integrator::{OptionsError, StepOptions};
-use crate::multibody::{Energy, StateError};
+use crate::multibody::{Energy, StateError, coordinates};
 use crate::planar::{ContactRule, PlanarDisc, PlanarFacing, PlanarGround, PlanarTree};
 use crate::system::{PlanarContact, PlanarScratch, PlanarSystem};
 
@@ -155,21 +155,7 @@ impl PlanarSimulation {
     /// Wrong length or an entry that is not finite; nothing is changed then.
     pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), StateError> {
         for (field, values) in [("q", q), ("v", v)] {
-            let expected = self.machine().nv();
-            if values.len() != expected {
-                return Err(StateError::Length {
-                    field,
-                    expected,
-                    actual: values.len(),
-                });
-            }
-            if let Some(index) = values.iter().position(|x| !x.is_finite()) {
-                return Err(StateError::NotFinite {
-                    field,
-                    index,
-                    value: values[index],
-                });
-            }
+            coordinates::check(field, values, self.machine().nv())?;
         }
         self.place(q.to_vec(), v.to_vec());
         Ok(())

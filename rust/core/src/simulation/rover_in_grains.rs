@@ -388,10 +388,10 @@ fn visit_near(
         let centre: [f64; 3] = (origin + shape.centre()).into();
         let reach = shape.bound() + grains.largest() + reach;
         grid.near(&centre, reach, |item| {
-            let ball = PlacedShape::Sphere(Sphere {
-                centre: Vector3::from(item.centre) - origin,
-                radius: item.radius,
-            });
+            let ball = PlacedShape::Sphere(Sphere::new(
+                Vector3::from(item.centre) - origin,
+                item.radius,
+            ));
             let gap = dispatch::nearest_points(&ball, &shape).gap;
             visit(part, item.index as usize, gap);
         });

@@ -232,17 +232,14 @@ impl<S: Scene> Simulation<S> {
 
     /// One call: its report is kept. `may_be_usual`: whether the scene's steps with the usual
     /// effort are the integrator's.
-    fn call<I>(
+    fn call<I: for<'a> Integrator<S::System<'a>>>(
         &mut self,
         integrator: &I,
         may_be_usual: bool,
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
-    ) -> Result<StepReport, StepError>
-    where
-        I: for<'a> Integrator<S::System<'a>>,
-    {
+    ) -> Result<StepReport, StepError> {
         self.begin_call();
         let result = self.steps(integrator, may_be_usual, n, go_on, probe);
         self.end_call(result.clone().unwrap_or_default());
@@ -267,17 +264,14 @@ impl<S: Scene> Simulation<S> {
         }
     }
 
-    fn steps<I>(
+    fn steps<I: for<'a> Integrator<S::System<'a>>>(
         &mut self,
         integrator: &I,
         may_be_usual: bool,
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
-    ) -> Result<StepReport, StepError>
-    where
-        I: for<'a> Integrator<S::System<'a>>,
-    {
+    ) -> Result<StepReport, StepError> {
         let mut total = StepReport::default();
         for _ in 0..n {
             let usual = if may_be_usual {
@@ -354,25 +348,19 @@ impl<S: Scene> Simulation<S> {
     }
 
     /// A step of any scene and integrator, with all effort.
-    pub(super) fn step_with_all_effort<I>(
+    pub(super) fn step_with_all_effort<I: for<'a> Integrator<S::System<'a>>>(
         &mut self,
         integrator: &I,
         probe: &mut dyn Probe,
-    ) -> Result<StepReport, StepError>
-    where
-        I: for<'a> Integrator<S::System<'a>>,
-    {
+    ) -> Result<StepReport, StepError> {
         self.guard(|own| own.take_with_all_effort(integrator, probe))?
     }
 
-    fn take_with_all_effort<I>(
+    fn take_with_all_effort<I: for<'a> Integrator<S::System<'a>>>(
         &mut self,
         integrator: &I,
         probe: &mut dyn Probe,
-    ) -> Result<StepReport, StepError>
-    where
-        I: for<'a> Integrator<S::System<'a>>,
-    {
+    ) -> Result<StepReport, StepError> {
         self.moved.read(&self.state.configuration);
         let (command, memory) = (&self.command, &mut self.memory);
         let mut system = (self.scene).system(&self.options, command, memory, &mut self.parts);

@@ -13,7 +13,7 @@
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
 use crate::multibody::path_matrix::PathMatrix;
 use crate::multibody::{Inertias, MassMatrix, Mechanism, Poses};
-use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::scalar::{Lane, LaneMask, Vec3, inlined};
 
 /// Scratch.
 #[derive(Clone, Debug)]
@@ -84,11 +84,7 @@ impl<T: Lane> Gyroscopic<T> {
             (&mut self.C, &mut self.weight),
         );
         loop {
-            T::vectorize(
-                token,
-                #[inline(always)]
-                || self.set_up(of, step, v, impulse, y),
-            );
+            inlined!(T::vectorize, token, self.set_up(of, step, v, impulse, y));
             self.is_lost.fill(nowhere);
             let (is_lost, is_skew) = (&mut self.is_lost, &self.is_skew);
             let each = |cluster: usize, is_positive: T::Mask| {
@@ -106,16 +102,12 @@ impl<T: Lane> Gyroscopic<T> {
                 }
             }
         }
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                of.mass_matrix.times(mechanism, &self.load, y);
-                for (y, impulse) in y.iter_mut().zip(impulse) {
-                    *y -= *impulse;
-                }
-            },
-        );
+        inlined!(T::vectorize, token, {
+            of.mass_matrix.times(mechanism, &self.load, y);
+            for (y, impulse) in y.iter_mut().zip(impulse) {
+                *y -= *impulse;
+            }
+        });
     }
 
     /// Matrix and right-hand side.

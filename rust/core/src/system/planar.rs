@@ -194,12 +194,6 @@ impl Dynamics for PlanarSystem<'_> {
         (velocity < 2).then_some(velocity)
     }
 
-    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Vec<f64>, to: &mut Vec<f64>) {
-        if lanes(0) {
-            to.clone_from(from);
-        }
-    }
-
     fn is_finite(&self, q: &Vec<f64>) -> bool {
         q.iter().all(|x| x.is_finite())
     }
@@ -380,6 +374,8 @@ impl MechanicalSystem for PlanarSystem<'_> {
 
     const DIMENSION: Dimension = Dimension::Two;
 
+    const SETTLES: bool = true;
+
     type Contact = PlanarContact;
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<PlanarContact>) {
@@ -490,13 +486,5 @@ impl MechanicalSystem for PlanarSystem<'_> {
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled(Dimension::Two, &self.parts.W, q, mu)
-    }
-
-    fn open_problem<'a>(
-        &'a self,
-        q: &'a [f64],
-        mu: &'a [f64],
-    ) -> Option<FrictionContactProblem<'a>> {
-        Some(self.problem(q, mu))
     }
 }

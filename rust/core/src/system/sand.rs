@@ -35,7 +35,7 @@ use crate::geometry::SoftLayer;
 use crate::multibody::{Factor, MassMatrix, Mechanism};
 use crate::sand::memory::after_step;
 use crate::sand::{RutMap, SandState, Soil};
-use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3, inlined};
 
 /// Way in a step under gravity, in units of `|g| h²`, below which memory is not resolved.
 ///
@@ -209,10 +209,10 @@ impl<T: Lane> SandContact<T> {
         for patch in &mut self.patches {
             if !self.is_given && (patch.force.is_touching & self.lanes).any() {
                 let (map, tangent) = (&mut patch.map, &patch.force.tangent);
-                T::vectorize(
+                inlined!(
+                    T::vectorize,
                     self.token,
-                    #[inline(always)]
-                    || map.add_to_mass(tangent, h, mechanism, mass),
+                    map.add_to_mass(tangent, h, mechanism, mass)
                 );
             }
         }
@@ -267,21 +267,17 @@ impl<T: Lane> SandContact<T> {
         }
         for patch in &mut self.patches {
             let (step, lanes) = (&self.step, self.lanes);
-            let twist = T::vectorize(
-                self.token,
-                #[inline(always)]
-                || {
-                    let twist = patch.map.twist(v_end);
-                    patch.end = patch.pose.moved(&twist, step.theta * step.h);
-                    twist
-                },
-            );
+            let twist = inlined!(T::vectorize, self.token, {
+                let twist = patch.map.twist(v_end);
+                patch.end = patch.pose.moved(&twist, step.theta * step.h);
+                twist
+            });
             let sinkage = patch.sinkage(layers, lanes);
             let own = &mut out[mechanism.cluster_of_body(patch.wheel.body)];
-            T::vectorize(
+            inlined!(
+                T::vectorize,
                 self.token,
-                #[inline(always)]
-                || *own += patch.try_work(step, lanes, v, (&twist, sinkage)),
+                *own += patch.try_work(step, lanes, v, (&twist, sinkage))
             );
         }
     }

@@ -19,7 +19,7 @@ use crate::sand::ruts::RutsNear;
 use crate::sand::{
     Bed, Derivatives, GaussRules, Memory, Reaction, RutMap, SandWheel, WheelPose, Window, react,
 };
-use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3, inlined};
 
 /// Error of the linearised force of a wheel, relative to the force, at which it has settled.
 const SETTLED: f64 = 2e-2;
@@ -172,14 +172,10 @@ impl<T: Lane> SandPatch<T> {
         v: &[T],
     ) {
         let token = step.length.token();
-        let at = T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                self.place(scene.poses);
-                self.map.twist(v)
-            },
-        );
+        let at = inlined!(T::vectorize, token, {
+            self.place(scene.poses);
+            self.map.twist(v)
+        });
         for lane in each(lanes) {
             if let Some(ground) = scene.ground(lane) {
                 self.read_ruts(lane, &ground);
@@ -193,11 +189,7 @@ impl<T: Lane> SandPatch<T> {
     fn take(&mut self, token: T::Token, lanes: T::Mask) {
         let arms = [self.wheel.shape.radius, self.wheel.shape.drum()];
         let Self { force, found, .. } = self;
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || force.take(lanes, found, arms),
-        );
+        inlined!(T::vectorize, token, force.take(lanes, found, arms));
     }
 
     /// The force at a lane's twist and its derivative by the twist.
@@ -259,15 +251,11 @@ impl<T: Lane> SandPatch<T> {
     ) -> T::Mask {
         let token = step.length.token();
         let arm = self.wheel.shape.radius;
-        let (twist, applied, is_open) = T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                let twist = self.map.twist(v_end);
-                let applied = self.force.applied(&twist);
-                (twist, applied, self.is_open(step, &twist, &applied))
-            },
-        );
+        let (twist, applied, is_open) = inlined!(T::vectorize, token, {
+            let twist = self.map.twist(v_end);
+            let applied = self.force.applied(&twist);
+            (twist, applied, self.is_open(step, &twist, &applied))
+        });
         let (mut compliance, mut is_new) = (None, 0);
         for lane in each(is_open & lanes) {
             let Some(ground) = scene.ground(lane) else {
@@ -282,11 +270,7 @@ impl<T: Lane> SandPatch<T> {
             }
             let mechanism = scene.mechanism;
             let A = compliance.get_or_insert_with(|| {
-                T::vectorize(
-                    token,
-                    #[inline(always)]
-                    || self.compliance(mechanism, factor),
-                )
+                inlined!(T::vectorize, token, self.compliance(mechanism, factor))
             });
             let A = six::matrix_of(A, lane) * step.h;
             let found = self.settle(step, (lane, &ground), &A, &found);

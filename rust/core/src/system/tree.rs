@@ -166,6 +166,8 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     const DIMENSION: Dimension = Dimension::Three;
 
+    const SETTLES: bool = true;
+
     type Contact = Contact;
 
     fn clusters_of(&self, key: &ContactKey) -> [usize; 2] {
@@ -282,14 +284,6 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
-    }
-
-    fn open_problem<'a>(
-        &'a self,
-        q: &'a [f64],
-        mu: &'a [f64],
-    ) -> Option<FrictionContactProblem<'a>> {
-        Some(self.problem(q, mu))
     }
 
     fn begin_residual(&mut self, start: At<'_>) {

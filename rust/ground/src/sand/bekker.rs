@@ -19,10 +19,9 @@
 //! Source: Bekker 1969, *Introduction to Terrain–Vehicle Systems*; Janosi and Hanamoto 1961,
 //! *Analytical determination of drawbar pull as a function of slip*; Wong and Reece 1967.
 
-use super::checks::{in_range, not_negative};
 use super::piece::{Piece, Stress, WheelConditions};
 use super::wheel::Skin;
-use friction_contact::quantity::{QuantityError, positive};
+use friction_contact::quantity::{QuantityError, between, not_negative, positive};
 use friction_contact::scalar::elementary::{exp_m1, ln};
 use friction_contact::scalar::{Lane, LaneMask};
 
@@ -136,30 +135,24 @@ impl Bekker {
     pub(super) fn check(&self) -> Result<(), QuantityError> {
         not_negative("cohesive_modulus", self.cohesive_modulus)?;
         positive("frictional_modulus", self.frictional_modulus)?;
-        in_range("exponent", self.exponent, [0.1, 3.0], "from 0.1 to 3")?;
         not_negative("cohesion", self.cohesion)?;
-        let range = "from 0.05 to 2";
-        in_range(
-            "internal_friction",
-            self.internal_friction,
-            [0.05, 2.0],
-            range,
-        )?;
-        in_range(
-            "shear_modulus",
-            self.shear_modulus,
-            [1e-4, 1.0],
-            "from 0.0001 to 1 m",
-        )?;
-        let range = "from 0 to 1";
-        in_range("stress_angle", self.stress_angle, [0.0, 1.0], range)?;
-        in_range(
-            "stress_angle_slip",
-            self.stress_angle_slip,
-            [0.0, 1.0],
-            range,
-        )?;
-        in_range("slip_sinkage", self.slip_sinkage, [0.0, 2.0], "from 0 to 2")
+        let (tan, way) = (self.internal_friction, self.shear_modulus);
+        for (field, value, ends, range) in [
+            ("exponent", self.exponent, [0.1, 3.0], "from 0.1 to 3"),
+            ("internal_friction", tan, [0.05, 2.0], "from 0.05 to 2"),
+            ("shear_modulus", way, [1e-4, 1.0], "from 0.0001 to 1 m"),
+            ("stress_angle", self.stress_angle, [0.0, 1.0], "from 0 to 1"),
+            (
+                "stress_angle_slip",
+                self.stress_angle_slip,
+                [0.0, 1.0],
+                "from 0 to 1",
+            ),
+            ("slip_sinkage", self.slip_sinkage, [0.0, 2.0], "from 0 to 2"),
+        ] {
+            between(field, value, ends, range)?;
+        }
+        Ok(())
     }
 }
 

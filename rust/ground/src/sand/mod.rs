@@ -31,7 +31,6 @@
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bekker;
-pub(crate) mod checks;
 pub mod memory;
 pub mod patch;
 pub mod piece;

@@ -15,7 +15,7 @@ use super::sliding::{OnRing, Rolling, Slid};
 use super::soil::{Soil, StressLaw};
 use super::wheel::{GaussRules, SandWheel, Skin};
 #[cfg(target_arch = "x86_64")]
-use friction_contact::scalar::{Eights, Fours};
+use friction_contact::scalar::{Eights, Fours, inlined};
 use friction_contact::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
 /// Pose of a wheel.
@@ -272,40 +272,36 @@ impl<'a> Frame<'a> {
     /// Sums the stresses over all points.
     #[inline(always)]
     fn sum<T: Lane>(&self, token: T::Token) -> Totals {
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                let (mut wrench, mut by_shift) = (zeros(), zeros());
-                let mut by_turn = zeros();
-                let mut sums = Sums {
-                    wrench: &mut wrench,
-                    by_shift: &mut by_shift,
-                    by_turn: &mut by_turn,
-                    is_touching: false,
-                };
-                let (mut feed, mut group) = (Feed::of(&self.immersed), Group::default());
-                while feed.fill::<T>(token, &mut group) {
-                    for part in 0..MAX_LANES / T::LANES {
-                        self.add::<T>(&group, (token, part * T::LANES), &mut sums);
-                    }
+        inlined!(T::vectorize, token, {
+            let (mut wrench, mut by_shift) = (zeros(), zeros());
+            let mut by_turn = zeros();
+            let mut sums = Sums {
+                wrench: &mut wrench,
+                by_shift: &mut by_shift,
+                by_turn: &mut by_turn,
+                is_touching: false,
+            };
+            let (mut feed, mut group) = (Feed::of(&self.immersed), Group::default());
+            while feed.fill::<T>(token, &mut group) {
+                for part in 0..MAX_LANES / T::LANES {
+                    self.add::<T>(&group, (token, part * T::LANES), &mut sums);
                 }
-                let is_touching = sums.is_touching;
-                let slopes = if self.want == Derivatives::Wrench {
-                    [[0.0; SLOPE]; 2]
-                } else {
-                    [
-                        total::<T, _>(token, &by_shift),
-                        total::<T, _>(token, &by_turn),
-                    ]
-                };
-                Totals {
-                    wrench: total::<T, _>(token, &wrench),
-                    slopes,
-                    is_touching,
-                }
-            },
-        )
+            }
+            let is_touching = sums.is_touching;
+            let slopes = if self.want == Derivatives::Wrench {
+                [[0.0; SLOPE]; 2]
+            } else {
+                [
+                    total::<T, _>(token, &by_shift),
+                    total::<T, _>(token, &by_turn),
+                ]
+            };
+            Totals {
+                wrench: total::<T, _>(token, &wrench),
+                slopes,
+                is_touching,
+            }
+        })
     }
 
     /// Adds the stress on a group of points: its lanes from `first` on.

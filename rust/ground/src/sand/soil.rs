@@ -1,11 +1,10 @@
 //! A soil: its law of stress, its memory, and how it bears a second pass.
 
 use super::bekker::Bekker;
-use super::checks::{in_range, not_negative};
 use super::piece::{Piece, Stress, WheelConditions};
 use super::resistive_force::{Flow, Interface, traction};
 use super::wheel::Skin;
-use friction_contact::quantity::{QuantityError, positive};
+use friction_contact::quantity::{QuantityError, between, not_negative, positive};
 use friction_contact::scalar::Lane;
 
 /// A soil.
@@ -137,8 +136,8 @@ impl Soil {
     /// # Errors
     /// A number out of its range, by the name of its field.
     pub fn check(&self) -> Result<(), QuantityError> {
-        in_range("memory", self.memory, [1e-4, 1.0], "from 0.0001 to 1 m")?;
-        in_range("reload", self.reload, [1.0, 1e3], "from 1 to 1000")?;
+        between("memory", self.memory, [1e-4, 1.0], "from 0.0001 to 1 m")?;
+        between("reload", self.reload, [1.0, 1e3], "from 1 to 1000")?;
         match &self.law {
             StressLaw::Resistive(sand) => sand.check(),
             StressLaw::Bekker(soil) => soil.check(),
@@ -148,19 +147,9 @@ impl Soil {
 
 impl Resistive {
     fn check(&self) -> Result<(), QuantityError> {
-        in_range(
-            "density",
-            self.density,
-            [1.0, 1e4],
-            "from 1 to 10 000 kg/m³",
-        )?;
-        let range = "from 0.05 to 2";
-        in_range(
-            "internal_friction",
-            self.internal_friction,
-            [0.05, 2.0],
-            range,
-        )?;
+        let (density, tan) = (self.density, self.internal_friction);
+        between("density", density, [1.0, 1e4], "from 1 to 10 000 kg/m³")?;
+        between("internal_friction", tan, [0.05, 2.0], "from 0.05 to 2")?;
         positive("stiffness_factor", self.stiffness_factor)?;
         for (name, surface) in [
             ("tread", &self.tread),
@@ -168,19 +157,19 @@ impl Resistive {
             ("grouser", &self.grousers),
         ] {
             not_negative(&format!("{name}_friction"), surface.friction)?;
-            in_range(
-                &format!("{name}_follow"),
-                surface.follow,
-                [0.01, 1e3],
-                "from 0.01 to 1000",
-            )?;
+            let follow = format!("{name}_follow");
+            between(&follow, surface.follow, [0.01, 1e3], "from 0.01 to 1000")?;
         }
         let flow = &self.flow;
         not_negative("dilatancy", flow.dilatancy)?;
-        in_range("grip", flow.grip, [0.0, 1.0], "from 0 to 1")?;
-        in_range("grip_width", flow.width, [1e-3, 1.0], "from 0.001 to 1")?;
-        in_range("fluidity", flow.fluidity, [0.0, 1.0], "from 0 to 1")?;
-        let range = "from 0.001 to 1";
-        in_range("mobilisation", flow.mobilisation, [1e-3, 1.0], range)
+        for (field, value, low, range) in [
+            ("grip", flow.grip, 0.0, "from 0 to 1"),
+            ("grip_width", flow.width, 1e-3, "from 0.001 to 1"),
+            ("fluidity", flow.fluidity, 0.0, "from 0 to 1"),
+            ("mobilisation", flow.mobilisation, 1e-3, "from 0.001 to 1"),
+        ] {
+            between(field, value, [low, 1.0], range)?;
+        }
+        Ok(())
     }
 }

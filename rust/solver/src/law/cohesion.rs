@@ -9,7 +9,7 @@
 //! The attraction is a load on both bodies, and the solver's impulse is p_N + h F, so no solver
 //! knows of it.
 
-use crate::quantity::{QuantityError, finite};
+use crate::quantity::{QuantityError, not_negative};
 
 /// No cohesion.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
@@ -71,12 +71,7 @@ impl Cohesion {
     /// A force that is not finite or negative; a range that is not positive or beyond a fifth of
     /// the radius.
     pub fn new(force: f64, range: Option<f64>, smallest: f64) -> Result<Self, CohesionError> {
-        if finite("cohesion", force)? < 0.0 {
-            return Err(CohesionError::Force(QuantityError::Negative {
-                field: "cohesion".to_owned(),
-                value: force,
-            }));
-        }
+        not_negative("cohesion", force)?;
         let range = range.unwrap_or(USUAL * smallest);
         let limit = FARTHEST * smallest;
         if !(range > 0.0 && range <= limit) {

@@ -23,7 +23,7 @@
 //! rolling radius).
 
 use crate::cone::{shortened, split};
-use crate::quantity::{QuantityError, finite};
+use crate::quantity::{QuantityError, not_negative};
 use crate::space::dot;
 
 /// Coefficients of rolling and drilling friction.
@@ -43,12 +43,7 @@ impl RollingFriction {
             ("rolling_friction", self.rolling),
             ("drilling_friction", self.drilling),
         ] {
-            if finite(field, value)? < 0.0 {
-                return Err(QuantityError::Negative {
-                    field: field.to_owned(),
-                    value,
-                });
-            }
+            not_negative(field, value)?;
         }
         Ok(())
     }

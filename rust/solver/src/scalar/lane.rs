@@ -112,7 +112,8 @@ pub trait Lane:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
     /// Runs `f` compiled for the instructions of the token; whatever `f` calls must be inlined, and
-    /// `f` itself: write `#[inline(always)] || ...`, or a large one is compiled for the baseline.
+    /// `f` itself, as [`inlined!`](super::inlined) makes sure, or a large one is compiled for the
+    /// baseline.
     fn vectorize<R>(token: Self::Token, f: impl FnOnce() -> R) -> R;
 
     /// The number `x` in every lane.

@@ -11,7 +11,7 @@
 //!
 //! ```text
 //! Instructions::of_this_machine() ──► token of Single, Fours or Eights
-//! T::vectorize(token, || formula(x, y))    the closure is compiled for the token's instructions
+//! inlined!(T::vectorize, token, formula(x, y))    compiled for the token's instructions
 //!                        │
 //!                        └─ x: T           f64, four or eight lanes; each has the same bits
 //!                           x.lt(y)        a mask; T::select(mask, a, b) in place of a branch
@@ -22,6 +22,19 @@
 //! No other chapter.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+/// Calls a function, as [`Lane::vectorize`](crate::scalar::Lane::vectorize), with a token and a
+/// closure of the last argument that is inlined into it.
+#[macro_export]
+macro_rules! inlined {
+    ($run:path, $token:expr, $body:expr) => {
+        $run(
+            $token,
+            #[inline(always)]
+            || $body,
+        )
+    };
+}
+
 pub mod dual;
 pub mod elementary;
 pub mod instructions;
@@ -29,6 +42,7 @@ pub mod lane;
 pub mod linear;
 mod registers;
 
+pub use crate::inlined;
 pub use dual::Dual;
 #[cfg(target_arch = "x86_64")]
 pub use instructions::{Eights, Fours};

@@ -3,7 +3,7 @@
 use super::options::{ContactLaw, Method, SolverOptions};
 use super::reference::relaxed;
 use super::report::{Rung, Rungs, SolveReport, SolveStatus, Stage, StageResult};
-use super::scratch::SolveScratch;
+use super::scratch::{Attempt, SolveScratch, StageEnd};
 use super::stage::body_sweeps::{ContactSolution, Swept};
 use super::stage::{admm, gauss_seidel, newton, proximal};
 use super::strategy::auto;
@@ -125,40 +125,16 @@ pub fn solve_with_laws<const D: usize, L: FrictionLaw<D> + Copy>(
     scales.resize(n_contacts);
     scratch.fit(n_contacts, n, W);
     scratch.history.begin(options.keeps_history);
-    scratch.work = WorkBudget::new(options.budget_of(n_contacts));
-    scratch.rungs = Rungs::default();
     scratch.start.copy_from_slice(p);
     let data = Prepared::new::<D>(problem, W, scales);
+    let mut attempt = begin::<D>(&data, options, p, u, scratch);
     let budget = SweepBudget {
         sweeps: options.max_sweeps,
         predict: false,
     };
-    let mut iterations = 0;
-    let law = |i: usize| laws[i];
-    let (status, residual) = gauss_seidel::sweeps_under::<D, _>(
-        (&data, &law),
-        options,
-        budget,
-        p,
-        u,
-        scratch,
-        &mut iterations,
-    );
-    let mut report = SolveReport {
-        status: scratch.list_stage(Stage::Sweeps, status, iterations),
-        iterations,
-        work: scratch.work.spent,
-        residual: residual.relative,
-        velocity_error: residual.velocity,
-        method: Method::GaussSeidel,
-        stage: Stage::Sweeps,
-        rungs: scratch.rungs,
-    };
-    let is_finite = residual.is_finite() && p.iter().chain(&*u).all(|x| x.is_finite());
-    if !is_finite {
-        refuse(&mut report, p, u);
-    }
-    report
+    let found = gauss_seidel::sweeps_under(&mut attempt, &|i| laws[i], budget);
+    let outcome = result_of(&mut attempt, Stage::Sweeps, found);
+    report_on(&mut attempt, outcome)
 }
 
 /// Solves an impact under [Poisson's law](crate::law::poisson_impact): first the compression, by
@@ -336,79 +312,91 @@ fn solve_with_scales<const D: usize>(
         islands,
         solve: &mut solve_island,
     };
-    Some(judge::<D>(&data, options, p, u, scratch, islands))
+    let mut attempt = begin::<D>(&data, options, p, u, scratch);
+    let outcome = run(&mut attempt, islands);
+    let mut report = report_on(&mut attempt, outcome);
+    if report.status == SolveStatus::Converged && !data.is_resolved(p) {
+        report.amend(SolveStatus::Stalled);
+    }
+    Some(report)
 }
 
-/// Runs the method. `u` is `W p + q` on return; `iterations` is advanced by
-/// the sweeps and linear solves.
-fn run<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    islands: IslandSolver<'_>,
-    iterations: &mut usize,
-) -> StageResult {
-    let (stage, (status, residual)) = match options.method {
-        Method::Auto => {
-            return auto::escalate::<D>(data, options, p, u, scratch, islands, iterations);
-        }
+/// A solve that has spent nothing yet.
+fn begin<'a, const D: usize>(
+    data: &'a Prepared<'a>,
+    options: &'a SolverOptions,
+    p: &'a mut [f64],
+    u: &'a mut [f64],
+    scratch: &'a mut SolveScratch,
+) -> Attempt<'a, D> {
+    scratch.work = WorkBudget::new(options.budget_of(data.mu.len()));
+    scratch.rungs = Rungs::default();
+    Attempt {
+        data,
+        options,
+        p,
+        u,
+        scratch,
+        iterations: 0,
+    }
+}
+
+/// Runs the method. `u` is `W p + q` on return.
+fn run<const D: usize>(attempt: &mut Attempt<'_, D>, islands: IslandSolver<'_>) -> StageResult {
+    let options = attempt.options;
+    let (stage, found) = match options.method {
+        Method::Auto => return auto::escalate(attempt, islands),
         Method::GaussSeidel => {
             let budget = SweepBudget {
                 sweeps: options.max_sweeps,
                 predict: false,
             };
-            scratch.start.copy_from_slice(p);
-            let found = gauss_seidel::sweeps::<D>(data, options, budget, p, u, scratch, iterations);
-            (Stage::Sweeps, found)
+            attempt.scratch.start.copy_from_slice(attempt.p);
+            (Stage::Sweeps, gauss_seidel::sweeps(attempt, budget))
         }
         Method::Newton => {
             let steps = options.max_newton_steps;
-            let found = newton::full_steps::<D>(data, options, steps, p, u, scratch, iterations);
-            (Stage::Newton, found)
+            (Stage::Newton, newton::full_steps(attempt, steps))
         }
         Method::ProximalPoint => {
-            scratch.start.copy_from_slice(p);
-            let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
-            (Stage::ProximalPoint, found)
+            attempt.scratch.start.copy_from_slice(attempt.p);
+            let steps = options.max_newton_steps;
+            (Stage::ProximalPoint, proximal::solve(attempt, steps))
         }
-        Method::Admm => {
-            let found = admm::solve::<D>(data, options, p, u, scratch, iterations);
-            (Stage::Admm, found)
-        }
-        Method::Relaxed => {
-            let found = relaxed::solve::<D>(data, options, p, u, scratch, iterations);
-            (Stage::Relaxed, found)
-        }
+        Method::Admm => (Stage::Admm, admm::solve(attempt)),
+        Method::Relaxed => (Stage::Relaxed, relaxed::solve(attempt)),
     };
+    result_of(attempt, stage, found)
+}
+
+/// The result of the only stage of a solve.
+fn result_of<const D: usize>(
+    attempt: &mut Attempt<'_, D>,
+    stage: Stage,
+    (status, residual): StageEnd,
+) -> StageResult {
     StageResult {
         method: stage.method(),
         stage,
-        status: scratch.list_stage(stage, status, *iterations),
+        status: attempt
+            .scratch
+            .list_stage(stage, status, attempt.iterations),
         residual,
     }
 }
 
-/// Runs the method and judges what it returns.
-fn judge<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    islands: IslandSolver<'_>,
-) -> SolveReport {
-    let mut iterations = 0;
-    scratch.work = WorkBudget::new(options.budget_of(data.mu.len()));
-    scratch.rungs = Rungs::default();
-    let outcome = run::<D>(data, options, p, u, scratch, islands, &mut iterations);
-    let StageResult {
+/// The report of a result. What is not finite becomes zero.
+fn report_on<const D: usize>(
+    attempt: &mut Attempt<'_, D>,
+    StageResult {
         method,
         stage,
         status,
         residual,
-    } = outcome;
+    }: StageResult,
+) -> SolveReport {
+    let iterations = attempt.iterations;
+    let Attempt { p, u, scratch, .. } = attempt;
     let mut report = SolveReport {
         status,
         iterations,
@@ -423,8 +411,6 @@ fn judge<const D: usize>(
     let is_finite = residual.is_finite() && p.iter().chain(u.iter()).all(|x| x.is_finite());
     if status == SolveStatus::NonFinite || !is_finite {
         refuse(&mut report, p, u);
-    } else if status == SolveStatus::Converged && !data.is_resolved(p) {
-        report.amend(SolveStatus::Stalled);
     }
     report
 }

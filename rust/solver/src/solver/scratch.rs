@@ -1,11 +1,14 @@
-//! Memory that the stages of a solve share, kept between solves so that none of them allocates.
+//! A solve on its way, and the memory that its stages share, kept between solves so that none of
+//! them allocates.
 
 use super::history::History;
 use super::linear::reduced_system::ReducedSystem;
+use super::local::sweep;
+use super::options::SolverOptions;
 use super::pivoting::{Many, Pivoting};
 use super::report::{Rung, Rungs, SolveStatus, Stage};
-use super::work::{WorkBudget, sweep};
-use crate::problem::Operator;
+use super::work::{self, WorkBudget};
+use crate::problem::{Operator, Prepared, Residual};
 
 /// Impulses and velocities of the iterations (n each), the Newton system,
 /// and the record of the stages.
@@ -86,11 +89,87 @@ impl SolveScratch {
         });
         status
     }
+}
 
-    /// Spends the work of a product and this many sweeps; false if the budget does not allow it.
+/// Why a stage ended, and the residual of its answer.
+pub(super) type StageEnd = (SolveStatus, Residual);
+
+/// A solve on its way: the problem, the impulse that the stages improve, and what they share.
+#[derive(Debug)]
+pub(super) struct Attempt<'a, const D: usize> {
+    pub data: &'a Prepared<'a>,
+    pub options: &'a SolverOptions,
+    /// Impulse (n), N s.
+    pub p: &'a mut [f64],
+    /// Velocity `W p + q` (n), m/s, when a stage ends.
+    pub u: &'a mut [f64],
+    pub scratch: &'a mut SolveScratch,
+    /// Sweeps and linear solves so far.
+    pub iterations: usize,
+}
+
+impl<const D: usize> Attempt<'_, D> {
+    /// `u = W p + q`.
     #[inline]
-    pub fn affords_sweeps(&mut self, product: u64, n_contacts: usize, sweeps: usize) -> bool {
-        self.work
-            .affords(product + sweeps as u64 * sweep(product, n_contacts))
+    pub fn find_velocity(&mut self) {
+        self.data.W.multiply_add(self.p, self.data.q, self.u);
+    }
+
+    /// Residual of the impulse and its velocity.
+    #[inline]
+    pub fn residual(&self) -> Residual {
+        self.data.measure::<D>(self.p, self.u)
+    }
+
+    /// Residual of the impulse and its velocity, which enters the history.
+    #[inline]
+    pub fn measure(&mut self) -> Residual {
+        let residual = self.residual();
+        self.scratch.history.note(self.iterations, residual);
+        residual
+    }
+
+    /// Whether no impulse does better, because of rounding.
+    #[inline]
+    pub fn is_within_rounding(&self) -> bool {
+        self.data.is_within_rounding::<D>(self.p, self.u)
+    }
+
+    /// Keeps the impulse if it is better than the best one of the stage so far.
+    #[inline]
+    pub fn keep_if_better(&mut self, residual: Residual, best: &mut Residual) {
+        if residual.relative < best.relative {
+            *best = residual;
+            self.scratch.best.copy_from_slice(self.p);
+        }
+    }
+
+    /// Goes back to the best impulse of the stage.
+    #[inline]
+    pub fn take_best(&mut self) {
+        self.p.copy_from_slice(&self.scratch.best);
+        self.find_velocity();
+    }
+
+    /// Spends the work of a few products with `W` and of sweeps; false if the budget does not allow
+    /// it.
+    #[inline]
+    pub fn affords_sweeps(&mut self, products: u64, sweeps: usize) -> bool {
+        let product = self.data.product;
+        let sweep = work::sweep(product, self.data.mu.len());
+        let work = &mut self.scratch.work;
+        work.affords(products * product + sweeps as u64 * sweep)
+    }
+
+    /// Sweeps over the regularised problem; false if the budget does not allow it.
+    pub fn sweep(&mut self, alpha: f64, sweeps: usize) -> bool {
+        if !self.affords_sweeps(0, sweeps) {
+            return false;
+        }
+        let prox = self.scratch.system.prox(alpha);
+        for _ in 0..sweeps {
+            sweep::sweep::<D>(self.data, prox, self.p);
+        }
+        true
     }
 }

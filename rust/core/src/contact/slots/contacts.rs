@@ -35,7 +35,7 @@ use crate::geometry::query::sweep::DEEP;
 use crate::geometry::query::{CIRCLE, NEAREST};
 use crate::geometry::{Disc, Roller, Sphere};
 use crate::multibody::{Model, Poses};
-use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3, inlined};
 use crate::solver::batch::problem::{MAX_CONTACTS, MAX_LARGE};
 
 /// Number of the plane in every terrain that has one.
@@ -537,11 +537,7 @@ impl<T: Lane> ContactSlots<T> {
         ground: &mut BlockGround<T>,
         input: &DetectionInput<'_, T>,
     ) -> T::Mask {
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || self.look(ground, input),
-        )
+        inlined!(T::vectorize, self.token, self.look(ground, input))
     }
 
     /// Fills all slots with the contacts at the midpoint and evaluates them at the end.
@@ -938,10 +934,7 @@ impl<T: Lane> ContactSlots<T> {
                 half,
                 rounding,
             };
-            let ball = Sphere {
-                centre: sphere.centre.get(lane).into(),
-                radius: sphere.radius.get(lane),
-            };
+            let ball = Sphere::new(sphere.centre.get(lane).into(), sphere.radius.get(lane));
             let base = Vector3::from(input.middle.origin_of(wheel.tree).get(lane));
             let touch = touch_of_wheel(&own, &ball, &base, &half_way.get(lane).into());
             if touch.is_some() {

@@ -36,10 +36,7 @@ const AHEAD_TILTED: f64 = 0.1;
 const ROUNDING: f64 = 1e-6;
 
 /// The place of a sphere that has not been found.
-const NONE: Sphere = Sphere {
-    centre: Vector3::new(0.0, 0.0, 0.0),
-    radius: f64::NEG_INFINITY,
-};
+const NONE: Sphere = Sphere::new(Vector3::new(0.0, 0.0, 0.0), f64::NEG_INFINITY);
 
 /// A sphere of the ground under each rover.
 #[derive(Clone, Copy, Debug)]

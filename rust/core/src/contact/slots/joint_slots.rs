@@ -9,7 +9,7 @@ use super::machine::{SharedMachine, Stop};
 use crate::contact::rows::close_stop;
 use crate::contact::{Activation, ContactKey, Part, Side, joint_friction};
 use crate::multibody::{JointModel, LaneConfiguration, Poses};
-use crate::scalar::{Lane, LaneMask};
+use crate::scalar::{Lane, LaneMask, inlined};
 
 /// What a joint's slot is for.
 #[derive(Clone, Copy, Debug)]
@@ -90,48 +90,44 @@ impl<T: Lane> ContactSlots<T> {
         v: &[T],
         activation: &Activation<T>,
     ) -> T::Mask {
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                let mut too_many = T::mask(self.token, 0);
-                for i in 0..self.stops.len() {
-                    let Stop { joint, limits } = self.stops[i];
-                    let own = machine.joints[joint];
-                    let link = &machine.links[own.body];
-                    let motion = &poses.motions[link.motion];
-                    let axis = link.joint.direction(motion);
-                    let gaps = |q: T| [q - q.like(limits.lower), q.like(limits.upper) - q];
-                    let [lower, upper] = gaps(middle.joints[joint]);
-                    let rate = v[own.velocity];
-                    let arm = rate.like(own.arm);
-                    let is_low = activation.admits(arm * lower, || arm * rate);
-                    let is_high = activation.admits(arm * upper, || -(arm * rate));
-                    let active = is_low | is_high;
-                    let both = is_low & is_high;
-                    too_many = too_many | both;
-                    let slot = self.first_of_joints + i;
-                    let contact = &mut self.slots[slot];
-                    contact.active = active & !both;
-                    if !contact.active.any() {
-                        continue;
-                    }
-                    let (zero, one) = (rate.like(0.0), rate.like(1.0));
-                    let end_of_range = T::select(is_low, one, -one);
-                    let end_of_range = T::select(active, end_of_range, zero);
-                    self.ends[i] = end_of_range;
-                    let [lower, upper] = gaps(end.joints[joint]);
-                    contact.gap = T::select(is_low, lower, upper);
-                    contact.point = poses.bodies[own.body].r;
-                    contact.n = axis * end_of_range;
-                    self.used.push(slot);
-                    too_many = too_many | self.list_slot(slot, None);
+        inlined!(T::vectorize, self.token, {
+            let mut too_many = T::mask(self.token, 0);
+            for i in 0..self.stops.len() {
+                let Stop { joint, limits } = self.stops[i];
+                let own = machine.joints[joint];
+                let link = &machine.links[own.body];
+                let motion = &poses.motions[link.motion];
+                let axis = link.joint.direction(motion);
+                let gaps = |q: T| [q - q.like(limits.lower), q.like(limits.upper) - q];
+                let [lower, upper] = gaps(middle.joints[joint]);
+                let rate = v[own.velocity];
+                let arm = rate.like(own.arm);
+                let is_low = activation.admits(arm * lower, || arm * rate);
+                let is_high = activation.admits(arm * upper, || -(arm * rate));
+                let active = is_low | is_high;
+                let both = is_low & is_high;
+                too_many = too_many | both;
+                let slot = self.first_of_joints + i;
+                let contact = &mut self.slots[slot];
+                contact.active = active & !both;
+                if !contact.active.any() {
+                    continue;
                 }
-                too_many = too_many | self.list_friction(machine, poses);
-                self.choose_forms();
-                too_many
-            },
-        )
+                let (zero, one) = (rate.like(0.0), rate.like(1.0));
+                let end_of_range = T::select(is_low, one, -one);
+                let end_of_range = T::select(active, end_of_range, zero);
+                self.ends[i] = end_of_range;
+                let [lower, upper] = gaps(end.joints[joint]);
+                contact.gap = T::select(is_low, lower, upper);
+                contact.point = poses.bodies[own.body].r;
+                contact.n = axis * end_of_range;
+                self.used.push(slot);
+                too_many = too_many | self.list_slot(slot, None);
+            }
+            too_many = too_many | self.list_friction(machine, poses);
+            self.choose_forms();
+            too_many
+        })
     }
 
     /// Lists the joints with dry friction. Returns the lanes that have too many contacts.

@@ -19,7 +19,7 @@ use crate::contact::{Contact, rollers};
 use crate::multibody::mechanism::{BASE, PathVelocity};
 use crate::multibody::model::Loop;
 use crate::multibody::{Factor, Poses};
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, inlined};
 use crate::solver::batch::pattern::Pattern;
 use crate::solver::batch::problem::{ContactProblem, Triple, block};
 
@@ -182,29 +182,25 @@ impl<T: Lane> ContactMatrices<T> {
         v: &[T],
         mut loops: Option<&mut Loops<T>>,
     ) {
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                for &slot in contacts.used() {
-                    self.build(machine, end, factor, contacts, v, slot);
+        inlined!(T::vectorize, self.token, {
+            for &slot in contacts.used() {
+                self.build(machine, end, factor, contacts, v, slot);
+            }
+            for &slot in contacts.used_by_joints() {
+                if is_friction(contacts, slot) {
+                    let (_, rows) = self.of(contacts, slot);
+                    self.normal[slot] = square(self.normal[slot].like(0.0), rows)[4];
                 }
-                for &slot in contacts.used_by_joints() {
-                    if is_friction(contacts, slot) {
-                        let (_, rows) = self.of(contacts, slot);
-                        self.normal[slot] = square(self.normal[slot].like(0.0), rows)[4];
-                    }
-                }
-                if let Some(loops) = loops.as_deref_mut() {
-                    self.multiply_loops(contacts, loops);
-                }
-                let loops = loops.as_deref();
-                self.multiply(contacts, loops);
-                if contacts.factored() != 0 {
-                    self.multiply_diagonal(contacts, loops);
-                }
-            },
-        );
+            }
+            if let Some(loops) = loops.as_deref_mut() {
+                self.multiply_loops(contacts, loops);
+            }
+            let loops = loops.as_deref();
+            self.multiply(contacts, loops);
+            if contacts.factored() != 0 {
+                self.multiply_diagonal(contacts, loops);
+            }
+        });
     }
 
     /// Path of a slot, and its rows of Z.
@@ -627,62 +623,58 @@ impl<T: Lane> ContactMatrices<T> {
         problems: &mut [ContactProblem],
         loops: Option<&Loops<T>>,
     ) {
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                let problems = &mut problems[..contacts.n_problems()];
-                let factored = contacts.factored();
-                for (index, problem) in problems.iter_mut().enumerate() {
-                    problem.n_contacts = contacts.list(index).n;
-                    problem.n_dry = contacts.n_dry(index);
-                    problem.make_room();
-                    problem.has_start = false;
-                    problem.asks_least = true;
-                    if problem.n_contacts > 0 && contacts.is_factored(index) {
-                        problem.factored.adopt(self.pattern_of(contacts, index));
-                        problem.factored.slots = 0;
-                        problem.factored.is_multiplied = contacts.is_multiplied(index);
-                    } else {
-                        problem.factored.pattern = None;
-                    }
+        inlined!(T::vectorize, self.token, {
+            let problems = &mut problems[..contacts.n_problems()];
+            let factored = contacts.factored();
+            for (index, problem) in problems.iter_mut().enumerate() {
+                problem.n_contacts = contacts.list(index).n;
+                problem.n_dry = contacts.n_dry(index);
+                problem.make_room();
+                problem.has_start = false;
+                problem.asks_least = true;
+                if problem.n_contacts > 0 && contacts.is_factored(index) {
+                    problem.factored.adopt(self.pattern_of(contacts, index));
+                    problem.factored.slots = 0;
+                    problem.factored.is_multiplied = contacts.is_multiplied(index);
+                } else {
+                    problem.factored.pattern = None;
                 }
-                for &slot in contacts.used() {
-                    let (problem_indices, places) =
-                        (contacts.problem_indices(slot), contacts.places(slot));
-                    let [n, t, b] = q[slot];
-                    let values = store_all(&[n, t, b, mu[slot]]);
-                    each::<T>(
-                        contacts.slot(slot).active,
-                        #[inline(always)]
-                        |lane| {
-                            let place = usize::from(places[lane]);
-                            let problem = &mut problems[usize::from(problem_indices[lane])];
-                            let q = &mut problem.q[3 * place..][..3];
-                            for i in 0..3 {
-                                q[i] = values[i][lane];
-                            }
-                            problem.mu[place] = values[3][lane];
-                        },
-                    );
-                    if factored != 0 && contacts.near(slot) != 0 {
-                        self.write_factors(contacts, slot, problems, loops);
-                    }
-                }
-                for cluster in 0..contacts.n_clusters() {
-                    let problems = &mut problems[cluster * T::LANES..][..T::LANES];
-                    let mut at = 0;
-                    let dense = contacts.used_densely(cluster);
-                    for (i, &row) in dense.iter().enumerate() {
-                        for &column in &dense[..=i] {
-                            let w = &self.W[self.first_blocks[cluster] + at];
-                            self.write_block(contacts, [row, column], (at, w), problems);
-                            at += 1;
+            }
+            for &slot in contacts.used() {
+                let (problem_indices, places) =
+                    (contacts.problem_indices(slot), contacts.places(slot));
+                let [n, t, b] = q[slot];
+                let values = store_all(&[n, t, b, mu[slot]]);
+                each::<T>(
+                    contacts.slot(slot).active,
+                    #[inline(always)]
+                    |lane| {
+                        let place = usize::from(places[lane]);
+                        let problem = &mut problems[usize::from(problem_indices[lane])];
+                        let q = &mut problem.q[3 * place..][..3];
+                        for i in 0..3 {
+                            q[i] = values[i][lane];
                         }
+                        problem.mu[place] = values[3][lane];
+                    },
+                );
+                if factored != 0 && contacts.near(slot) != 0 {
+                    self.write_factors(contacts, slot, problems, loops);
+                }
+            }
+            for cluster in 0..contacts.n_clusters() {
+                let problems = &mut problems[cluster * T::LANES..][..T::LANES];
+                let mut at = 0;
+                let dense = contacts.used_densely(cluster);
+                for (i, &row) in dense.iter().enumerate() {
+                    for &column in &dense[..=i] {
+                        let w = &self.W[self.first_blocks[cluster] + at];
+                        self.write_block(contacts, [row, column], (at, w), problems);
+                        at += 1;
                     }
                 }
-            },
-        );
+            }
+        });
     }
 
     /// Pattern of a problem with factors.

@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 use super::check_loops::check_loops;
 use super::check_shapes::check_shapes;
 use super::check_values::{
-    direction, finite, in_range, length, material, moderate, not_negative, place, positive,
+    direction, finite, in_range, length, material, moderate, not_negative, place, positive, within,
 };
 use super::join::check_machines;
 use super::joint::{JointKind, JointLimits};
@@ -14,7 +14,7 @@ use super::masses::mass_left;
 use super::{
     MAX_SHAPES, MAX_SOLIDS, MAX_TRIANGLES, ModelDescription, SolidDescription, WheelDescription,
 };
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 
 /// Least angle of rollers from the axle, rad. At 0 they would turn in place of the wheel.
 const LEAST_ROLLER_ANGLE: f64 = 0.01;
@@ -25,7 +25,7 @@ const MOST_ACROSS: f64 = 100.0;
 /// Checks the whole description, in the order of its text.
 pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), ModelError> {
     if description.solids.is_empty() {
-        return Err(ModelError::NoSolids);
+        return Err(ModelFault::NoSolids.at("solids"));
     }
     let n_shapes = description.solids.iter().map(|s| s.shapes.len()).sum();
     let drawings = description.solids.iter().flat_map(|s| &s.drawings);
@@ -45,21 +45,15 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
         ("solids", "triangles", n_triangles, MAX_TRIANGLES),
     ] {
         if count > limit {
-            return Err(ModelError::TooMany {
-                field,
-                what,
-                count,
-                limit,
-            });
+            return Err(ModelFault::TooMany { what, count, limit }.at(field));
         }
     }
     let mut solids: HashMap<&str, usize> = HashMap::new();
     for (i, solid) in description.solids.iter().enumerate() {
         if solids.contains_key(solid.name.as_str()) {
-            return Err(ModelError::DuplicateName {
-                field: format!("solids[{i}].name"),
-                name: solid.name.clone(),
-            });
+            return Err(
+                ModelFault::DuplicateName(solid.name.clone()).at(format!("solids[{i}].name"))
+            );
         }
         check_joint(i, solid, &solids)?;
         check_body(i, solid)?;
@@ -80,7 +74,7 @@ fn check_joint(
     before: &HashMap<&str, usize>,
 ) -> Result<(), ModelError> {
     let at = |what: &str| format!("solids[{i}].{what}");
-    let missing = |what: &str| ModelError::Missing { field: at(what) };
+    let missing = |what: &str| ModelFault::Missing.at(at(what));
     let kind = solid.joint_kind();
     let has_axis = kind.has_axis();
     let given = [
@@ -112,19 +106,16 @@ fn check_joint(
     }
     let unwanted = (given.iter()).find(|(is_given, _, is_allowed)| *is_given && !is_allowed);
     if let Some((_, what, _)) = unwanted {
-        return Err(ModelError::NotForJoint {
-            field: at(what),
+        return Err(ModelFault::NotForJoint {
             what,
             joint: kind.name(),
-        });
+        }
+        .at(at(what)));
     }
     if let Some(parent) = &solid.parent
         && !before.contains_key(parent.as_str())
     {
-        return Err(ModelError::UnknownParent {
-            field: at("parent"),
-            name: parent.clone(),
-        });
+        return Err(ModelFault::UnknownParent(parent.clone()).at(at("parent")));
     }
     if kind == JointKind::Free {
         return Ok(());
@@ -172,10 +163,7 @@ fn check_properties(
         return Ok(());
     };
     if !before.contains_key(coupled.joint.as_str()) {
-        return Err(ModelError::UnknownName {
-            field: at("coupled.joint"),
-            name: coupled.joint.clone(),
-        });
+        return Err(ModelFault::UnknownName(coupled.joint.clone()).at(at("coupled.joint")));
     }
     in_range(
         &at("coupled.ratio"),
@@ -196,11 +184,11 @@ fn check_properties(
         (solid.locked.is_some(), "locked"),
     ] {
         if is_given {
-            return Err(ModelError::NotForJoint {
-                field: at(what),
+            return Err(ModelFault::NotForJoint {
                 what,
                 joint: "coupled",
-            });
+            }
+            .at(at(what)));
         }
     }
     Ok(())
@@ -219,11 +207,11 @@ fn check_limits(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     if lower < upper {
         return Ok(());
     }
-    Err(ModelError::NotBelow {
-        field: at("lower"),
+    Err(ModelFault::NotBelow {
         value: lower,
         upper,
-    })
+    }
+    .at(at("lower")))
 }
 
 /// Checks that the solids of a tree are listed together.
@@ -236,10 +224,8 @@ fn check_trees(description: &ModelDescription) -> Result<(), ModelError> {
             Some(parent) => roots.get(parent).copied().unwrap_or(current),
         };
         if solid.parent.is_some() && root != current {
-            return Err(ModelError::OtherTree {
-                field: format!("solids[{i}].parent"),
-                name: description.solids[root].name.clone(),
-            });
+            return Err(ModelFault::OtherTree(description.solids[root].name.clone())
+                .at(format!("solids[{i}].parent")));
         }
         current = root;
         roots.insert(&solid.name, root);
@@ -251,13 +237,8 @@ fn check_trees(description: &ModelDescription) -> Result<(), ModelError> {
 fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let at = |what: &str| format!("solids[{i}].{what}");
     positive(&at("mass"), solid.mass)?;
-    if !(1e-9..=1e12).contains(&solid.mass) {
-        return Err(ModelError::OutOfRange {
-            field: at("mass"),
-            range: "from 1e-9 to 1e12 kg",
-            value: solid.mass,
-        });
-    }
+    let is_within = (1e-9..=1e12).contains(&solid.mass);
+    within(is_within, &at("mass"), solid.mass, "from 1e-9 to 1e12 kg")?;
     check_shapes(i, solid)?;
     place(
         &at("centre_of_mass"),
@@ -272,10 +253,7 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let principal = inertia.symmetric_eigenvalues();
     let (sum, largest) = (principal.sum(), principal.max());
     if principal.min() <= 0.0 || largest > (sum - largest) * (1.0 + 1e-9) {
-        return Err(ModelError::ImpossibleInertia {
-            field: at("inertia"),
-            principal: principal.into(),
-        });
+        return Err(ModelFault::ImpossibleInertia(principal.into()).at(at("inertia")));
     }
     Ok(())
 }
@@ -288,16 +266,10 @@ fn check_tags(
     for (i, tag) in description.tags.iter().enumerate() {
         let at = |what: &str| format!("tags[{i}].{what}");
         if solids.contains_key(tag.name.as_str()) || !names.insert(tag.name.as_str()) {
-            return Err(ModelError::DuplicateName {
-                field: at("name"),
-                name: tag.name.clone(),
-            });
+            return Err(ModelFault::DuplicateName(tag.name.clone()).at(at("name")));
         }
         if !solids.contains_key(tag.solid.as_str()) {
-            return Err(ModelError::UnknownName {
-                field: at("solid"),
-                name: tag.solid.clone(),
-            });
+            return Err(ModelFault::UnknownName(tag.solid.clone()).at(at("solid")));
         }
         place(&at("position"), &tag.position)?;
         for angle in tag.rotation.iter().flatten() {
@@ -313,10 +285,7 @@ fn check_materials(description: &ModelDescription) -> Result<(), ModelError> {
         let at = |what: &str| format!("materials[{i}].{what}");
         material(&at("name"), Some(&own.name))?;
         if !names.insert(own.name.as_str()) {
-            return Err(ModelError::DuplicateName {
-                field: at("name"),
-                name: own.name.clone(),
-            });
+            return Err(ModelFault::DuplicateName(own.name.clone()).at(at("name")));
         }
         moderate(&at("friction"), own.friction)?;
         if let Some(across) = own.friction_across {
@@ -341,45 +310,21 @@ fn check_width(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result
         length(&at("width"), width)?;
     }
     not_negative(&at("rounding"), rounding)?;
-    if rounding > 0.5 * width {
-        return Err(ModelError::OutOfRange {
-            field: at("rounding"),
-            range: "at most half the wheel's width",
-            value: rounding,
-        });
-    }
     let radius = wheel.contact_radius.unwrap_or(wheel.radius);
-    if rounding >= radius {
-        return Err(ModelError::OutOfRange {
-            field: at("rounding"),
-            range: "smaller than the wheel's radius",
-            value: rounding,
-        });
+    for (is_within, range) in [
+        (rounding <= 0.5 * width, "at most half the wheel's width"),
+        (rounding < radius, "smaller than the wheel's radius"),
+    ] {
+        within(is_within, &at("rounding"), rounding, range)?;
     }
     let height = wheel.grouser_height.unwrap_or(0.0);
     not_negative(&at("grouser_height"), height)?;
-    if height > radius {
-        return Err(ModelError::OutOfRange {
-            field: at("grouser_height"),
-            range: "at most the wheel's radius",
-            value: height,
-        });
-    }
-    check_rollers(at, wheel)
-}
-
-/// Checks the angle of a wheel's rollers; `at` gives the path of its fields.
-fn check_rollers(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result<(), ModelError> {
-    match wheel.rollers {
-        Some(angle) if !(LEAST_ROLLER_ANGLE..=FRAC_PI_2).contains(&angle.abs()) => {
-            Err(ModelError::OutOfRange {
-                field: at("rollers"),
-                range: "from 0.01 to π/2 rad either way",
-                value: angle,
-            })
-        }
-        _ => Ok(()),
-    }
+    let range = "at most the wheel's radius";
+    within(height <= radius, &at("grouser_height"), height, range)?;
+    let angle = wheel.rollers.unwrap_or(FRAC_PI_2);
+    let is_crossed = (LEAST_ROLLER_ANGLE..=FRAC_PI_2).contains(&angle.abs());
+    let range = "from 0.01 to π/2 rad either way";
+    within(is_crossed, &at("rollers"), angle, range)
 }
 
 /// Checks how a wheel yields; `at` gives the path of its fields.
@@ -413,12 +358,11 @@ fn check_compliance(
         None => wheel.deflection.is_none(),
     };
     match beside.into_iter().find(|(_, value)| *value != 0.0) {
-        Some((field, value)) if is_rigid => Err(ModelError::OutOfRange {
-            field: at(field),
-            range: "given beside a stiffness or a deflection",
-            value,
-        }),
-        _ => Ok(()),
+        Some((field, value)) => {
+            let range = "given beside a stiffness or a deflection";
+            within(!is_rigid, &at(field), value, range)
+        }
+        None => Ok(()),
     }
 }
 
@@ -430,25 +374,19 @@ fn check_wheels(
     for (i, wheel) in description.wheels.iter().enumerate() {
         let at = |what: &str| format!("wheels[{i}].{what}");
         if !names.insert(wheel.name.as_str()) {
-            return Err(ModelError::DuplicateName {
-                field: at("name"),
-                name: wheel.name.clone(),
-            });
+            return Err(ModelFault::DuplicateName(wheel.name.clone()).at(at("name")));
         }
         let find = |field: &str, name: &String| {
             let found = solids.get(name.as_str()).copied();
-            found.ok_or_else(|| ModelError::UnknownName {
-                field: at(field),
-                name: name.clone(),
-            })
+            found.ok_or_else(|| ModelFault::UnknownName(name.clone()).at(at(field)))
         };
         let mut solid = find("solid", &wheel.solid)?;
         if description.solids[solid].drive.is_some() {
-            return Err(ModelError::NotForJoint {
-                field: format!("solids[{solid}].drive"),
+            return Err(ModelFault::NotForJoint {
                 what: "drive",
                 joint: "wheel's",
-            });
+            }
+            .at(format!("solids[{solid}].drive")));
         }
         direction(&at("axle"), wheel.axle)?;
         length(&at("radius"), wheel.radius)?;
@@ -461,20 +399,17 @@ fn check_wheels(
         if let Some(radius) = description.solids[solid].disc_radius(&wheel.axle)
             && (radius - wheel.radius).abs() > 1e-9 * radius
         {
-            return Err(ModelError::RadiusContradictsShape {
-                field: at("radius"),
+            return Err(ModelFault::RadiusContradictsShape {
                 value: wheel.radius,
                 solid: wheel.solid.clone(),
                 shape: radius,
-            });
+            }
+            .at(at("radius")));
         }
         moderate(&at("torque_limit"), wheel.torque_limit)?;
         finite(&at("drive_sign"), &[wheel.drive_sign])?;
         if (wheel.drive_sign.abs() - 1.0).abs() > 0.0 {
-            return Err(ModelError::NotASign {
-                field: at("drive_sign"),
-                value: wheel.drive_sign,
-            });
+            return Err(ModelFault::NotASign(wheel.drive_sign).at(at("drive_sign")));
         }
         if let Some(motor) = wheel.motor {
             motor.check(|field| at(&format!("motor.{field}")))?;
@@ -487,15 +422,10 @@ fn check_wheels(
                 solid = parent.and_then(|p| solids.get(p).copied()).unwrap_or(0);
             }
             if solid != steering || description.solids[steering].parent.is_none() {
-                return Err(ModelError::SteeringNotAbove {
-                    field: at("steering"),
-                    name: name.clone(),
-                });
+                return Err(ModelFault::SteeringNotAbove(name.clone()).at(at("steering")));
             }
             let Some(limit) = wheel.steering_limit else {
-                return Err(ModelError::Missing {
-                    field: at("steering_limit"),
-                });
+                return Err(ModelFault::Missing.at(at("steering_limit")));
             };
             moderate(&at("steering_limit"), limit)?;
         }

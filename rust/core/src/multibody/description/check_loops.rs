@@ -2,10 +2,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::check_values::{in_range, place};
+use super::check_values::{in_range, place, within};
 use super::closure::{LoopDescription, LoopKind, MAX_TERMS};
 use super::{JointKind, ModelDescription};
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 
 /// Checks names and numbers. Whether the loops close is seen when the machine is built.
 pub(super) fn check_loops(
@@ -16,10 +16,7 @@ pub(super) fn check_loops(
     for (i, closure) in description.loops.iter().enumerate() {
         let at = |what: &str| format!("loops[{i}].{what}");
         if !names.insert(closure.name.as_str()) {
-            return Err(ModelError::DuplicateName {
-                field: at("name"),
-                name: closure.name.clone(),
-            });
+            return Err(ModelFault::DuplicateName(closure.name.clone()).at(at("name")));
         }
         let ends = [
             ("solid", Some(&closure.solid)),
@@ -28,24 +25,21 @@ pub(super) fn check_loops(
         for (what, name) in ends {
             let Some(name) = name else { continue };
             let Some(&solid) = solids.get(name.as_str()) else {
-                return Err(ModelError::UnknownName {
-                    field: at(what),
-                    name: name.clone(),
-                });
+                return Err(ModelFault::UnknownName(name.clone()).at(at(what)));
             };
             let solid = &description.solids[solid];
             if closure.kind == LoopKind::Joint
                 && (!solid.joint_kind().has_axis() || solid.locked.is_some())
             {
-                return Err(ModelError::NotForJoint {
-                    field: at(what),
+                return Err(ModelFault::NotForJoint {
                     what: "coordinate",
                     joint: if solid.locked.is_some() {
                         "locked"
                     } else {
                         solid.joint_kind().name()
                     },
-                });
+                }
+                .at(at(what)));
             }
         }
         check_fields(closure, at)?;
@@ -72,11 +66,11 @@ fn check_fields(closure: &LoopDescription, at: impl Fn(&str) -> String) -> Resul
         (closure.polynomial.is_some(), "polynomial", is_joint),
     ] {
         if is_given && !is_allowed {
-            return Err(ModelError::NotForLoop {
-                field: at(what),
+            return Err(ModelFault::NotForLoop {
                 what,
                 kind: closure.kind.name(),
-            });
+            }
+            .at(at(what)));
         }
     }
     place(&at("position"), &closure.position.unwrap_or_default())?;
@@ -98,17 +92,13 @@ fn check_fields(closure: &LoopDescription, at: impl Fn(&str) -> String) -> Resul
     } else {
         1
     };
-    if terms.is_empty() || terms.len() > most {
-        return Err(ModelError::OutOfRange {
-            field: at("polynomial"),
-            range: if most == 1 {
-                "one coefficient, since the loop has no other joint"
-            } else {
-                "one to five coefficients"
-            },
-            value: terms.len() as f64,
-        });
-    }
+    let range = if most == 1 {
+        "one coefficient, since the loop has no other joint"
+    } else {
+        "one to five coefficients"
+    };
+    let n = terms.len();
+    within((1..=most).contains(&n), &at("polynomial"), n as f64, range)?;
     for term in terms {
         in_range(&at("polynomial"), *term, 1e6, "at most 1e6 either way")?;
     }
@@ -133,9 +123,7 @@ fn check_ends(
         ),
     ];
     match needed.iter().find(|(is_missing, _)| *is_missing) {
-        Some((_, what)) => Err(ModelError::Missing {
-            field: format!("loops[{i}].{what}"),
-        }),
+        Some((_, what)) => Err(ModelFault::Missing.at(format!("loops[{i}].{what}"))),
         None => Ok(()),
     }
 }

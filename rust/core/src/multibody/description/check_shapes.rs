@@ -2,14 +2,14 @@
 
 use super::check_values::{in_range, length, material, not_negative, place, positive};
 use super::{Shape, ShapeDescription, SolidDescription};
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 
 /// Checks each shape of a solid, and that the solid uses only one of the two forms.
 pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let at = |what: &str| format!("solids[{i}].{what}");
     if let Some(shape) = &solid.shape {
         if matches!(shape, Shape::Hull { .. }) {
-            return Err(ModelError::HullAlone { field: at("shape") });
+            return Err(ModelFault::HullAlone.at(at("shape")));
         }
         check_lengths(&at("shape"), shape)?;
     }
@@ -20,16 +20,11 @@ pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), Mod
         (solid.material.is_some(), "material"),
     ] {
         if is_given && !solid.shapes.is_empty() {
-            return Err(ModelError::NotWithShapes {
-                field: at(what),
-                what,
-            });
+            return Err(ModelFault::NotWithShapes(what).at(at(what)));
         }
     }
     if solid.collides && !can_collide {
-        return Err(ModelError::CannotCollide {
-            field: at("collides"),
-        });
+        return Err(ModelFault::CannotCollide.at(at("collides")));
     }
     material(&at("material"), solid.material.as_ref())?;
     for (k, shape) in solid.shapes.iter().enumerate() {
@@ -43,7 +38,7 @@ pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), Mod
         } else {
             "centre_of_mass"
         };
-        return Err(ModelError::HalfGiven { field: at(missing) });
+        return Err(ModelFault::HalfGiven.at(at(missing)));
     }
     Ok(())
 }
@@ -57,11 +52,7 @@ fn check_drawings(i: usize, solid: &SolidDescription) -> Result<(), ModelError> 
         let count = drawing.vertices.len();
         if let Some(&vertex) = drawing.faces.iter().flatten().find(|&&v| v >= count) {
             let field = at("faces");
-            return Err(ModelError::NoVertex {
-                field,
-                vertex,
-                count,
-            });
+            return Err(ModelFault::NoVertex { vertex, count }.at(field));
         }
         colour(&at("colour"), drawing.colour)?;
     }
@@ -94,9 +85,7 @@ fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelErr
     material(&format!("{at}.material"), shape.material.as_ref())?;
     colour(&format!("{at}.colour"), shape.colour)?;
     if shape.collides && !collides(&shape.shape) {
-        return Err(ModelError::CannotCollide {
-            field: format!("{at}.collides"),
-        });
+        return Err(ModelFault::CannotCollide.at(format!("{at}.collides")));
     }
     Ok(())
 }
@@ -119,10 +108,7 @@ fn check_lengths(at: &str, shape: &Shape) -> Result<(), ModelError> {
             shape
                 .polytope()
                 .map(|_| ())
-                .ok_or_else(|| ModelError::NoHull {
-                    field: field("points"),
-                    count: points.len(),
-                })
+                .ok_or_else(|| ModelFault::NoHull(points.len()).at(field("points")))
         }
     }
 }

@@ -3,10 +3,23 @@
 use nalgebra::{Unit, Vector3};
 
 use crate::law::materials::is_name;
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 
 /// Largest magnitude of a length in a description, m.
 const MAX_LENGTH: f64 = 1e6;
+
+/// Checks that a value is within its range, which words name.
+pub(in crate::multibody) fn within(
+    is_within: bool,
+    field: &str,
+    value: f64,
+    range: &'static str,
+) -> Result<(), ModelError> {
+    if is_within {
+        return Ok(());
+    }
+    Err(ModelFault::OutOfRange { range, value }.at(field))
+}
 
 /// Checks that a value is finite and at most `limit` in magnitude.
 pub(in crate::multibody) fn in_range(
@@ -16,27 +29,14 @@ pub(in crate::multibody) fn in_range(
     range: &'static str,
 ) -> Result<(), ModelError> {
     finite(field, &[value])?;
-    if value.abs() <= limit {
-        return Ok(());
-    }
-    Err(ModelError::OutOfRange {
-        field: field.to_owned(),
-        range,
-        value,
-    })
+    within(value.abs() <= limit, field, value, range)
 }
 
 /// Checks a positive length, m.
 pub(in crate::multibody) fn length(field: &str, value: f64) -> Result<(), ModelError> {
     positive(field, value)?;
-    if (1e-6..=MAX_LENGTH).contains(&value) {
-        return Ok(());
-    }
-    Err(ModelError::OutOfRange {
-        field: field.to_owned(),
-        range: "from 1e-6 to 1e6 m",
-        value,
-    })
+    let is_within = (1e-6..=MAX_LENGTH).contains(&value);
+    within(is_within, field, value, "from 1e-6 to 1e6 m")
 }
 
 /// Checks a position, m.
@@ -56,10 +56,7 @@ pub(super) fn finite(field: &str, values: &[f64]) -> Result<(), ModelError> {
         if value.is_finite() {
             Ok(())
         } else {
-            Err(ModelError::NotFinite {
-                field: field.to_owned(),
-                value,
-            })
+            Err(ModelFault::NotFinite(value).at(field))
         }
     })
 }
@@ -69,10 +66,7 @@ pub(super) fn positive(field: &str, value: f64) -> Result<(), ModelError> {
     if value > 0.0 {
         Ok(())
     } else {
-        Err(ModelError::NotPositive {
-            field: field.to_owned(),
-            value,
-        })
+        Err(ModelFault::NotPositive(value).at(field))
     }
 }
 
@@ -81,20 +75,14 @@ pub(super) fn not_negative(field: &str, value: f64) -> Result<(), ModelError> {
     if value >= 0.0 {
         Ok(())
     } else {
-        Err(ModelError::Negative {
-            field: field.to_owned(),
-            value,
-        })
+        Err(ModelFault::Negative(value).at(field))
     }
 }
 
 /// Checks the name of a material.
 pub(super) fn material(field: &str, name: Option<&String>) -> Result<(), ModelError> {
     match name.filter(|name| !is_name(name)) {
-        Some(name) => Err(ModelError::MaterialName {
-            field: field.to_owned(),
-            name: name.clone(),
-        }),
+        Some(name) => Err(ModelFault::MaterialName(name.clone()).at(field)),
         None => Ok(()),
     }
 }
@@ -104,9 +92,6 @@ pub(super) fn direction(field: &str, value: [f64; 3]) -> Result<(), ModelError> 
     if Unit::try_new(Vector3::from(value), 1e-9).is_some() {
         Ok(())
     } else {
-        Err(ModelError::NoDirection {
-            field: field.to_owned(),
-            value,
-        })
+        Err(ModelFault::NoDirection(value).at(field))
     }
 }

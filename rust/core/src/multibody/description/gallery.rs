@@ -1,7 +1,7 @@
 //! The models that come with the simulator, by name.
 
 use super::ModelDescription;
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 
 /// Names and files, the built-in rover first.
 const GALLERY: [(&str, &str); 5] = [
@@ -34,12 +34,15 @@ impl ModelDescription {
     /// The model of the gallery with this name.
     ///
     /// # Errors
-    /// [`ModelError::UnknownModel`] with the known names.
+    /// [`ModelFault::UnknownModel`] with the known names.
     pub fn named(name: &str) -> Result<Self, ModelError> {
         let found = GALLERY.iter().find(|(known, _)| *known == name);
-        let (_, text) = found.ok_or_else(|| ModelError::UnknownModel {
-            name: name.to_owned(),
-            known: Self::names().join(", "),
+        let (_, text) = found.ok_or_else(|| {
+            ModelFault::UnknownModel {
+                name: name.to_owned(),
+                known: Self::names().join(", "),
+            }
+            .at("name")
         })?;
         Self::from_toml(text)
     }

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{LoopDescription, MachineDescription, ModelDescription, SolidDescription};
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 
 impl ModelDescription {
     /// Machines side by side, with loops between them. Names of solids, wheels, tags and loops get
@@ -89,18 +89,13 @@ pub(super) fn check_machines(
         return Ok(());
     }
     if description.self_contact {
-        return Err(ModelError::OfAMachine {
-            field: "self_contact".to_owned(),
-        });
+        return Err(ModelFault::OfAMachine.at("self_contact"));
     }
     let (mut names, mut least) = (HashSet::new(), 0);
     for (i, machine) in description.machines.iter().enumerate() {
         let at = |what: &str| format!("machines[{i}].{what}");
         if !names.insert(machine.name.as_str()) {
-            return Err(ModelError::DuplicateName {
-                field: at("name"),
-                name: machine.name.clone(),
-            });
+            return Err(ModelFault::DuplicateName(machine.name.clone()).at(at("name")));
         }
         let first = solids.get(machine.first.as_str()).copied();
         let is_first = first.is_some_and(|first| {
@@ -108,10 +103,7 @@ pub(super) fn check_machines(
                 && if i == 0 { first == 0 } else { first >= least }
         });
         if !is_first {
-            return Err(ModelError::NotAFirstSolid {
-                field: at("first"),
-                name: machine.first.clone(),
-            });
+            return Err(ModelFault::NotAFirstSolid(machine.first.clone()).at(at("first")));
         }
         least = first.map_or(0, |first| first + 1);
     }
@@ -120,10 +112,10 @@ pub(super) fn check_machines(
     for (i, wheel) in description.wheels.iter().enumerate() {
         let machine = solids.get(wheel.solid.as_str()).map_or(0, |&k| machines[k]);
         if machine < last {
-            return Err(ModelError::OtherMachine {
-                field: format!("wheels[{i}].solid"),
-                name: description.machines[machine].name.clone(),
-            });
+            return Err(
+                ModelFault::OtherMachine(description.machines[machine].name.clone())
+                    .at(format!("wheels[{i}].solid")),
+            );
         }
         last = machine;
     }

@@ -4,14 +4,16 @@ use std::collections::HashSet;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::check_values::{direction, in_range, length, material, moderate, place, positive};
+use super::check_values::{
+    direction, in_range, length, material, moderate, place, positive, within,
+};
 use super::tracks::MOST_TRACK_WHEELS;
 use super::yielding::Share;
 use super::{
     CouplingDescription, JointKind, ModelDescription, SolidDescription, TrackDescription,
     WheelDescription,
 };
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 
 impl ModelDescription {
     /// Replaces all tracks by solids and wheels.
@@ -138,27 +140,19 @@ fn check_track(
     at: impl Fn(&str) -> String,
 ) -> Result<(), ModelError> {
     if !known.contains(track.solid.as_str()) {
-        return Err(ModelError::UnknownName {
-            field: at("solid"),
-            name: track.solid.clone(),
-        });
+        return Err(ModelFault::UnknownName(track.solid.clone()).at(at("solid")));
     }
     for k in 0..track.wheels.min(MOST_TRACK_WHEELS) {
         let name = track.name_of(k);
         if known.contains(name.as_str()) {
-            return Err(ModelError::DuplicateName {
-                field: at("name"),
-                name,
-            });
+            return Err(ModelFault::DuplicateName(name).at(at("name")));
         }
     }
-    if !(2..=MOST_TRACK_WHEELS).contains(&track.wheels) {
-        return Err(ModelError::OutOfRange {
-            field: at("wheels"),
-            range: "from 2 to 100",
-            value: track.wheels as f64,
-        });
-    }
+    let (n, is_within) = (
+        track.wheels,
+        (2..=MOST_TRACK_WHEELS).contains(&track.wheels),
+    );
+    within(is_within, &at("wheels"), n as f64, "from 2 to 100")?;
     place(&at("from"), &track.from)?;
     place(&at("to"), &track.to)?;
     length(&at("radius"), track.radius)?;
@@ -175,9 +169,7 @@ fn check_track(
         moderate(&at(what), value.unwrap_or(0.0))?;
     }
     if track.damping.is_some() && track.stiffness.is_none() {
-        return Err(ModelError::Missing {
-            field: at("stiffness"),
-        });
+        return Err(ModelFault::Missing.at(at("stiffness")));
     }
     material(&at("material"), track.material.as_ref())?;
     if let Some(motor) = track.motor {

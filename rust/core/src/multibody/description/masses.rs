@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Shape, ShapeDescription, SolidDescription};
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 use crate::spatial::SymmetricMatrix3;
 
 /// Mass centre and inertia of a solid, in its frame.
@@ -45,8 +45,7 @@ impl SolidDescription {
             return Ok(MassProperties { centre, inertia });
         }
         if self.shapes.is_empty() {
-            let field = "shape".to_owned();
-            return Err(ModelError::Missing { field });
+            return Err(ModelFault::Missing.at("shape"));
         }
         Ok(together(&self.shapes, &shape_masses(self)?))
     }
@@ -61,9 +60,9 @@ fn shape_masses(solid: &SolidDescription) -> Result<Vec<f64>, ModelError> {
     let content = |(k, shape): (usize, &ShapeDescription)| match (shape.mass, &shape.shape) {
         (Some(_), _) => Ok(0.0),
         (None, Shape::Disc { radius }) if are_discs => Ok(radius * radius),
-        (None, shape) => shape.volume().ok_or_else(|| ModelError::NoVolume {
-            field: format!("shapes[{k}].mass"),
-        }),
+        (None, shape) => shape
+            .volume()
+            .ok_or_else(|| ModelFault::NoVolume.at(format!("shapes[{k}].mass"))),
     };
     let contents: Vec<f64> = (shapes.iter().enumerate())
         .map(content)
@@ -88,11 +87,11 @@ pub(super) fn mass_left(solid: &SolidDescription) -> Result<f64, ModelError> {
     if is_right {
         return Ok(rest);
     }
-    Err(ModelError::MassesContradict {
-        field: "mass".to_owned(),
+    Err(ModelFault::MassesContradict {
         value: solid.mass,
         sum,
-    })
+    }
+    .at("mass"))
 }
 
 /// Mass centre of the shapes, and their inertia about it by the parallel axis theorem.

@@ -19,7 +19,7 @@ pub mod shape;
 mod tracks;
 mod yielding;
 
-use super::error::ModelError;
+use super::error::{ModelError, ModelFault};
 use super::motor::Motor;
 pub use closure::{LoopDescription, LoopKind};
 pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, JointLimits, Spring};
@@ -305,7 +305,7 @@ fn read<E: ToString>(
         Ok(description) if description.format == FORMAT => Ok(description),
         other => match format() {
             Some(format) if format != i64::from(FORMAT) => {
-                Err(ModelError::UnknownFormat { format })
+                Err(ModelFault::UnknownFormat(format).at("format"))
             }
             _ => other.map_err(|e| ModelError::Unreadable {
                 message: e.to_string(),
@@ -316,12 +316,12 @@ fn read<E: ToString>(
 
 fn check_length(text: &str) -> Result<(), ModelError> {
     if text.len() > MAX_TEXT {
-        return Err(ModelError::TooMany {
-            field: "text",
+        return Err(ModelFault::TooMany {
             what: "bytes",
             count: text.len(),
             limit: MAX_TEXT,
-        });
+        }
+        .at("text"));
     }
     Ok(())
 }
@@ -428,7 +428,7 @@ impl ModelDescription {
     /// Reads TOML.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond
+    /// [`ModelError::Unreadable`] with line and column; [`ModelFault::TooMany`] beyond
     /// [`MAX_TEXT`].
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
         check_length(text)?;
@@ -450,7 +450,7 @@ impl ModelDescription {
     /// Reads JSON.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond
+    /// [`ModelError::Unreadable`] with line and column; [`ModelFault::TooMany`] beyond
     /// [`MAX_TEXT`].
     pub fn from_json(text: &str) -> Result<Self, ModelError> {
         check_length(text)?;

@@ -118,8 +118,4 @@ impl JointModel for Coupled {
     fn combined(&self) -> Option<(usize, usize)> {
         self.coupling.combined
     }
-
-    fn names(&self) -> &'static [&'static str] {
-        &[]
-    }
 }

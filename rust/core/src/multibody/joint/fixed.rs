@@ -16,14 +16,6 @@ use crate::scalar::{Lane, Mat3};
 pub struct Fixed;
 
 impl JointModel for Fixed {
-    fn nv(&self) -> usize {
-        0
-    }
-
-    fn turning(&self) -> Option<f64> {
-        None
-    }
-
     #[inline(always)]
     fn place<T: Lane>(
         &self,
@@ -43,10 +35,6 @@ impl JointModel for Fixed {
     #[inline(always)]
     fn screw<T: Lane>(&self, _motion: &Motion<T>) -> Screw<T> {
         Screw::NONE
-    }
-
-    fn names(&self) -> &'static [&'static str] {
-        &[]
     }
 }
 

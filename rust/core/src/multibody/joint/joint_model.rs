@@ -45,8 +45,12 @@ pub struct JointPlacement<T> {
 
 /// A joint of the catalogue.
 pub trait JointModel {
-    /// Number of its own velocities; 0 for a joint that follows another.
-    fn nv(&self) -> usize;
+    /// Number of its own velocities; 0 for a joint that follows another. By default one if it has a
+    /// coordinate.
+    #[inline(always)]
+    fn nv(&self) -> usize {
+        usize::from(self.coordinate().is_some())
+    }
 
     /// Number of its screws: one a velocity, own or followed, without those of a free base.
     fn n_motions(&self) -> usize {
@@ -60,7 +64,9 @@ pub trait JointModel {
 
     /// Angular speed of its body relative to the carrier at a unit of one of its velocities; `None`
     /// if it never turns.
-    fn turning(&self) -> Option<f64>;
+    fn turning(&self) -> Option<f64> {
+        None
+    }
 
     /// Which of the machine's numbers is its coordinate, or that of the joint that it follows.
     fn coordinate(&self) -> Option<usize> {
@@ -112,7 +118,10 @@ pub trait JointModel {
     fn advance<T: Lane>(&self, _q: &mut impl JointCoordinates<T>, _v: &[T], _h: T) {}
 
     /// Names of its public coordinates; that of a single number is the body's.
-    fn names(&self) -> &'static [&'static str];
+    fn names(&self) -> &'static [&'static str] {
+        const SINGLE: &[&str] = &[""];
+        &SINGLE[..self.nv()]
+    }
 
     /// Where the angles of its rotation stand among its public coordinates, if it has one.
     fn first_angle(&self) -> Option<usize> {

@@ -30,16 +30,8 @@ impl Prismatic {
 }
 
 impl JointModel for Prismatic {
-    fn nv(&self) -> usize {
-        1
-    }
-
     fn slides(&self) -> bool {
         true
-    }
-
-    fn turning(&self) -> Option<f64> {
-        None
     }
 
     fn coordinate(&self) -> Option<usize> {
@@ -68,9 +60,5 @@ impl JointModel for Prismatic {
     #[inline(always)]
     fn screw<T: Lane>(&self, motion: &Motion<T>) -> Screw<T> {
         Screw::slide(motion.swing)
-    }
-
-    fn names(&self) -> &'static [&'static str] {
-        &[""]
     }
 }

@@ -20,11 +20,6 @@ pub struct Revolute {
 }
 
 impl JointModel for Revolute {
-    #[inline(always)]
-    fn nv(&self) -> usize {
-        1
-    }
-
     fn turning(&self) -> Option<f64> {
         Some(1.0)
     }
@@ -63,9 +58,5 @@ impl JointModel for Revolute {
     #[inline(always)]
     fn screw<T: Lane>(&self, motion: &Motion<T>) -> Screw<T> {
         Screw::turn(motion.axis)
-    }
-
-    fn names(&self) -> &'static [&'static str] {
-        &[""]
     }
 }

@@ -16,7 +16,7 @@ use crate::law::materials::OwnFriction;
 use crate::multibody::description::{
     JointKind, MaterialDescription, ModelDescription, Shape, SolidDescription,
 };
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 use crate::multibody::joint::fixed::Lock;
 use crate::multibody::joint::{
     Coupled, Coupling, Fixed, Free, Joint, JointAxis, JointModel, Prismatic, Revolute, SingleJoint,
@@ -428,10 +428,7 @@ fn named(material: Option<&String>, default: &str) -> String {
 
 fn coupled_apart(i: usize, solid: &SolidDescription) -> ModelError {
     let name = solid.coupled.as_ref().map(|c| c.joint.clone());
-    ModelError::CoupledApart {
-        field: format!("solids[{i}].coupled.joint"),
-        name: name.unwrap_or_default(),
-    }
+    ModelFault::CoupledApart(name.unwrap_or_default()).at(format!("solids[{i}].coupled.joint"))
 }
 
 fn tree(t: usize, bodies: &[Body], paths: &Paths) -> Tree {

@@ -8,7 +8,7 @@ use super::closed_loop::{BodyPose, Closure, JointReading, Loop, LoopEnd};
 use super::{Body, Frame, Model, fingerprint};
 use crate::multibody::description::check_loops::is_placed;
 use crate::multibody::description::{LoopDescription, LoopKind};
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 use crate::multibody::joint::fixed::Lock;
 use crate::multibody::joint::{Coupled, Joint, SingleJoint};
 use crate::scalar::elementary::atan2;
@@ -50,13 +50,13 @@ impl Model {
                 made.kind != LoopKind::Joint && is_placed(&self.description, &described, &solids);
             // A gap that is not a number is open, too.
             if has_place && (gap.value.is_nan() || gap.value > CLOSED) {
-                return Err(ModelError::LoopOpen {
-                    field: format!("loops[{i}]"),
+                return Err(ModelFault::LoopOpen {
                     name: made.name,
                     gap: gap.value,
                     unit: gap.unit,
                     without,
-                });
+                }
+                .at(format!("loops[{i}]")));
             }
             self.description.loops[i] = described;
             self.loops.push(made);
@@ -81,10 +81,7 @@ impl Model {
         );
         let body = |frame: Option<&Frame>| frame.map(|frame| frame.body);
         if body(first) == body(second) {
-            return Err(ModelError::LoopInOneBody {
-                field: format!("loops[{i}]"),
-                name: described.name.clone(),
-            });
+            return Err(ModelFault::LoopInOneBody(described.name.clone()).at(format!("loops[{i}]")));
         }
         let (R_a, r_a) = pose(first, poses);
         let (R_b, r_b) = pose(second, poses);
@@ -115,19 +112,15 @@ impl Model {
             let found = body.and_then(|body| {
                 JointReading::of(&self.bodies[body].joint, &self.joint_velocities)
             });
-            found.ok_or_else(|| ModelError::UnknownName {
-                field: format!("loops[{i}].{what}"),
-                name: name.to_owned(),
+            found.ok_or_else(|| {
+                ModelFault::UnknownName(name.to_owned()).at(format!("loops[{i}].{what}"))
             })
         };
         let own = reading("solid", &described.solid)?;
         let other = (described.other.as_deref()).map(|name| reading("other", name));
         let other = other.transpose()?;
         if other.is_some_and(|other| other.joint == own.joint) {
-            return Err(ModelError::LoopInOneBody {
-                field: format!("loops[{i}]"),
-                name: described.name.clone(),
-            });
+            return Err(ModelFault::LoopInOneBody(described.name.clone()).at(format!("loops[{i}]")));
         }
         let usual: &[f64] = if other.is_some() { &[0.0, 1.0] } else { &[0.0] };
         let polynomial = described.polynomial.as_deref().unwrap_or(usual);

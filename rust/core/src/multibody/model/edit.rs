@@ -3,7 +3,7 @@
 use super::Model;
 use crate::multibody::description::check_values::{in_range, length};
 use crate::multibody::description::{LoopDescription, ModelDescription, WheelDescription};
-use crate::multibody::error::ModelError;
+use crate::multibody::error::{ModelError, ModelFault};
 use crate::multibody::motor::Motor;
 
 /// What of a copy of a machine is changed; `None` leaves it as it is.
@@ -108,10 +108,7 @@ impl Model {
         for (name, mass) in &changes.masses {
             let Some(solid) = description.solids.iter_mut().find(|s| &s.name == name) else {
                 let field = "masses".to_owned();
-                return Err(ModelError::UnknownName {
-                    field,
-                    name: name.clone(),
-                });
+                return Err(ModelFault::UnknownName(name.clone()).at(field));
             };
             solid.set_mass(*mass);
         }
@@ -153,10 +150,7 @@ impl Model {
             let mut solids = description.solids.iter_mut();
             let found = solids.find(|s| &s.name == name && s.joint_kind().has_axis());
             let Some(solid) = found else {
-                return Err(ModelError::UnknownName {
-                    field: format!("joints[{i}]"),
-                    name: name.clone(),
-                });
+                return Err(ModelFault::UnknownName(name.clone()).at(format!("joints[{i}]")));
             };
             in_range(&format!("joints[{name}]"), *angle, 1e9, "at most 1e9 rad")?;
             solid.locked = Some(*angle);
@@ -178,10 +172,7 @@ impl Model {
             let solid = solids.find(|s| s.name == wheel.solid);
             if let Some(solid) = solid {
                 let Some(before) = solid.set_disc_radius(&wheel.axle, radius) else {
-                    return Err(ModelError::NotADisc {
-                        field: "wheel_radius",
-                        solid: wheel.solid.clone(),
-                    });
+                    return Err(ModelFault::NotADisc(wheel.solid.clone()).at("wheel_radius"));
                 };
                 let scale = (radius / before).powi(2);
                 for entry in solid.inertia.iter_mut().flatten() {

@@ -66,14 +66,8 @@ impl TreeAmongGrains<'_> {
         StepStart<'q, LaneConfiguration<f64>>,
     ) {
         let ((q_a, q_b), (v_a, v_b)) = (start.configuration, self.halves(start.v));
-        let of_grains = StepStart {
-            configuration: q_a,
-            v: v_a,
-        };
-        let of_tree = StepStart {
-            configuration: q_b,
-            v: v_b,
-        };
+        let of_grains = StepStart::at(q_a, v_a);
+        let of_tree = StepStart::at(q_b, v_b);
         (of_grains, of_tree)
     }
 
@@ -145,12 +139,6 @@ impl Dynamics for TreeAmongGrains<'_> {
         let (v_a, v_b) = self.halves(v);
         self.bed.advance(&mut q.0, v_a, h);
         self.tree.machine().advance(&mut q.1, v_b, h);
-    }
-
-    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Both, to: &mut Both) {
-        if lanes(0) {
-            to.clone_from(from);
-        }
     }
 
     fn is_finite(&self, q: &Both) -> bool {
@@ -526,47 +514,24 @@ impl MechanicalSystem for TreeAmongGrains<'_> {
     }
 
     fn solve(
-        &self,
-        q: &[f64],
-        mu: &[f64],
-        options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
-        workspace: &mut SolverWorkspace,
-    ) -> SolveReport {
-        let parts = &*self.parts;
-        if !parts.touches.is_empty() {
-            return self.bed.solve(q, mu, options, p, u, workspace);
-        }
-        let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
-        let ([q_a, q_b], [p_a, p_b]) = (parts.split(q), parts.split_mut(p));
-        let [u_a, u_b] = parts.split_mut(u);
-        harder(
-            &self.bed.solve(q_a, mu_a, options, p_a, u_a, workspace),
-            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
-        )
-    }
-
-    fn solve_step(
         &mut self,
-        (v, y): (&[f64], &[f64]),
+        free: Option<(&[f64], &[f64])>,
         (q, mu): (&[f64], &[f64]),
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        (p, u): (&mut [f64], &mut [f64]),
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        let free = (self.halves(v).0, self.halves(y).0);
+        let free = free.map(|(v, y)| (self.halves(v).0, self.halves(y).0));
         let parts = &*self.parts;
         if !parts.touches.is_empty() {
-            return (self.bed).solve_step(free, (q, mu), options, p, u, workspace);
+            return (self.bed).solve(free, (q, mu), options, (p, u), workspace);
         }
         let (mu_a, mu_b) = mu.split_at(parts.of_grains.len());
         let ([q_a, q_b], [p_a, p_b]) = (parts.split(q), parts.split_mut(p));
         let [u_a, u_b] = parts.split_mut(u);
         harder(
-            &(self.bed).solve_step(free, (q_a, mu_a), options, p_a, u_a, workspace),
-            &self.tree.solve(q_b, mu_b, options, p_b, u_b, workspace),
+            &(self.bed).solve(free, (q_a, mu_a), options, (p_a, u_a), workspace),
+            &(self.tree).solve(None, (q_b, mu_b), options, (p_b, u_b), workspace),
         )
     }
 

@@ -7,7 +7,7 @@ use crate::contact::{ContactKey, clusters_of};
 use crate::integrator::grouped::Grouped;
 use crate::integrator::{StepOptions, StepReport, WarmStart};
 use crate::multibody::Model;
-use crate::scalar::{Lane, LaneMask};
+use crate::scalar::{Lane, LaneMask, inlined};
 use crate::solver::batch::problem::{ContactProblem, Triple};
 use crate::solver::{Method, SolverOptions};
 
@@ -54,10 +54,10 @@ impl<T: Lane> LaneSystem<T> {
             }
         }
         if self.contacts.factored() != 0 {
-            T::vectorize(
+            inlined!(
+                T::vectorize,
                 self.token,
-                #[inline(always)]
-                || self.begin_near(options, q, start, lanes, problems),
+                self.begin_near(options, q, start, lanes, problems)
             );
         }
     }

@@ -17,7 +17,7 @@ use crate::integrator::{StepOptions, StepReport};
 use crate::law::compliance::{Compliance, Yielding};
 use crate::law::newton_impact::rebound;
 use crate::multibody::LaneConfiguration;
-use crate::scalar::{Lane, Vec3};
+use crate::scalar::{Lane, Vec3, inlined};
 use crate::solver::batch::problem::{ContactProblem, Triple};
 use crate::system::tree_lanes::TreeLanes;
 
@@ -81,11 +81,7 @@ impl<T: Lane> LaneSystem<T> {
     pub fn find_loop_impulses(&mut self, lanes: T::Mask, p: &[Triple<T>]) {
         if let Some(loops) = &mut self.tree.loops {
             let impulses = in_slots(&self.contacts, lanes, p);
-            T::vectorize(
-                self.token,
-                #[inline(always)]
-                || loops.find_impulses(&impulses),
-            );
+            inlined!(T::vectorize, self.token, loops.find_impulses(&impulses));
         }
     }
 

@@ -1,6 +1,6 @@
 //! The grains: radii and masses, and the factors of their diagonal mass matrix.
 
-use super::error::GrainError;
+use super::error::{GrainError, check_length};
 use super::removal::Renumbering;
 use crate::law::cohesion::Cohesion;
 use crate::quantity::{LENGTHS, MASSES, within};
@@ -61,13 +61,7 @@ impl<const D: usize> Grains<D> {
         if radius.is_empty() {
             return Err(GrainError::Empty);
         }
-        if mass.len() != radius.len() {
-            return Err(GrainError::Length {
-                field: "mass",
-                expected: radius.len(),
-                count: mass.len(),
-            });
-        }
+        check_length("mass", radius.len(), mass.len())?;
         check_count::<D>(radius.len())?;
         for (name, values, range) in [("radius", &radius, LENGTHS), ("mass", &mass, MASSES)] {
             for (i, value) in values.iter().enumerate() {
@@ -96,13 +90,7 @@ impl<const D: usize> Grains<D> {
     /// # Errors
     /// Another number of marks.
     pub fn with_kinematic(self, kinematic: Vec<bool>) -> Result<Self, GrainError> {
-        if kinematic.len() != self.len() {
-            return Err(GrainError::Length {
-                field: "kinematic",
-                expected: self.len(),
-                count: kinematic.len(),
-            });
-        }
+        check_length("kinematic", self.len(), kinematic.len())?;
         Ok(Self { kinematic, ..self })
     }
 

@@ -103,6 +103,22 @@ pub enum GrainError {
     NoMachine,
 }
 
+/// Checks the number of entries of an argument.
+pub(crate) fn check_length(
+    field: &'static str,
+    expected: usize,
+    count: usize,
+) -> Result<(), GrainError> {
+    if count == expected {
+        return Ok(());
+    }
+    Err(GrainError::Length {
+        field,
+        expected,
+        count,
+    })
+}
+
 impl GrainError {
     /// Name of the argument that is wrong.
     #[must_use]

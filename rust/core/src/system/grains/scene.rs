@@ -6,14 +6,14 @@ use nalgebra::{SVector, Vector2};
 
 use super::bodies::{COORDINATES, Grains, noun};
 use super::contact::GrainContact;
-use super::error::GrainError;
+use super::error::{GrainError, check_length};
 use super::grid::Grid;
 use super::wall::Wall;
 use crate::geometry::{Facing, Support};
 use crate::law::rolling::RollingFriction;
 use crate::multibody::fingerprint;
 use crate::planar::PlanarTree;
-use crate::quantity::{QuantityError, finite};
+use crate::quantity::{QuantityError, finite, not_negative};
 use crate::spatial::space::{body_velocities, length};
 
 /// Coulomb's μ of each kind of contact, and rolling friction.
@@ -49,12 +49,7 @@ impl GrainFriction {
             ("wall_friction", self.walls),
             ("wheel_friction", self.wheels),
         ] {
-            if finite(field, value)? < 0.0 {
-                return Err(QuantityError::Negative {
-                    field: field.to_owned(),
-                    value,
-                });
-            }
+            not_negative(field, value)?;
         }
         self.rolling.check()
     }
@@ -167,13 +162,7 @@ impl<const D: usize> GrainScene<D> {
     pub fn check_configuration(&self, q: &[f64]) -> Result<(), GrainError> {
         let n = self.grains.len();
         let (radius, kinematic) = (self.grains.radius(), self.grains.kinematic());
-        if q.len() != self.nq() {
-            return Err(GrainError::Length {
-                field: "position",
-                expected: self.nq(),
-                count: q.len(),
-            });
-        }
+        check_length("position", self.nq(), q.len())?;
         self.check_finite("position", "machine", q, COORDINATES)?;
         let allowed = -OVERLAP * self.grains.smallest();
         let mut grid = Grid::<D>::default();

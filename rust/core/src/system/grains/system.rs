@@ -345,12 +345,6 @@ where
         }
     }
 
-    fn take(&self, lanes: impl Fn(usize) -> bool, from: &Vec<f64>, to: &mut Vec<f64>) {
-        if lanes(0) {
-            to.clone_from(from);
-        }
-    }
-
     fn is_finite(&self, q: &Vec<f64>) -> bool {
         q.iter().all(|x| x.is_finite())
     }
@@ -643,33 +637,24 @@ where
     }
 
     fn solve(
-        &self,
-        q: &[f64],
-        mu: &[f64],
-        options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
-        workspace: &mut SolverWorkspace,
-    ) -> SolveReport {
-        let rolling = &mut [];
-        self.solve_rolling(q, mu, options, ContactSolution { p, u, rolling }, workspace)
-    }
-
-    fn solve_step(
         &mut self,
-        (v, y): (&[f64], &[f64]),
+        free: Option<(&[f64], &[f64])>,
         (q, mu): (&[f64], &[f64]),
         options: &SolverOptions,
-        p: &mut [f64],
-        u: &mut [f64],
+        (p, u): (&mut [f64], &mut [f64]),
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
+        let Some(free) = free else {
+            let rolling = &mut [];
+            let answer = ContactSolution { p, u, rolling };
+            return self.solve_rolling(q, mu, options, answer, workspace);
+        };
         let mut moments = std::mem::take(&mut self.parts.rolling);
         let surface = |key| self.parts.surface(key).map(|surface| surface.spin);
-        moments.set_free(self.scene, (v, y), surface);
+        moments.set_free(self.scene, free, surface);
         let rolling = &mut moments.contacts;
-        let report =
-            self.solve_rolling(q, mu, options, ContactSolution { p, u, rolling }, workspace);
+        let answer = ContactSolution { p, u, rolling };
+        let report = self.solve_rolling(q, mu, options, answer, workspace);
         self.parts.rolling = moments;
         report
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use crate::quantity::{PLACES, QuantityError, within};
+use crate::quantity::{Demand, PLACES, QuantityError, within};
 use crate::spatial::space::axis;
 
 /// The half-plane or half-space `n · x ≥ offset` is free.
@@ -29,10 +29,7 @@ impl<const D: usize> Wall<D> {
         }
         let length = normal.norm();
         if !(length > 0.0 && length.is_finite()) {
-            return Err(QuantityError::NotPositive {
-                field: "normal".to_owned(),
-                value: length,
-            });
+            return Err(QuantityError::new("normal", Demand::Positive, length));
         }
         let n = normal / length;
         Ok(Self {

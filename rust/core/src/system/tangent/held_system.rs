@@ -12,7 +12,7 @@ use crate::integrator::{Dynamics, StepOptions, StepReport};
 use crate::law::compliance::{Compliance, Yielding};
 use crate::law::newton_impact::rebound;
 use crate::multibody::LaneConfiguration;
-use crate::scalar::{Dual, Lane, Vec3};
+use crate::scalar::{Dual, Lane, Vec3, inlined};
 use crate::solver::batch::problem::Triple;
 use crate::system::tree_lanes::TreeLanes;
 
@@ -267,14 +267,10 @@ impl<T: Lane> Systems for HeldSystem<'_, T> {
         _: T::Mask,
     ) -> T::Mask {
         let token = self.own.tree.token;
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                self.place_contacts(end);
-                self.press_sand();
-            },
-        );
+        inlined!(T::vectorize, token, {
+            self.place_contacts(end);
+            self.press_sand();
+        });
         T::mask(token, 0)
     }
 
@@ -297,14 +293,10 @@ impl<T: Lane> Systems for HeldSystem<'_, T> {
     fn assemble(&mut self, v: &[Dual<T>]) {
         self.own.v.copy_from_slice(v);
         self.own.softness.clear();
-        self.own.u_before = T::vectorize(
-            self.own.tree.token,
-            #[inline(always)]
-            || {
-                self.write_rows();
-                self.all_along(v)
-            },
-        );
+        self.own.u_before = inlined!(T::vectorize, self.own.tree.token, {
+            self.write_rows();
+            self.all_along(v)
+        });
     }
 
     #[inline(always)]
@@ -426,11 +418,7 @@ impl<T: Lane> Systems for HeldSystem<'_, T> {
         _: T::Mask,
         problems: &mut HeldAnswer<T>,
     ) {
-        *problems = T::vectorize(
-            self.own.tree.token,
-            #[inline(always)]
-            || self.answer(q, change),
-        );
+        *problems = inlined!(T::vectorize, self.own.tree.token, self.answer(q, change));
     }
 
     fn take_answers(

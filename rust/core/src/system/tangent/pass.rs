@@ -15,7 +15,7 @@ use crate::integrator::held_step::SAME;
 use crate::integrator::projection::set_gaps;
 use crate::integrator::scheme::{Next, conclude, finish, prepare};
 use crate::multibody::Configuration;
-use crate::scalar::{Dual, Lane, LaneMask};
+use crate::scalar::{Dual, Lane, LaneMask, inlined};
 
 /// Relative difference of velocities that is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -94,11 +94,7 @@ impl<T: Lane> TangentPass<T> {
             set_gaps(s, d, displacement);
         }
         finish(s, d, is_deep.then_some(displacement), &mut NoProbe);
-        T::vectorize(
-            d.token,
-            #[inline(always)]
-            || s.recall_sand([&v_start, &d.v]),
-        );
+        inlined!(T::vectorize, d.token, s.recall_sand([&v_start, &d.v]));
         let fastest = scene.v_end.iter().fold(1e-3_f64, |m, v| m.max(v.abs()));
         let off = d.v.iter().zip(scene.v_end);
         let off = off.fold(0.0_f64, |m, (own, v)| m.max((own.get(0) - v).abs()));

@@ -6,7 +6,7 @@ use crate::integrator::{Dynamics, StepOptions};
 use crate::multibody::LaneConfiguration;
 use crate::multibody::energy::energies;
 use crate::multibody::loops::Placed;
-use crate::scalar::{Lane, LaneMask, Vec3};
+use crate::scalar::{Lane, LaneMask, Vec3, inlined};
 use crate::system::extent::{Turning, displacement, tolerated};
 
 impl<T: Lane> TreeLanes<T> {
@@ -14,15 +14,11 @@ impl<T: Lane> TreeLanes<T> {
     fn add_implicit(&mut self, options: &StepOptions) {
         let (machine, step) = (&*self.mechanism, self.step(options));
         let (drives, mass_matrix) = (&mut self.drives, &mut self.mass_matrix);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                drives.add_implicit(machine, step, |k, a| {
-                    mass_matrix.add_to_diagonal(machine, k, a);
-                });
-            },
-        );
+        inlined!(T::vectorize, self.token, {
+            drives.add_implicit(machine, step, |k, a| {
+                mass_matrix.add_to_diagonal(machine, k, a);
+            });
+        });
         if let Some(sand) = &mut self.sand {
             sand.add_to_mass(machine, mass_matrix);
         }
@@ -133,10 +129,10 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
         if is_first {
             let (machine, step) = (&*self.mechanism, self.step(options));
             let (mass_matrix, drives) = (&self.mass_matrix, &mut self.drives);
-            T::vectorize(
+            inlined!(
+                T::vectorize,
                 self.token,
-                #[inline(always)]
-                || drives.set_theta(machine, step, |k| mass_matrix.diagonal(machine, k)),
+                drives.set_theta(machine, step, |k| mass_matrix.diagonal(machine, k))
             );
             self.sink(options, going);
         }
@@ -248,11 +244,7 @@ impl<T: Lane> Dynamics for TreeLanes<T> {
             lanes,
         };
         let gap = loops.project_position(&with, q);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || loops.project_velocity(&with, v),
-        );
+        inlined!(T::vectorize, self.token, loops.project_velocity(&with, v));
         Some(gap)
     }
 

@@ -4,7 +4,7 @@ use super::TreeLanes;
 use crate::integrator::{Forces, StartOf, StepOptions, Work};
 use crate::multibody::LaneConfiguration;
 use crate::multibody::bias::bias;
-use crate::scalar::Lane;
+use crate::scalar::{Lane, inlined};
 use crate::system::gyroscopic::{Gyroscopic, Turned};
 
 impl<T: Lane> TreeLanes<T> {
@@ -41,14 +41,10 @@ impl<T: Lane> TreeLanes<T> {
 impl<T: Lane> Forces for TreeLanes<T> {
     fn begin_load(&mut self, options: &StepOptions, start: StartOf<'_, Self>, y: &mut [T]) {
         let mut torque = std::mem::take(&mut self.torque);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                torque.fill(self.number(0.0));
-                self.actuate(options, start, start.v, &mut torque);
-            },
-        );
+        inlined!(T::vectorize, self.token, {
+            torque.fill(self.number(0.0));
+            self.actuate(options, start, start.v, &mut torque);
+        });
         self.torque = torque;
         let mut before = std::mem::take(&mut self.bias_before);
         if before.is_empty() {
@@ -56,30 +52,22 @@ impl<T: Lane> Forces for TreeLanes<T> {
             self.find_bias(start.v, &mut before);
         }
         let (h, _) = self.step(options);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                for (y, (torque, bias)) in y.iter_mut().zip(self.torque.iter().zip(&before)) {
-                    *y = *torque - h * *bias;
-                }
-            },
-        );
+        inlined!(T::vectorize, self.token, {
+            for (y, (torque, bias)) in y.iter_mut().zip(self.torque.iter().zip(&before)) {
+                *y = *torque - h * *bias;
+            }
+        });
         self.bias_before = before;
     }
 
     fn load(&mut self, options: &StepOptions, _: StartOf<'_, Self>, v_mean: &[T], y: &mut [T]) {
         self.find_bias(v_mean, y);
         let (h, _) = self.step(options);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                for (y, torque) in y.iter_mut().zip(&self.torque) {
-                    *y = *torque - h * *y;
-                }
-            },
-        );
+        inlined!(T::vectorize, self.token, {
+            for (y, torque) in y.iter_mut().zip(&self.torque) {
+                *y = *torque - h * *y;
+            }
+        });
     }
 
     #[inline(always)]
@@ -127,10 +115,10 @@ impl<T: Lane> Forces for TreeLanes<T> {
 
     fn revise(&mut self, lanes: T::Mask, v: &[T], v_end: &[T]) -> T::Mask {
         let (drives, machine) = (&mut self.drives, &*self.mechanism);
-        let retaken = T::vectorize(
+        let retaken = inlined!(
+            T::vectorize,
             self.token,
-            #[inline(always)]
-            || drives.revise(machine, lanes, v, v_end),
+            drives.revise(machine, lanes, v, v_end)
         );
         retaken | self.revise_sand(lanes, v_end)
     }
@@ -156,18 +144,14 @@ impl<T: Lane> Forces for TreeLanes<T> {
         let v = [start.v, v_end];
         self.find_sand_work(v);
         let step = self.step(options);
-        T::vectorize(
-            self.token,
-            #[inline(always)]
-            || {
-                let places = &start.configuration.joints;
-                self.drives.work(&self.mechanism, step, places, v, out);
-                self.add_work_of_wrenches(step, v, out);
-                for (work, of_sand) in out.iter_mut().zip(&self.of_sand) {
-                    work.damped -= *of_sand;
-                }
-            },
-        );
+        inlined!(T::vectorize, self.token, {
+            let places = &start.configuration.joints;
+            self.drives.work(&self.mechanism, step, places, v, out);
+            self.add_work_of_wrenches(step, v, out);
+            for (work, of_sand) in out.iter_mut().zip(&self.of_sand) {
+                work.damped -= *of_sand;
+            }
+        });
     }
 
     #[inline(always)]

@@ -329,12 +329,8 @@ mod tests {
     fn sphere() -> impl Strategy<Value = Sphere> {
         // From pebbles to boulders, some at the same place, some far off.
         let place = prop_oneof![8 => -10.0..10.0, 1 => Just(1.0), 1 => -1e4..1e4];
-        (prop::array::uniform3(place), -4.0..1.5).prop_map(|(centre, size): ([f64; 3], f64)| {
-            Sphere {
-                centre: centre.into(),
-                radius: size.exp(),
-            }
-        })
+        (prop::array::uniform3(place), -4.0..1.5)
+            .prop_map(|(centre, size): ([f64; 3], f64)| Sphere::new(centre.into(), size.exp()))
     }
 
     proptest! {
@@ -375,10 +371,7 @@ mod tests {
 
     #[test]
     fn very_many_balls_at_one_place_are_no_deeper_than_the_search_remembers() {
-        let one = Sphere {
-            centre: Vector3::zeros(),
-            radius: 1.0,
-        };
+        let one = Sphere::new(Vector3::zeros(), 1.0);
         let tree = BallTree::new(&vec![one; 1 << 17]);
         let mut count = 0;
         tree.visit_near(&Vector3::zeros(), 0.5, |_, _| count += 1);

@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, PairPoint, SurfacePoint};
+use super::{NEAREST, SurfacePoint};
 use crate::geometry::{OrientedBox, Sphere};
 
 /// Nearest point of a box; `base` (m, world) is where its coordinates have their origin.
@@ -22,13 +22,6 @@ pub fn nearest_point(solid: &OrientedBox, sphere: &Sphere, base: &Vector3<f64>) 
         &(solid.R * n),
         distance - sphere.radius,
     )
-}
-
-/// Nearest points of a box and a ball that moves; n from the box to the ball.
-#[must_use]
-pub fn nearest_points(solid: &OrientedBox, sphere: &Sphere) -> PairPoint {
-    let near = nearest_point(solid, sphere, &Vector3::zeros());
-    PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
 /// Nearest point of the surface, normal into the box and signed distance of
@@ -125,10 +118,7 @@ mod tests {
 
     #[test]
     fn on_a_crest_the_flat_bottom_touches_above_the_crest() {
-        let sphere = Sphere {
-            centre: Vector3::new(0.1, 0.0, -0.2),
-            radius: 0.5,
-        };
+        let sphere = Sphere::new(Vector3::new(0.1, 0.0, -0.2), 0.5);
         let solid = OrientedBox {
             centre: Vector3::new(0.0, 0.69, 0.0),
             R: nalgebra::Matrix3::identity(),

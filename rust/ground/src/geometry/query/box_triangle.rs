@@ -1,5 +1,5 @@
-//! Box on a triangulated surface: its corners over a face, its edges across a convex edge, its
-//! faces and edges on a convex vertex.
+//! Box on a triangulated surface: its edges across a convex edge, its faces and edges on a convex
+//! vertex. Over a face it touches with its corners, as on a plane ([`super::box_plane`]).
 //!
 //! Of the box's twelve edges those along one axis share the normal `n ∝ e × f` with an edge of the
 //! surface, and the side of n decides which of the four can touch: one, or both of a side of the
@@ -9,10 +9,10 @@
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, SurfacePoint, box_plane, box_sphere};
+use super::{NEAREST, SurfacePoint, box_sphere};
 use crate::geometry::OrientedBox;
 use crate::geometry::shape::oriented_box::signs;
-use crate::geometry::terrain::surface::{Edge, Face, Vertex};
+use crate::geometry::terrain::surface::{Edge, Vertex};
 
 /// Sine of the angle between two edges below which they have no common normal.
 const PARALLEL: f64 = 1e-9;
@@ -24,24 +24,8 @@ const SLACK: f64 = 0.02;
 /// Fraction of the box's size by which a crossing may lie beyond the ends of the edges.
 const ENDS: f64 = 1e-9;
 
-/// Corners over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
-#[inline]
-pub fn corners_over_face(
-    solid: &OrientedBox,
-    face: &Face,
-    base: &Vector3<f64>,
-    reach: f64,
-    mut visit: impl FnMut(&SurfacePoint),
-) {
-    box_plane::corners(solid, &face.plane, base, reach, |point| {
-        if face.admits(&(base + point.point)) {
-            visit(point);
-        }
-    });
-}
-
 /// Visits the crossings of the box's edges with an edge of the surface whose gap is at most
-/// `reach`.
+/// `reach`; `base` as in [`super::dispatch`].
 pub fn crossings(
     solid: &OrientedBox,
     edge: &Edge,

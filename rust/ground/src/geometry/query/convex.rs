@@ -569,10 +569,7 @@ mod tests {
                 R,
                 half_size: Vector3::new(0.3, 0.2, 0.15),
             }),
-            _ => PlacedShape::Sphere(Sphere {
-                centre,
-                radius: 0.25,
-            }),
+            _ => PlacedShape::Sphere(Sphere::new(centre, 0.25)),
         }
     }
 

@@ -22,9 +22,9 @@ use nalgebra::Vector3;
 
 use super::chord::{self, LIES};
 use super::crossing::crossing;
-use super::disc_plane::{rim_point_over, rim_points};
+use super::disc_plane::rim_point_over;
 use super::{CHORD, NEAREST, SurfacePoint, roller_sphere};
-use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
+use crate::geometry::terrain::surface::{Edge, OVERLAP, Vertex};
 use crate::geometry::{Disc, Roller};
 
 /// Sine of the angle between a disc and an edge up to which the ends of the chord are the only
@@ -34,23 +34,6 @@ const FLAT: f64 = 1e-6;
 
 /// Fraction of the radius by which the end of a chord may lie beyond the edge.
 const ENDS: f64 = 1e-9;
-
-/// Rim points over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
-#[inline]
-pub fn rim_points_over_face(
-    disc: &Disc,
-    face: &Face,
-    base: &Vector3<f64>,
-    reach: f64,
-    mut visit: impl FnMut(&SurfacePoint),
-) {
-    let lies = may_lie(disc, face.plane.normal());
-    rim_points(disc, &face.plane, base, reach, |point| {
-        if (point.feature == NEAREST || lies) && face.admits(&(base + point.point)) {
-            visit(point);
-        }
-    });
-}
 
 /// Whether a disc leans against a plane of normal n by so little that its points beside the lowest
 /// may support it. Of a disc that stands they are one and a half radii higher: where they are in

@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use super::{
     NEAREST, PairPoint, SurfacePoint, box_plane, box_sphere, box_triangle, convex, disc_disc,
     disc_plane, disc_triangle, ellipsoid_plane, ellipsoid_sphere, ellipsoid_triangle, hull_plane,
-    hull_sphere, hull_triangle, roller_plane, roller_sphere, roller_triangle, sphere_plane,
-    sphere_sphere, sphere_triangle,
+    hull_sphere, hull_triangle, is_lowest, roller_plane, roller_sphere, roller_triangle,
+    sphere_plane, sphere_sphere, sphere_triangle,
 };
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{PlacedShape, Plane, Roller, Sphere};
@@ -105,7 +105,8 @@ pub fn point_on_sphere(
     }
 }
 
-/// Visits the points of a shape over a face of a surface whose gap is at most `reach`, m.
+/// Visits the points of a shape over a face of a surface whose gap is at most `reach`, m: those
+/// over its plane that lie over the face.
 #[inline]
 pub fn visit_on_face(
     shape: &PlacedShape<'_>,
@@ -114,32 +115,19 @@ pub fn visit_on_face(
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
-    match shape {
-        PlacedShape::Disc(disc) => {
-            disc_triangle::rim_points_over_face(disc, face, base, reach, visit);
-        }
+    let n = face.plane.normal();
+    let lies = match shape {
+        PlacedShape::Disc(disc) => disc_triangle::may_lie(disc, n),
         PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
-            roller_triangle::rim_points_over_face(roller, face, base, reach, visit);
+            disc_triangle::may_lie(&roller.core, n)
         }
-        PlacedShape::Box(solid) => {
-            box_triangle::corners_over_face(solid, face, base, reach, visit);
+        _ => true,
+    };
+    visit_on_plane(shape, &face.plane, base, reach, |point| {
+        if (lies || is_lowest(point.feature)) && face.admits(&(base + point.point)) {
+            visit(point);
         }
-        PlacedShape::Sphere(sphere) => {
-            let low = sphere_triangle::lowest_over_face(sphere, face, base);
-            if let Some(low) = low.filter(|low| low.gap <= reach) {
-                visit(&low);
-            }
-        }
-        PlacedShape::Ellipsoid(solid) => {
-            let low = ellipsoid_triangle::lowest_over_face(solid, face, base);
-            if let Some(low) = low.filter(|low| low.gap <= reach) {
-                visit(&low);
-            }
-        }
-        PlacedShape::Hull(hull) => {
-            hull_triangle::vertices_over_face(hull, face, base, reach, visit);
-        }
-    }
+    });
 }
 
 /// Visits the points of a shape at a convex edge of a surface whose gap is at most `reach`, m.
@@ -294,16 +282,11 @@ pub fn nearest_points(first: &PlacedShape<'_>, second: &PlacedShape<'_>) -> Pair
 
 /// Nearest points of a shape and a ball; n from the shape to the ball.
 fn nearest_to_ball(shape: &PlacedShape<'_>, ball: &Sphere) -> PairPoint {
-    match shape {
-        PlacedShape::Disc(disc) => roller_sphere::nearest_points(&Roller::thin(*disc), ball),
-        PlacedShape::Roller(roller) | PlacedShape::Cylinder(roller) => {
-            roller_sphere::nearest_points(roller, ball)
-        }
-        PlacedShape::Box(solid) => box_sphere::nearest_points(solid, ball),
-        PlacedShape::Sphere(own) => sphere_sphere::nearest_points(own, ball),
-        PlacedShape::Ellipsoid(solid) => ellipsoid_sphere::nearest_points(solid, ball),
-        PlacedShape::Hull(hull) => hull_sphere::nearest_points(hull, ball),
+    if let PlacedShape::Sphere(own) = shape {
+        return sphere_sphere::nearest_points(own, ball);
     }
+    let near = point_on_sphere(shape, ball, &Vector3::zeros());
+    PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
 /// A shape without its rounding, and the rounding, m.

@@ -14,7 +14,7 @@
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, PairPoint, SurfacePoint};
+use super::{NEAREST, SurfacePoint};
 use crate::geometry::{Ellipsoid, Sphere, SupportMap};
 
 /// Most steps of Newton's iteration; random places take about six.
@@ -78,13 +78,6 @@ pub fn nearest_point(solid: &Ellipsoid, sphere: &Sphere, base: &Vector3<f64>) ->
     let (point, n, distance) = nearest_local(&local, &solid.radii);
     let point = solid.centre + solid.R * point;
     SurfacePoint::of_normal(NEAREST, point, &(solid.R * n), distance - sphere.radius)
-}
-
-/// Nearest points of an ellipsoid and a ball that moves; n from the ellipsoid to the ball.
-#[must_use]
-pub fn nearest_points(solid: &Ellipsoid, sphere: &Sphere) -> PairPoint {
-    let near = nearest_point(solid, sphere, &Vector3::zeros());
-    PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
 /// The ellipsoid's point over the tangent plane (normal n) at the point `touch` where a sphere was

@@ -10,22 +10,12 @@
 use nalgebra::Vector3;
 
 use super::crossing::crossing;
-use super::{NEAREST, SurfacePoint, ellipsoid_plane, ellipsoid_sphere};
-use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
+use super::{NEAREST, SurfacePoint, ellipsoid_sphere};
+use crate::geometry::terrain::surface::{Edge, OVERLAP, Vertex};
 use crate::geometry::{Ellipsoid, Sphere, SupportMap};
 
-/// The lowest point, if it lies over the face; `base` as in [`super::dispatch`].
-#[must_use]
-pub fn lowest_over_face(
-    solid: &Ellipsoid,
-    face: &Face,
-    base: &Vector3<f64>,
-) -> Option<SurfacePoint> {
-    let low = ellipsoid_plane::lowest_point(solid, &face.plane, base);
-    face.admits(&(base + low.point)).then_some(low)
-}
-
-/// The point at an edge, if its normal lies strictly between the faces'.
+/// The point at an edge, if its normal lies strictly between the faces'; `base` as in
+/// [`super::dispatch`].
 #[must_use]
 pub fn point_at_edge(solid: &Ellipsoid, edge: &Edge, base: &Vector3<f64>) -> Option<SurfacePoint> {
     let start = edge.start - base;
@@ -70,9 +60,6 @@ fn lean(solid: &Ellipsoid, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) 
 /// The point nearest to a vertex, wherever it is.
 #[must_use]
 pub fn nearest_at_vertex(solid: &Ellipsoid, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
-    let point = Sphere {
-        centre: vertex.place,
-        radius: 0.0,
-    };
+    let point = Sphere::new(vertex.place, 0.0);
     ellipsoid_sphere::nearest_point(solid, &point, base)
 }

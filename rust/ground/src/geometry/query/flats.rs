@@ -545,10 +545,7 @@ mod tests {
                 half_size: Vector3::new(0.3, 0.2, 0.15),
             }),
             6 => PlacedShape::Roller(Roller::new(disc(0.25), 0.2, 0.05)),
-            _ => PlacedShape::Sphere(crate::geometry::Sphere {
-                centre: x,
-                radius: 0.2,
-            }),
+            _ => PlacedShape::Sphere(crate::geometry::Sphere::new(x, 0.2)),
         }
     }
 

@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, PairPoint, SurfacePoint};
+use super::{NEAREST, SurfacePoint};
 use crate::geometry::{Hull, Sphere, SupportMap};
 use crate::spatial::{Polytope, PolytopeFace};
 
@@ -78,13 +78,6 @@ pub fn nearest_point(hull: &Hull<'_>, sphere: &Sphere, base: &Vector3<f64>) -> S
     let (point, n, distance) = nearest_local(hull.polytope, &local);
     let point = hull.place(&point);
     SurfacePoint::of_normal(NEAREST, point, &(hull.R * n), distance - sphere.radius)
-}
-
-/// Nearest points of a hull and a ball that moves; n from the hull to the ball.
-#[must_use]
-pub fn nearest_points(hull: &Hull<'_>, sphere: &Sphere) -> PairPoint {
-    let near = nearest_point(hull, sphere, &Vector3::zeros());
-    PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
 /// The hull's point over the tangent plane (normal n) at the point `touch` where a sphere was first

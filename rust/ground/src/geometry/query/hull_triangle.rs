@@ -1,5 +1,6 @@
-//! Convex polytope on a triangulated surface: its vertices over a face, its edges across a convex
-//! edge, its faces, edges and vertices on a convex vertex.
+//! Convex polytope on a triangulated surface: its edges across a convex edge, its faces, edges and
+//! vertices on a convex vertex. Over a face it touches with its vertices, as on a plane
+//! ([`super::hull_plane`]).
 //!
 //! An edge f of the polytope and an edge e of the surface touch along the normal `n ∝ e × f`, where
 //! n is between the normals of the surface's faces and −n between those of the polytope's. A vertex
@@ -8,9 +9,9 @@
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, SurfacePoint, hull_plane, hull_sphere};
+use super::{NEAREST, SurfacePoint, hull_sphere};
 use crate::geometry::Hull;
-use crate::geometry::terrain::surface::{Edge, Face, Vertex};
+use crate::geometry::terrain::surface::{Edge, Vertex};
 use crate::spatial::PolytopeEdge;
 
 /// Sine of the angle between two edges below which they have no common normal.
@@ -26,22 +27,7 @@ const ENDS: f64 = 1e-9;
 /// Feature of the first vertex at an edge.
 const VERTICES: usize = 192;
 
-/// Vertices over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
-pub fn vertices_over_face(
-    hull: &Hull<'_>,
-    face: &Face,
-    base: &Vector3<f64>,
-    reach: f64,
-    mut visit: impl FnMut(&SurfacePoint),
-) {
-    hull_plane::vertices(hull, &face.plane, base, reach, |point| {
-        if face.admits(&(base + point.point)) {
-            visit(point);
-        }
-    });
-}
-
-/// Visits the points at an edge whose gap is at most `reach`.
+/// Visits the points at an edge whose gap is at most `reach`; `base` as in [`super::dispatch`].
 pub fn points_at_edge(
     hull: &Hull<'_>,
     edge: &Edge,

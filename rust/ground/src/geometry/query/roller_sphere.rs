@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use super::section::{NO_DIRECTION, Section};
-use super::{NEAREST, PairPoint, SurfacePoint};
+use super::{NEAREST, SurfacePoint};
 use crate::geometry::{Roller, Sphere};
 use friction_contact::scalar::Vec3;
 
@@ -155,13 +155,6 @@ pub fn nearest_point(roller: &Roller, sphere: &Sphere, base: &Vector3<f64>) -> S
     }
 }
 
-/// Nearest points of a wheel and a ball that moves; n from the wheel to the ball.
-#[must_use]
-pub fn nearest_points(roller: &Roller, sphere: &Sphere) -> PairPoint {
-    let near = nearest_point(roller, sphere, &Vector3::zeros());
-    PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
-}
-
 /// The wheel's point over the tangent plane (normal n) at the point `touch`
 /// where a sphere was first met.
 ///
@@ -257,10 +250,7 @@ mod tests {
             rim * 0.5 + wheel.axle * 1e-13,
         ];
         for place in places {
-            let sphere = Sphere {
-                centre: wheel.centre + place,
-                radius: 0.05,
-            };
+            let sphere = Sphere::new(wheel.centre + place, 0.05);
             let near = nearest_point(&Roller::thin(wheel), &sphere, &Vector3::zeros());
             assert!((near.n.norm() - 1.0).abs() < 1e-12);
             assert!(near.gap.is_finite() && near.point.iter().all(|x| x.is_finite()));

@@ -13,10 +13,10 @@
 use nalgebra::Vector3;
 
 use super::CIRCLE;
-use super::roller_plane::{rim_points, swept};
+use super::roller_plane::swept;
 use super::roller_sphere::{nearest_open, nearest_to};
-use super::{SurfacePoint, disc_triangle, is_lowest, sphere_triangle};
-use crate::geometry::terrain::surface::{Edge, Face, Vertex};
+use super::{SurfacePoint, disc_triangle, sphere_triangle};
+use crate::geometry::terrain::surface::{Edge, Vertex};
 use crate::geometry::{Roller, Sphere};
 
 /// Feature of the tread at an edge.
@@ -28,24 +28,7 @@ const PARALLEL: f64 = 1e-9;
 /// Fraction of the wheel's size by which a point may lie beyond the ends of edge and tread.
 const ENDS: f64 = 1e-9;
 
-/// Points over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
-#[inline]
-pub fn rim_points_over_face(
-    roller: &Roller,
-    face: &Face,
-    base: &Vector3<f64>,
-    reach: f64,
-    mut visit: impl FnMut(&SurfacePoint),
-) {
-    let lies = disc_triangle::may_lie(&roller.core, face.plane.normal());
-    rim_points(roller, &face.plane, base, reach, |point| {
-        if (is_lowest(point.feature) || lies) && face.admits(&(base + point.point)) {
-            visit(point);
-        }
-    });
-}
-
-/// Visits the points at an edge whose gap is at most `reach`.
+/// Visits the points at an edge whose gap is at most `reach`; `base` as in [`super::dispatch`].
 pub fn points_at_edge(
     roller: &Roller,
     edge: &Edge,
@@ -120,10 +103,7 @@ pub fn point_at_edge(
 
 /// The ball at an end of a capsule.
 fn end_of_capsule(roller: &Roller, k: usize) -> Sphere {
-    Sphere {
-        centre: roller.circle(k).centre,
-        radius: roller.rounding,
-    }
+    Sphere::new(roller.circle(k).centre, roller.rounding)
 }
 
 fn of_end(k: usize, point: SurfacePoint) -> SurfacePoint {

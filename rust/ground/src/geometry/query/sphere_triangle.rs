@@ -1,21 +1,14 @@
-//! Sphere on a triangulated surface: its lowest point over a face, its nearest point to a convex
-//! edge or vertex.
+//! Sphere on a triangulated surface: its nearest point to a convex edge or vertex. Over a face it
+//! touches with its lowest point, as on a plane ([`super::sphere_plane`]).
 
 use nalgebra::Vector3;
 
-use super::{NEAREST, SurfacePoint, sphere_plane, sphere_sphere};
+use super::{NEAREST, SurfacePoint, sphere_sphere};
 use crate::geometry::Sphere;
-use crate::geometry::terrain::surface::{Edge, Face, OVERLAP, Vertex};
+use crate::geometry::terrain::surface::{Edge, OVERLAP, Vertex};
 
-/// The lowest point, if it lies over the face; `base` as in [`super::dispatch`].
-#[inline]
-#[must_use]
-pub fn lowest_over_face(sphere: &Sphere, face: &Face, base: &Vector3<f64>) -> Option<SurfacePoint> {
-    let low = sphere_plane::lowest_point(sphere, &face.plane, base);
-    face.admits(&(base + low.point)).then_some(low)
-}
-
-/// The point nearest to an edge, if its normal lies strictly between the faces'.
+/// The point nearest to an edge, if its normal lies strictly between the faces'; `base` as in
+/// [`super::dispatch`].
 #[inline]
 #[must_use]
 pub fn point_at_edge(sphere: &Sphere, edge: &Edge, base: &Vector3<f64>) -> Option<SurfacePoint> {
@@ -52,9 +45,6 @@ pub fn nearest_at_edge(sphere: &Sphere, edge: &Edge, base: &Vector3<f64>) -> Sur
 #[inline]
 #[must_use]
 pub fn nearest_at_vertex(sphere: &Sphere, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
-    let point = Sphere {
-        centre: vertex.place,
-        radius: 0.0,
-    };
+    let point = Sphere::new(vertex.place, 0.0);
     sphere_sphere::nearest_point(sphere, &point, base)
 }

@@ -51,10 +51,7 @@ mod tests {
                 outside(&[axial.abs() - wheel.half, radial - wheel.core.radius]) - wheel.rounding
             }
             PlacedShape::Ellipsoid(solid) => {
-                let place = Sphere {
-                    centre: *x,
-                    radius: 0.0,
-                };
+                let place = Sphere::new(*x, 0.0);
                 ellipsoid_sphere::nearest_point(solid, &place, &Vector3::zeros()).gap
             }
             PlacedShape::Hull(solid) => solid.outermost(&solid.local(x)).1,

@@ -14,6 +14,13 @@ pub struct Sphere {
 }
 
 impl Sphere {
+    /// About a centre, m, with a radius, m; a point if that is 0.
+    #[inline]
+    #[must_use]
+    pub const fn new(centre: Vector3<f64>, radius: f64) -> Self {
+        Self { centre, radius }
+    }
+
     /// Signed distance of a point (m), positive outside.
     #[inline]
     #[must_use]

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{Facing, Support};
 use crate::spatial::space::length;
-use friction_contact::quantity::{LENGTHS, PLACES, QuantityError, finite, within};
+use friction_contact::quantity::{Demand, LENGTHS, PLACES, QuantityError, finite, within};
 
 /// A flat floor of no thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,11 +38,8 @@ impl Silo {
             within(|| "floor".to_owned(), floor.height, PLACES)?;
             let value = finite("hole", floor.hole)?;
             if !(0.0..radius).contains(&value) {
-                return Err(QuantityError::OutOfRange {
-                    field: "hole".to_owned(),
-                    range: "from 0 to less than the radius of the tube",
-                    value,
-                });
+                let range = Demand::Within("from 0 to less than the radius of the tube");
+                return Err(QuantityError::new("hole", range, value));
             }
         }
         Ok(Self {

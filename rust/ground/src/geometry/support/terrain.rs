@@ -45,10 +45,7 @@ impl Support<3> for TerrainSupport {
             n: *n,
             distance,
         };
-        let here = Sphere {
-            centre: *centre,
-            radius: 0.0,
-        };
+        let here = Sphere::new(*centre, 0.0);
         let base = Vector3::zeros();
         let terrain = &*self.0;
         let mut within: Option<Facing<3>> = None;

@@ -265,10 +265,10 @@ impl Rocks {
     fn rest(&self, x: f64, z: f64, radius: f64, burial: f64) -> Sphere {
         let n = self.ground.normal();
         let y = -(n.x * x + n.z * z + self.ground.offset()) / n.y;
-        Sphere {
-            centre: Vector3::new(x, y, z) + n * (radius * (1.0 - 2.0 * burial)),
+        Sphere::new(
+            Vector3::new(x, y, z) + n * (radius * (1.0 - 2.0 * burial)),
             radius,
-        }
+        )
     }
 }
 

@@ -454,14 +454,11 @@ fn tolerance_of(start: &Vector3<f64>, end: &Vector3<f64>) -> f64 {
 
 fn ball_about(piece: &Primitive) -> Sphere {
     match piece {
-        Primitive::Edge(edge) => Sphere {
-            centre: edge.start + edge.along * (0.5 * edge.length),
-            radius: 0.5 * edge.length,
-        },
-        Primitive::Vertex(vertex) => Sphere {
-            centre: vertex.place,
-            radius: 0.0,
-        },
+        Primitive::Edge(edge) => Sphere::new(
+            edge.start + edge.along * (0.5 * edge.length),
+            0.5 * edge.length,
+        ),
+        Primitive::Vertex(vertex) => Sphere::new(vertex.place, 0.0),
         _ => unreachable!("invariant: seams have edges and vertices"),
     }
 }

@@ -9,8 +9,7 @@ use super::{Area, Coverage, KnownRules, Neighbourhood, Plane, Primitive, SoftLay
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::{PlacedShape, Sphere};
 use crate::sand::Soil;
-use crate::sand::checks::in_range;
-use friction_contact::quantity::QuantityError;
+use friction_contact::quantity::{QuantityError, between};
 
 /// A layer of sand under a surface. Wheels sink into it; to every other part of a machine the
 /// surface is rigid. Immutable: the ruts belong to a simulation.
@@ -41,7 +40,7 @@ impl SoftGround {
         cell: f64,
     ) -> Result<Self, QuantityError> {
         soil.check()?;
-        in_range("rut_cell", cell, [1e-3, 1.0], "from 0.001 to 1 m")?;
+        between("rut_cell", cell, [1e-3, 1.0], "from 0.001 to 1 m")?;
         Ok(Self {
             surface,
             soil,

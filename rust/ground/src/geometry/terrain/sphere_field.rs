@@ -62,10 +62,7 @@ impl SphereField {
             if radius <= 0.0 {
                 return Err(TerrainError::NonPositiveRadius { index, radius });
             }
-            spheres.push(Sphere {
-                centre: Vector3::from(*centre),
-                radius,
-            });
+            spheres.push(Sphere::new(Vector3::from(*centre), radius));
         }
         let tree = BallTree::new(&spheres);
         Ok(Self {
@@ -81,13 +78,9 @@ impl SphereField {
     pub fn rug() -> Self {
         let spheres: Vec<Sphere> = (0..50)
             .flat_map(|i| (0..25).map(move |j| (0.6 * f64::from(i), 0.6 * f64::from(j))))
-            .map(|(x, z)| Sphere {
-                centre: Vector3::new(
-                    x,
-                    -0.5 + 0.5 * sin_cos(x / 5.0 + std::f64::consts::FRAC_PI_2).0,
-                    z,
-                ),
-                radius: 0.5,
+            .map(|(x, z)| {
+                let y = -0.5 + 0.5 * sin_cos(x / 5.0 + std::f64::consts::FRAC_PI_2).0;
+                Sphere::new(Vector3::new(x, y, z), 0.5)
             })
             .collect();
         Self {

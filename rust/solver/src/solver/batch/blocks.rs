@@ -414,11 +414,6 @@ impl<T: Lane, const C: usize, const B: usize> Loaded<T, C> for DenseSystem<T, C,
     }
 
     #[inline(always)]
-    fn least_softness(_: &ContactProblem) -> f64 {
-        0.0
-    }
-
-    #[inline(always)]
     fn least_pivot(&self, lane: usize) -> f64 {
         if !Self::IS_WHOLE {
             return 0.0;

@@ -317,11 +317,6 @@ impl<T: Lane> Loaded<T, PLACES> for DrySystem<T> {
     }
 
     #[inline(always)]
-    fn least_softness(_: &ContactProblem) -> f64 {
-        0.0
-    }
-
-    #[inline(always)]
     fn block_of(problem: &ContactProblem, contact: usize) -> &[f64; 9] {
         &problem.W[block(contact, contact)]
     }

@@ -11,7 +11,7 @@ use super::problem::{
 };
 use super::velocities::VelocitySystem;
 use crate::problem::{Answered, ContactScales, Magnitudes, Redundancy, Settled};
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, inlined};
 use crate::solver::pivoting::{FURTHER_ALPHAS, Few, Pivoting};
 
 /// Most steps of a solve: those of the first attempt and of all further ones.
@@ -339,8 +339,23 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
 
     /// Solves the problems of a line, until it has no more or lets the solver leave. Problems that
     /// are not solved then stay with their lanes. `tolerances`: squares.
-    #[inline(always)]
     pub(super) fn run(
+        &mut self,
+        token: T::Token,
+        problems: &mut [ContactProblem],
+        tolerances: [T; 2],
+        line: &mut impl ProblemSource,
+    ) {
+        inlined!(
+            T::vectorize,
+            token,
+            self.solve(token, problems, tolerances, line)
+        );
+    }
+
+    /// [`Self::run`], for the instructions that it is compiled for.
+    #[inline(always)]
+    fn solve(
         &mut self,
         token: T::Token,
         problems: &mut [ContactProblem],

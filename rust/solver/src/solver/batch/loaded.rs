@@ -21,7 +21,10 @@ pub(super) trait Loaded<T: Lane, const C: usize>: System<T, Few<C>> + Sized {
     fn contact_at(problem: &ContactProblem, place: usize) -> Option<usize>;
 
     /// The least that is added to the diagonal of a problem's operator, 1/kg.
-    fn least_softness(problem: &ContactProblem) -> f64;
+    #[inline(always)]
+    fn least_softness(_problem: &ContactProblem) -> f64 {
+        0.0
+    }
 
     /// Smallest pivot of a lane's last factors, 1/kg; 0 if it says nothing about the rank of W.
     #[inline(always)]

@@ -304,36 +304,19 @@ impl<T: Lane> Queue<T> {
             n_others,
         };
         match kind {
-            Kind::Few => T::vectorize(
-                token,
-                #[inline(always)]
-                || (self.few).run(token, problems, tolerances, &mut line),
-            ),
-            Kind::Many => T::vectorize(
-                token,
-                #[inline(always)]
-                || (self.many).run(token, problems, tolerances, &mut line),
-            ),
-            Kind::Dry => T::vectorize(
-                token,
-                #[inline(always)]
-                || (self.dry).run(token, problems, tolerances, &mut line),
-            ),
+            Kind::Few => self.few.run(token, problems, tolerances, &mut line),
+            Kind::Many => self.many.run(token, problems, tolerances, &mut line),
+            Kind::Dry => self.dry.run(token, problems, tolerances, &mut line),
             Kind::Large => {
                 let large = self
                     .large
                     .get_or_insert_with(|| Box::new(LargeSolver::new(token)));
-                T::vectorize(
-                    token,
-                    #[inline(always)]
-                    || large.run(token, problems, tolerances, &mut line),
-                );
+                large.run(token, problems, tolerances, &mut line);
             }
-            Kind::Factored(place) => T::vectorize(
-                token,
-                #[inline(always)]
-                || (self.factored[place].1).run(token, problems, tolerances, &mut line),
-            ),
+            Kind::Factored(place) => {
+                let own = &mut self.factored[place].1;
+                own.run(token, problems, tolerances, &mut line);
+            }
         }
     }
 }

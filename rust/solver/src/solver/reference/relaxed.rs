@@ -3,9 +3,8 @@
 
 use crate::law::associated::natural_map;
 use crate::problem::{Prepared, Residual};
-use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::SolveScratch;
+use crate::solver::scratch::{Attempt, StageEnd};
 use crate::solver::stage::admm::{self, AdmmLaw};
 
 /// Residual of `(p, u)` under the relaxed law, with the same two numbers as for Coulomb's law.
@@ -28,18 +27,12 @@ fn measure<const D: usize>(data: &Prepared<'_>, p: &[f64], u: &[f64]) -> Residua
 }
 
 /// Iterates from `p`. `u` is `W p + q` on return, and the residual is Coulomb's.
-pub(in crate::solver) fn solve<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
+pub(in crate::solver) fn solve<const D: usize>(attempt: &mut Attempt<'_, D>) -> StageEnd {
+    let data = attempt.data;
     let law = AdmmLaw {
         shifts: false,
         measure: |p: &[f64], u: &[f64]| measure::<D>(data, p, u),
         solved: SolveStatus::SolvedRelaxed,
     };
-    admm::alternate::<D, _>(data, options, &law, p, u, scratch, iterations)
+    admm::alternate(attempt, &law)
 }

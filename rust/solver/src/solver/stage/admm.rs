@@ -18,9 +18,8 @@
 use crate::cone::{SecondOrderCone, tangential_norm};
 use crate::law::coulomb::modified_velocity;
 use crate::problem::{Prepared, Residual};
-use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::SolveScratch;
+use crate::solver::scratch::{Attempt, SolveScratch, StageEnd};
 
 /// Initial `σ`, dimensionless; balancing adapts it.
 const SIGMA: f64 = 0.1;
@@ -130,66 +129,53 @@ pub(in crate::solver) struct AdmmLaw<M> {
 }
 
 /// Alternates from `p` under Coulomb's law. `u` is `W p + q` on return.
-pub(in crate::solver) fn solve<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
+pub(in crate::solver) fn solve<const D: usize>(attempt: &mut Attempt<'_, D>) -> StageEnd {
+    let data = attempt.data;
     let law = AdmmLaw {
         shifts: true,
         measure: |p: &[f64], u: &[f64]| data.measure::<D>(p, u),
         solved: SolveStatus::Converged,
     };
-    alternate::<D, _>(data, options, &law, p, u, scratch, iterations)
+    alternate(attempt, &law)
 }
 
 /// Alternates from `p` under `law`. `u` is `W p + q` on return, and the
 /// residual is Coulomb's under either law.
 pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Residual>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
+    attempt: &mut Attempt<'_, D>,
     law: &AdmmLaw<M>,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
+) -> StageEnd {
+    let (data, options) = (attempt.data, attempt.options);
     let mut sigma = SIGMA;
-    data.W.multiply_add(p, data.q, u);
-    begin_dual::<D>(data.mu, law.shifts, u, &mut scratch.direction);
-    if !factorise::<D>(data, sigma, scratch) {
-        return (SolveStatus::Stalled, data.measure::<D>(p, u));
+    attempt.find_velocity();
+    let dual = &mut attempt.scratch.direction;
+    begin_dual::<D>(data.mu, law.shifts, attempt.u, dual);
+    if !factorise::<D>(data, sigma, attempt.scratch) {
+        return (SolveStatus::Stalled, attempt.residual());
     }
     let mut best = Residual::UNSOLVED;
-    scratch.best.copy_from_slice(p);
+    attempt.scratch.best.copy_from_slice(attempt.p);
     let (mut step, mut changes_of_sigma) = (0, 0);
     loop {
         if step % LOOK == 0 || step == options.max_sweeps {
-            data.W.multiply_add(p, data.q, u);
-            let residual = (law.measure)(p, u);
-            scratch.history.note(*iterations, residual);
+            attempt.find_velocity();
+            let residual = (law.measure)(attempt.p, attempt.u);
+            attempt.scratch.history.note(attempt.iterations, residual);
             if !residual.is_finite() && !best.is_finite() {
                 return (SolveStatus::NonFinite, residual);
             }
-            if residual.relative < best.relative {
-                best = residual;
-                scratch.best.copy_from_slice(p);
-            }
+            attempt.keep_if_better(residual, &mut best);
             let is_solved = options.accepts(residual);
             // A substitution costs about as much as a product.
-            let is_spent = !scratch.work.affords(LOOK as u64 * 2 * data.product);
+            let is_spent = !(attempt.scratch.work).affords(LOOK as u64 * 2 * data.product);
             if is_solved || is_spent || step >= options.max_sweeps || !residual.is_finite() {
-                p.copy_from_slice(&scratch.best);
-                data.W.multiply_add(p, data.q, u);
+                attempt.take_best();
                 let status = if is_solved {
                     law.solved
                 } else {
                     SolveStatus::MaxIterations
                 };
-                return (status, data.measure::<D>(p, u));
+                return (status, attempt.residual());
             }
         }
         let SolveScratch {
@@ -197,22 +183,23 @@ pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Resi
             weights,
             direction: dual,
             ..
-        } = &mut *scratch;
+        } = &mut *attempt.scratch;
+        let (z, r) = (&*attempt.p, (sigma, &weights[..]));
         let x = system.solve_shifted::<D>(data, |rhs| {
-            right_side::<D>(data, law.shifts, (sigma, &weights[..]), p, dual, rhs);
+            right_side::<D>(data, law.shifts, r, z, dual, rhs);
         });
-        let [primal, dual] = project::<D>(data.mu, sigma, weights, x, dual, p);
+        let [primal, dual] = project::<D>(data.mu, sigma, weights, x, dual, attempt.p);
         step += 1;
-        *iterations += 1;
+        attempt.iterations += 1;
         let ratio = (primal / dual).sqrt();
         let is_unbalanced = ratio.is_finite() && !(1.0 / IMBALANCE..=IMBALANCE).contains(&ratio);
         if step % BALANCE == 0 && is_unbalanced && changes_of_sigma < MAX_CHANGES {
             let change = ratio.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
             let next = (sigma * change).clamp(1e-10, 1e6);
             changes_of_sigma += 1;
-            if next.is_finite() && factorise::<D>(data, next, scratch) {
+            if next.is_finite() && factorise::<D>(data, next, attempt.scratch) {
                 sigma = next;
-            } else if !factorise::<D>(data, sigma, scratch) {
+            } else if !factorise::<D>(data, sigma, attempt.scratch) {
                 step = options.max_sweeps;
             }
         }

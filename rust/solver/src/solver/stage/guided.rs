@@ -11,8 +11,7 @@ use crate::law::one_contact::estimate_one_contact;
 use crate::problem::{Operator, Prepared, Residual};
 use crate::solver::linear::reduced_system::{Factorisation, NewtonStep};
 use crate::solver::local::modes;
-use crate::solver::options::SolverOptions;
-use crate::solver::scratch::SolveScratch;
+use crate::solver::scratch::Attempt;
 
 /// Number of sweeps, and of Newton steps that try their modes.
 const SWEEPS: usize = 4;
@@ -89,33 +88,29 @@ fn sweep<const D: usize>(data: &Prepared<'_>, W: &[f64], kappas: &mut [f64], p: 
 
 /// Solves from `p = 0`; `None` where the modes turn out wrong or undecided. `u` is `W p + q` on
 /// return, `iterations` is advanced by sweeps and linear solves.
-pub(in crate::solver) fn solve<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> Option<Residual> {
+pub(in crate::solver) fn solve<const D: usize>(attempt: &mut Attempt<'_, D>) -> Option<Residual> {
+    let (data, options) = (attempt.data, attempt.options);
     let Operator::Dense(W) = data.W else {
         return None;
     };
+    let system = &mut attempt.scratch.system;
     // The place of the Newton point is free until the first step.
-    let kappas = &mut scratch.system.trial[..data.mu.len()];
+    let kappas = &mut system.trial[..data.mu.len()];
     kappas.fill(0.0);
     for _ in 0..SWEEPS {
-        sweep::<D>(data, W, kappas, p);
+        sweep::<D>(data, W, kappas, attempt.p);
     }
-    *iterations += SWEEPS;
-    data.W.multiply_add(p, data.q, u);
-    modes::recall::<D>(data.mu, p, u, &mut scratch.system.modes);
-    p.fill(0.0);
-    u.copy_from_slice(data.q);
+    attempt.iterations += SWEEPS;
+    data.W.multiply_add(attempt.p, data.q, attempt.u);
+    modes::recall::<D>(data.mu, attempt.p, attempt.u, &mut system.modes);
+    attempt.p.fill(0.0);
+    attempt.u.copy_from_slice(data.q);
     let alpha = options.regularisation * data.mean_diagonal;
     let mut factors = Factorisation::None;
     let mut last = f64::INFINITY;
-    scratch.system.centre.fill(0.0);
+    system.centre.fill(0.0);
     for step in 0..STEPS.min(options.max_newton_steps) {
+        let Attempt { p, u, scratch, .. } = &mut *attempt;
         if factors == Factorisation::None {
             factors = (scratch.system).factorise::<D>(data, alpha, true, &mut scratch.work);
         }
@@ -133,18 +128,18 @@ pub(in crate::solver) fn solve<const D: usize>(
             on_cone: true,
         };
         scratch.system.newton_point::<D>(data, newton_step, p, u);
-        *iterations += 1;
         p.copy_from_slice(&scratch.system.trial);
-        data.W.multiply_add(p, data.q, u);
-        let residual = data.measure::<D>(p, u);
-        scratch.history.note(*iterations, residual);
+        attempt.iterations += 1;
+        attempt.find_velocity();
+        let residual = attempt.measure();
         let progress = residual.relative / last;
         let is_solved = options.accepts(residual)
             || (progress > LEAST_GAIN
                 && residual.relative < ROUNDING_ASKED
-                && data.is_within_rounding::<D>(p, u));
+                && attempt.is_within_rounding());
+        let modes = &mut attempt.scratch.system.modes;
         if is_solved {
-            return is_decided::<D>(data, &scratch.system.modes, u).then_some(residual);
+            return is_decided::<D>(data, modes, attempt.u).then_some(residual);
         }
         if step >= SETTLED && (progress > LEAST_GAIN || progress.is_nan()) {
             return None;
@@ -153,7 +148,7 @@ pub(in crate::solver) fn solve<const D: usize>(
             factors = Factorisation::None;
         }
         last = residual.relative;
-        modes::turn::<D>(data.mu, p, u, &mut scratch.system.modes);
+        modes::turn::<D>(data.mu, attempt.p, attempt.u, modes);
     }
     None
 }

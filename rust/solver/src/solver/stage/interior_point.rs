@@ -22,10 +22,9 @@
 //! Todd 1998.
 
 use crate::cone::lorentz::{determinant, dot, jordan, tangential, way_out};
-use crate::problem::{Prepared, Residual};
-use crate::solver::options::SolverOptions;
+use crate::problem::Residual;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::SolveScratch;
+use crate::solver::scratch::{Attempt, StageEnd};
 
 /// Range of the friction coefficients that the cones take: what lies outside becomes the nearest
 /// bound, and the next stage corrects the answer.
@@ -286,13 +285,9 @@ fn longest<const D: usize>(cones: &[Cone<D>], share: f64) -> f64 {
 }
 
 /// Newton's direction for the targets of the cones.
-fn direct<const D: usize>(
-    data: &Prepared<'_>,
-    cones: &mut [Cone<D>],
-    share: f64,
-    scratch: &mut SolveScratch,
-) {
-    let dp = scratch.system.solve_shifted::<D>(data, |rhs| {
+fn direct<const D: usize>(attempt: &mut Attempt<'_, D>, cones: &mut [Cone<D>], share: f64) {
+    let system = &mut attempt.scratch.system;
+    let dp = system.solve_shifted::<D>(attempt.data, |rhs| {
         for (cone, rhs) in cones.iter().zip(rhs.chunks_exact_mut(D)) {
             cone.right_side(share, rhs);
         }
@@ -304,14 +299,13 @@ fn direct<const D: usize>(
 
 /// One predictor and corrector with the factors at hand; the step's length.
 fn take_step<const D: usize>(
-    data: &Prepared<'_>,
+    attempt: &mut Attempt<'_, D>,
     cones: &mut [Cone<D>],
     share: f64,
-    scratch: &mut SolveScratch,
 ) -> f64 {
     let gap = mean_gap(cones, 0.0);
     cones.iter_mut().for_each(Cone::aim_at_boundary);
-    direct(data, cones, 1.0, scratch);
+    direct(attempt, cones, 1.0);
     let reach = longest(cones, 1.0);
     let mut centring = (mean_gap(cones, reach) / gap).powi(3).max(LEAST_CENTRING);
     if reach < 0.9 {
@@ -321,7 +315,7 @@ fn take_step<const D: usize>(
     for cone in &mut *cones {
         cone.aim_at(centring * gap, reach);
     }
-    direct(data, cones, 1.0 - centring, scratch);
+    direct(attempt, cones, 1.0 - centring);
     let step = longest(cones, share);
     for cone in cones {
         cone.advance(step);
@@ -345,15 +339,8 @@ fn revise(proximal: f64, step: f64) -> f64 {
 }
 
 /// Follows one course. The best impulse and its residual are in `scratch.best` and `best`.
-fn follow<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    course: Course,
-    best: &mut Residual,
-    (p, u): (&mut [f64], &mut [f64]),
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) {
+fn follow<const D: usize>(attempt: &mut Attempt<'_, D>, course: Course, best: &mut Residual) {
+    let data = attempt.data;
     let speed = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let mut cones: Vec<Cone<D>> = (0..data.mu.len())
         .map(|i| Cone::new(data.mu[i], &data.block::<D>(i), speed, course.load))
@@ -361,78 +348,56 @@ fn follow<const D: usize>(
     let (mut nearest, mut since) = (f64::INFINITY, 0);
     let (mut proximal, mut step) = (0.0, 1.0);
     for _ in 0..MOST_STEPS {
-        for (cone, p) in cones.iter().zip(p.chunks_exact_mut(D)) {
+        for (cone, p) in cones.iter().zip(attempt.p.chunks_exact_mut(D)) {
             for (k, p) in p.iter_mut().enumerate() {
                 *p = cone.x[k] / cone.unit(k);
             }
         }
-        data.W.multiply_add(p, data.q, u);
-        let residual = data.measure::<D>(p, u);
-        scratch.history.note(*iterations, residual);
-        if residual.relative < best.relative {
-            *best = residual;
-            scratch.best.copy_from_slice(p);
-        }
+        attempt.find_velocity();
+        let residual = attempt.measure();
+        attempt.keep_if_better(residual, best);
         since += 1;
         if residual.relative < nearest {
             (nearest, since) = (residual.relative, 0);
         }
         let has_ended = since > PATIENCE || !residual.is_finite();
-        let is_near = residual.relative <= NEAR || options.accepts(residual);
-        let contacts = cones.iter_mut().zip(u.chunks_exact(D));
+        let is_near = residual.relative <= NEAR || attempt.options.accepts(residual);
+        let contacts = cones.iter_mut().zip(attempt.u.chunks_exact(D));
         if has_ended || is_near || !contacts.into_iter().all(|(cone, u)| cone.linearise(u)) {
             return;
         }
         proximal = revise(proximal, step);
+        let scratch = &mut *attempt.scratch;
         let blocks = scratch.system.blocks.chunks_exact_mut(D * D);
         for (cone, block) in cones.iter().zip(blocks) {
             cone.block(proximal, block);
         }
-        *iterations += 1;
+        attempt.iterations += 1;
         // Two substitutions, and the product above.
         if !scratch.work.affords(6 * data.product)
-            || !scratch
-                .system
-                .factorise_shifted::<D>(data, &mut scratch.work)
+            || !(scratch.system).factorise_shifted::<D>(data, &mut scratch.work)
         {
             return;
         }
-        step = take_step(data, &mut cones, course.share, scratch);
+        step = take_step(attempt, &mut cones, course.share);
     }
 }
 
 /// Follows the path to the answer from one start after the other; none is `p`. `u` is `W p + q` on
 /// return, and `p` the best impulse found, mostly within 1e-6 and hardly ever within the tolerance.
-pub(in crate::solver) fn solve<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
-    data.W.multiply_add(p, data.q, u);
-    let mut best = data.measure::<D>(p, u);
-    scratch.best.copy_from_slice(p);
+pub(in crate::solver) fn solve<const D: usize>(attempt: &mut Attempt<'_, D>) -> StageEnd {
+    attempt.find_velocity();
+    let mut best = attempt.residual();
+    attempt.scratch.best.copy_from_slice(attempt.p);
     for course in COURSES {
-        let (p, u) = (&mut *p, &mut *u);
-        follow::<D>(
-            data,
-            options,
-            course,
-            &mut best,
-            (p, u),
-            scratch,
-            iterations,
-        );
-        if best.relative <= PROMISING || scratch.work.is_exhausted {
+        follow(attempt, course, &mut best);
+        if best.relative <= PROMISING || attempt.scratch.work.is_exhausted {
             break;
         }
     }
-    p.copy_from_slice(&scratch.best);
-    data.W.multiply_add(p, data.q, u);
-    let residual = data.measure::<D>(p, u);
-    let status = if options.accepts(residual) {
+    attempt.take_best();
+    let residual = attempt.residual();
+    let status = if attempt.options.accepts(residual) {
         SolveStatus::Converged
     } else {
         SolveStatus::Stalled

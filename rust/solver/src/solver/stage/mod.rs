@@ -1,7 +1,7 @@
 //! The stages: iterative methods that improve an impulse. Each can solve a problem on its own.
 //!
-//! A stage takes the prepared problem, the start `p` (n), N s, and the shared
-//! [scratch](super::scratch). It returns `p`, `u = W p + q` and the reason for its end. No stage
+//! A stage takes an [`Attempt`](super::scratch::Attempt): the prepared problem, the start `p` (n),
+//! N s, and the shared scratch. It returns `p`, `u = W p + q` and the reason for its end. No stage
 //! knows which one came before or comes next; the strategy decides that.
 
 mod accelerated;

@@ -6,14 +6,11 @@
 //! system regular when `W` is not: every step is a proximal step, which leaves the null space of
 //! `W` at the centre `c`.
 
-use crate::problem::{Prepared, Proximal, Residual};
+use crate::problem::{Proximal, Residual};
 use crate::solver::linear::reduced_system::{Factorisation, NewtonStep, ReducedSystem};
 use crate::solver::local::modes;
-use crate::solver::local::sweep;
-use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::SolveScratch;
-use crate::solver::work;
+use crate::solver::scratch::{Attempt, StageEnd};
 
 /// Most full steps before the safeguarded method takes over. Measured on the recorded problems:
 /// full steps find the modes within about ten steps or not at all.
@@ -84,13 +81,14 @@ impl Course {
 /// Predicts the modes; after the first change with the exact predictor. Returns whether they
 /// changed.
 #[inline]
-fn predict<const D: usize>(
-    data: &Prepared<'_>,
-    course: &mut Course,
-    p: &[f64],
-    u: &[f64],
-    scratch: &mut SolveScratch,
-) -> bool {
+fn predict<const D: usize>(attempt: &mut Attempt<'_, D>, course: &mut Course) -> bool {
+    let Attempt {
+        data,
+        p,
+        u,
+        scratch,
+        ..
+    } = attempt;
     let ReducedSystem { centre, modes, .. } = &mut scratch.system;
     let prox = Proximal {
         alpha: course.alpha,
@@ -117,38 +115,11 @@ fn predict<const D: usize>(
     false
 }
 
-/// A few sweeps out of a cycle of modes; false if the budget does not allow them.
-fn break_cycle<const D: usize>(
-    data: &Prepared<'_>,
-    course: &mut Course,
-    p: &mut [f64],
-    scratch: &mut SolveScratch,
-) -> bool {
-    let prox = scratch.system.prox(course.alpha);
-    if !scratch
-        .work
-        .affords(CYCLE_SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
-    {
-        return false;
-    }
-    for _ in 0..CYCLE_SWEEPS {
-        sweep::sweep::<D>(data, prox, p);
-    }
-    course.last = f64::INFINITY;
-    course.factors = Factorisation::None;
-    true
-}
-
 /// Moves `p` to the Newton point of the predicted modes; false if the system is singular or the
 /// budget does not allow it.
 #[inline]
-fn take_step<const D: usize>(
-    data: &Prepared<'_>,
-    course: &mut Course,
-    p: &mut [f64],
-    u: &[f64],
-    scratch: &mut SolveScratch,
-) -> bool {
+fn take_step<const D: usize>(attempt: &mut Attempt<'_, D>, course: &mut Course) -> bool {
+    let Attempt { data, scratch, .. } = attempt;
     if course.factors == Factorisation::None {
         course.factors = scratch.system.factorise::<D>(
             data,
@@ -165,22 +136,9 @@ fn take_step<const D: usize>(
         factors: course.factors,
         on_cone: true,
     };
-    scratch.system.newton_point::<D>(data, newton_step, p, u);
-    p.copy_from_slice(&scratch.system.trial);
+    (scratch.system).newton_point::<D>(data, newton_step, attempt.p, attempt.u);
+    attempt.p.copy_from_slice(&scratch.system.trial);
     true
-}
-
-/// Ends without an answer and restores the best impulse.
-fn give_best(
-    data: &Prepared<'_>,
-    best: Residual,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &SolveScratch,
-) -> (SolveStatus, Residual) {
-    p.copy_from_slice(&scratch.best);
-    data.W.multiply_add(p, data.q, u);
-    (SolveStatus::Stalled, best)
 }
 
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
@@ -189,14 +147,10 @@ fn give_best(
 /// that the last steps refine what the regularisation left. `u` is `W p + q` on return;
 /// `iterations` is advanced by the linear solves.
 pub(in crate::solver) fn full_steps<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
+    attempt: &mut Attempt<'_, D>,
     max_steps: usize,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
+) -> StageEnd {
+    let (data, options) = (attempt.data, attempt.options);
     let mut course = Course {
         alpha: options.regularisation * data.mean_diagonal,
         factors: Factorisation::None,
@@ -205,54 +159,50 @@ pub(in crate::solver) fn full_steps<const D: usize>(
         settled: 0,
         last: f64::INFINITY,
     };
-    data.W.multiply_add(p, data.q, u);
-    modes::recall::<D>(data.mu, p, u, &mut scratch.system.modes);
-    let is_warm = p.iter().any(|x| x.abs() > 0.0);
-    scratch.system.centre.copy_from_slice(p);
-    let mut step = 0;
+    attempt.find_velocity();
+    let system = &mut attempt.scratch.system;
+    modes::recall::<D>(data.mu, attempt.p, attempt.u, &mut system.modes);
+    let is_warm = attempt.p.iter().any(|x| x.abs() > 0.0);
+    system.centre.copy_from_slice(attempt.p);
     let mut best = Residual::UNSOLVED;
-    loop {
-        let residual = data.measure::<D>(p, u);
-        scratch.history.note(*iterations, residual);
-        if residual.relative < best.relative {
-            best = residual;
-            scratch.best.copy_from_slice(p);
-        }
+    for step in 0.. {
+        let residual = attempt.measure();
+        attempt.keep_if_better(residual, &mut best);
         if options.accepts(residual) {
             return (SolveStatus::Converged, residual);
         }
         if !residual.is_finite() {
             if best.is_finite() {
-                return give_best(data, best, p, u, scratch);
+                break;
             }
             return (SolveStatus::NonFinite, residual);
         }
         let progress = residual.relative / course.last;
-        if progress > 0.5
-            && residual.relative < ROUNDING_ASKED
-            && data.is_within_rounding::<D>(p, u)
-        {
+        if progress > 0.5 && residual.relative < ROUNDING_ASKED && attempt.is_within_rounding() {
             return (SolveStatus::Converged, residual);
         }
         if step == max_steps {
-            return give_best(data, best, p, u, scratch);
+            break;
         }
         course.last = residual.relative;
         let is_recalled = step == 0 && is_warm;
-        let changed = !is_recalled && predict::<D>(data, &mut course, p, u, scratch);
-        *iterations += 1;
+        let changed = !is_recalled && predict(attempt, &mut course);
+        attempt.iterations += 1;
         if changed && step > 0 && step % CYCLE == 0 {
-            if !break_cycle::<D>(data, &mut course, p, scratch) {
-                return give_best(data, best, p, u, scratch);
+            if !attempt.sweep(course.alpha, CYCLE_SWEEPS) {
+                break;
             }
+            course.last = f64::INFINITY;
+            course.factors = Factorisation::None;
         } else {
             let smallest = SMALLEST * data.mean_diagonal;
-            course.revise(progress, [changed, scratch.system.slides], smallest);
-            if !take_step::<D>(data, &mut course, p, u, scratch) {
-                return give_best(data, best, p, u, scratch);
+            course.revise(progress, [changed, attempt.scratch.system.slides], smallest);
+            if !take_step(attempt, &mut course) {
+                break;
             }
         }
-        data.W.multiply_add(p, data.q, u);
-        step += 1;
+        attempt.find_velocity();
     }
+    attempt.take_best();
+    (SolveStatus::Stalled, best)
 }

@@ -13,10 +13,9 @@ use crate::law::one_contact::solve_one_contact;
 use crate::problem::{ContactScales, Prepared, Residual};
 use crate::solver::draws::Draws;
 use crate::solver::linear::reduced_system::{Factorisation, NewtonStep, ReducedSystem};
-use crate::solver::options::SolverOptions;
 use crate::solver::pivoting::{FURTHER_ALPHAS, Many, NO_GAIN, Pivoting, System, Triple};
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::SolveScratch;
+use crate::solver::scratch::{Attempt, StageEnd};
 use crate::solver::work::WorkBudget;
 
 /// Most systems to solve, unless there are more contacts.
@@ -167,22 +166,19 @@ fn load<const D: usize>(
 /// Pivots from the warm start `p`, with the given initial `α` relative to the mean diagonal or one
 /// that suits the start. `u` is `W p + q` on return; `iterations` is advanced by the steps.
 pub(in crate::solver) fn pivots<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
+    attempt: &mut Attempt<'_, D>,
     alpha: Option<f64>,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
+) -> StageEnd {
+    let (data, options) = (attempt.data, attempt.options);
+    let scratch = &mut *attempt.scratch;
     let pivoting = &mut scratch.pivoting;
-    load::<D>(data, alpha, p, pivoting);
+    load::<D>(data, alpha, attempt.p, pivoting);
     let mut system = PreparedSystem::<D> {
         data,
         reduced: &mut scratch.system,
         work: &mut scratch.work,
-        p,
-        u,
+        p: attempt.p,
+        u: attempt.u,
         factors: Factorisation::None,
         is_fresh: false,
     };
@@ -192,7 +188,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
     let mut steps = 0;
     let answer = loop {
         let residual = pivoting.residual_of(0);
-        scratch.history.note(*iterations, residual);
+        scratch.history.note(attempt.iterations, residual);
         if pivoting.is_solved(tolerances) {
             break (SolveStatus::Converged, residual);
         }
@@ -207,7 +203,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
             break (SolveStatus::Stalled, residual);
         }
         steps += 1;
-        *iterations += 1;
+        attempt.iterations += 1;
         pivoting.advance(&mut system, true, tolerances);
     };
     system.show(pivoting);
@@ -217,28 +213,20 @@ pub(in crate::solver) fn pivots<const D: usize>(
 /// Pivots from the start that the scratch keeps, with one of [`FURTHER_ALPHAS`] after the other,
 /// and gives the nearest answer. `u` is `W p + q` on return; `iterations` is advanced by the linear
 /// solves.
-pub(in crate::solver) fn further_pivots<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
-    let mut best: Option<(SolveStatus, Residual)> = None;
+pub(in crate::solver) fn further_pivots<const D: usize>(attempt: &mut Attempt<'_, D>) -> StageEnd {
+    let mut best: Option<StageEnd> = None;
     for alpha in FURTHER_ALPHAS {
-        p.copy_from_slice(&scratch.start);
-        let found = pivots::<D>(data, options, Some(alpha), p, u, scratch, iterations);
+        attempt.p.copy_from_slice(&attempt.scratch.start);
+        let found = pivots(attempt, Some(alpha));
         if found.0 == SolveStatus::Converged {
             return found;
         }
         if best.is_none_or(|(_, best)| found.1.relative < best.relative) {
             best = Some(found);
-            scratch.best.copy_from_slice(p);
+            attempt.scratch.best.copy_from_slice(attempt.p);
         }
     }
-    p.copy_from_slice(&scratch.best);
-    data.W.multiply_add(p, data.q, u);
+    attempt.take_best();
     best.unwrap_or((SolveStatus::Stalled, Residual::UNSOLVED))
 }
 
@@ -249,39 +237,31 @@ pub(in crate::solver) fn further_pivots<const D: usize>(
 /// differ by 1e-12 of the slip: some of the points then have to open, and as friction is
 /// nonassociated, correcting the worst contradiction first may go in circles.
 pub(in crate::solver) fn random_pivots<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
+    attempt: &mut Attempt<'_, D>,
     attempts: usize,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
-    let mut best = data.measure::<D>(p, u);
-    scratch.best.copy_from_slice(p);
-    for attempt in 0..attempts {
-        let size = p.iter().map(|x| x * x).sum::<f64>().sqrt();
+) -> StageEnd {
+    let (data, options) = (attempt.data, attempt.options);
+    let mut best = attempt.residual();
+    attempt.scratch.best.copy_from_slice(attempt.p);
+    for k in 0..attempts {
+        let size = attempt.p.iter().map(|x| x * x).sum::<f64>().sqrt();
         let exact = options.tolerance / (data.inverse_speed * size * data.mean_diagonal);
-        let alpha = (ALPHAS_AT_RANDOM[attempt % 2] * exact).min(1.0);
-        scratch.pivoting.draws = Some(Draws(attempt as u64));
-        let found = pivots::<D>(data, options, Some(alpha), p, u, scratch, iterations);
-        scratch.pivoting.draws = None;
+        let alpha = (ALPHAS_AT_RANDOM[k % 2] * exact).min(1.0);
+        attempt.scratch.pivoting.draws = Some(Draws(k as u64));
+        let found = pivots(attempt, Some(alpha));
+        attempt.scratch.pivoting.draws = None;
         if found.0 == SolveStatus::Converged {
             return found;
         }
-        if found.1.relative < best.relative {
-            best = found.1;
-            scratch.best.copy_from_slice(p);
-        }
-        if scratch.work.is_exhausted {
+        attempt.keep_if_better(found.1, &mut best);
+        if attempt.scratch.work.is_exhausted {
             break;
         }
         let is_lost = found.1.relative.is_nan() || found.1.relative > CONTINUED;
         if is_lost {
-            p.copy_from_slice(&scratch.best);
+            attempt.p.copy_from_slice(&attempt.scratch.best);
         }
     }
-    p.copy_from_slice(&scratch.best);
-    data.W.multiply_add(p, data.q, u);
-    (SolveStatus::Stalled, data.measure::<D>(p, u))
+    attempt.take_best();
+    (SolveStatus::Stalled, attempt.residual())
 }

@@ -11,13 +11,11 @@
 //! problem, and Gauss–Seidel sweeps when backtracking fails. Once a step is cheap, a *sprint* with
 //! a small `α` tries to finish with Newton's convergence.
 
-use crate::problem::{Prepared, Proximal, Residual};
+use crate::problem::Proximal;
 use crate::solver::linear::reduced_system::{Factorisation, NewtonStep, ReducedSystem};
-use crate::solver::local::{modes, sweep};
-use crate::solver::options::SolverOptions;
+use crate::solver::local::modes;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::SolveScratch;
-use crate::solver::work;
+use crate::solver::scratch::{Attempt, StageEnd};
 
 /// Most Newton steps for one value of `α`.
 const INNER_STEPS: usize = 30;
@@ -183,7 +181,8 @@ struct Task {
 }
 
 /// Accepts the answer of a sprint that gained enough; otherwise goes back to the accepted one.
-fn end_sprint(course: &mut Course, gained: bool, p: &mut [f64], scratch: &mut SolveScratch) {
+fn end_sprint<const D: usize>(attempt: &mut Attempt<'_, D>, course: &mut Course, gained: bool) {
+    let Attempt { p, scratch, .. } = attempt;
     if gained {
         scratch.accepted.copy_from_slice(p);
     } else {
@@ -195,20 +194,11 @@ fn end_sprint(course: &mut Course, gained: bool, p: &mut [f64], scratch: &mut So
 
 /// Backtracks from `scratch.system.trial` towards `(p, u)` until the natural map falls; `false`,
 /// with `(p, u)` unchanged, if it never does.
-fn backtrack<const D: usize>(
-    data: &Prepared<'_>,
-    alpha: f64,
-    current: f64,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-) -> bool {
-    for ((d, t), x) in scratch
-        .direction
-        .iter_mut()
-        .zip(&scratch.system.trial)
-        .zip(&*p)
-    {
+fn backtrack<const D: usize>(attempt: &mut Attempt<'_, D>, alpha: f64, current: f64) -> bool {
+    let data = attempt.data;
+    let Attempt { p, u, scratch, .. } = attempt;
+    let directions = scratch.direction.iter_mut().zip(&scratch.system.trial);
+    for ((d, t), x) in directions.zip(&**p) {
         *d = t - x;
     }
     scratch.system.trial_velocity.fill(0.0);
@@ -237,24 +227,19 @@ fn backtrack<const D: usize>(
 
 /// Solves one regularised problem with the centre `scratch.system.centre`, from `p`; true if its
 /// natural map fell below the tolerance. `u = W p + q` on return.
-fn descend<const D: usize>(
-    data: &Prepared<'_>,
-    task: Task,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> bool {
+fn descend<const D: usize>(attempt: &mut Attempt<'_, D>, task: Task) -> bool {
     let Task {
         alpha,
         tolerance,
         mut exact,
         steps,
     } = task;
-    data.W.multiply_add(p, data.q, u);
+    let data = attempt.data;
+    attempt.find_velocity();
     let threshold = (tolerance / data.inverse_data).powi(2);
     let mut stuck = 0;
     for step in 0..=steps {
+        let Attempt { p, u, scratch, .. } = &mut *attempt;
         let current = data.merit::<D>(scratch.system.prox(alpha), p, u);
         if !current.is_finite() || step == steps {
             return current <= threshold;
@@ -266,7 +251,6 @@ fn descend<const D: usize>(
         let prox = Proximal { alpha, centre };
         modes::predict::<D>(data, prox, exact, p, u, modes);
         let factors = (scratch.system).factorise::<D>(data, alpha, false, &mut scratch.work);
-        *iterations += 1;
         let mut accepted = false;
         if factors != Factorisation::None || scratch.system.m == 0 {
             let newton_step = NewtonStep {
@@ -275,8 +259,9 @@ fn descend<const D: usize>(
                 on_cone: false,
             };
             scratch.system.newton_point::<D>(data, newton_step, p, u);
-            accepted = backtrack::<D>(data, alpha, current, p, u, scratch);
+            accepted = backtrack(attempt, alpha, current);
         }
+        attempt.iterations += 1;
         if accepted {
             stuck = 0;
             continue;
@@ -288,92 +273,82 @@ fn descend<const D: usize>(
         // keeps the current one.
         exact = !exact;
         stuck += 1;
-        if stuck > MAX_STUCK {
+        if stuck > MAX_STUCK || !attempt.sweep(alpha, SWEEPS) {
             return false;
         }
-        let prox = scratch.system.prox(alpha);
-        if !scratch
-            .work
-            .affords(SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
-        {
-            return false;
-        }
-        for _ in 0..SWEEPS {
-            sweep::sweep::<D>(data, prox, p);
-        }
-        data.W.multiply_add(p, data.q, u);
+        attempt.find_velocity();
     }
-    data.W.multiply_add(p, data.q, u);
+    attempt.find_velocity();
     true
 }
 
-/// Proximal point from `p`. `u = W p + q` on return; without convergence `p` is the best impulse
-/// found.
+/// Proximal point from `p`, with at most so many linear solves. `u = W p + q` on return; without
+/// convergence `p` is the best impulse found.
 pub(in crate::solver) fn solve<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
-    data.W.multiply_add(p, data.q, u);
-    let mut best = data.measure::<D>(p, u);
-    scratch.history.note(*iterations, best);
+    attempt: &mut Attempt<'_, D>,
+    most_steps: usize,
+) -> StageEnd {
+    let (data, options) = (attempt.data, attempt.options);
+    attempt.find_velocity();
+    let mut best = attempt.measure();
     if options.accepts(best) {
         return (SolveStatus::Converged, best);
     }
     if !best.is_finite() {
         return (SolveStatus::NonFinite, best);
     }
-    scratch.best.copy_from_slice(p);
-    scratch.accepted.copy_from_slice(p);
-    scratch.system.centre.copy_from_slice(p);
+    let scratch = &mut *attempt.scratch;
+    for kept in [
+        &mut scratch.best,
+        &mut scratch.accepted,
+        &mut scratch.system.centre,
+    ] {
+        kept.copy_from_slice(attempt.p);
+    }
     let target = options.regularisation * data.mean_diagonal;
     let mut course = Course::new(data.mean_diagonal);
     let mut last = f64::INFINITY;
     // Required of a step with the smallest α; tightened if it holds and the velocity is still
     // inaccurate.
     let mut asked = options.tolerance;
-    let limit = *iterations + options.max_newton_steps;
+    let limit = attempt.iterations + most_steps;
     let mut status = SolveStatus::MaxIterations;
-    while *iterations < limit && !scratch.work.is_exhausted {
+    while attempt.iterations < limit && !attempt.scratch.work.is_exhausted {
         let sprints = course.begins_sprint();
         if sprints {
-            scratch.system.centre.copy_from_slice(p);
+            attempt.scratch.system.centre.copy_from_slice(attempt.p);
         }
         let task = course.task(sprints, target, last, asked);
-        let before = *iterations;
-        let solved = descend::<D>(data, task, p, u, scratch, iterations);
+        let before = attempt.iterations;
+        let solved = descend(attempt, task);
         // Count a round even if its start was its answer, so that the search ends.
-        *iterations = (*iterations).max(before + 1);
-        let residual = data.measure::<D>(p, u);
-        scratch.history.note(*iterations, residual);
-        if options.accepts(residual)
-            || (residual.relative < LOOSE && data.is_within_rounding::<D>(p, u))
+        attempt.iterations = attempt.iterations.max(before + 1);
+        let residual = attempt.measure();
+        if options.accepts(residual) || (residual.relative < LOOSE && attempt.is_within_rounding())
         {
             return (SolveStatus::Converged, residual);
         }
         if residual.relative <= asked {
             asked *= 0.1;
         }
-        if residual.relative < best.relative {
-            best = residual;
-            scratch.best.copy_from_slice(p);
-        }
+        attempt.keep_if_better(residual, &mut best);
         if sprints {
             let gained = residual.relative < SLOW * last;
             if gained {
                 last = residual.relative;
             }
-            end_sprint(&mut course, gained, p, scratch);
-        } else if solved {
+            end_sprint(attempt, &mut course, gained);
+            continue;
+        }
+        let Attempt { p, scratch, .. } = &mut *attempt;
+        if solved {
             scratch.accepted.copy_from_slice(p);
             let slow = residual.relative > SLOW * last;
             last = residual.relative;
             if !course.follow_path(target) {
                 scratch.system.centre.copy_from_slice(p);
-                course.succeed(slow, *iterations - before, SMALLEST * data.mean_diagonal);
+                let steps = attempt.iterations - before;
+                course.succeed(slow, steps, SMALLEST * data.mean_diagonal);
             }
         } else {
             p.copy_from_slice(&scratch.accepted);
@@ -384,7 +359,6 @@ pub(in crate::solver) fn solve<const D: usize>(
             }
         }
     }
-    p.copy_from_slice(&scratch.best);
-    data.W.multiply_add(p, data.q, u);
-    (status, data.measure::<D>(p, u))
+    attempt.take_best();
+    (status, attempt.residual())
 }

@@ -6,12 +6,11 @@
 //! press against each other with μ = 1e8, which no earlier stage solves, it solves 21.
 
 use super::pivoting;
-use crate::problem::{Prepared, Residual};
+use crate::problem::Residual;
 use crate::scalar::elementary::sin_cos;
 use crate::solver::draws::Draws;
-use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
-use crate::solver::scratch::SolveScratch;
+use crate::solver::scratch::{Attempt, StageEnd};
 
 /// Starts.
 const STARTS: usize = 16;
@@ -45,34 +44,23 @@ fn draw<const D: usize>(mu: &[f64], size: f64, draws: &mut Draws, p: &mut [f64])
 
 /// Pivots from the best answer so far and from others. `u` is `W p + q` on return; `iterations` is
 /// advanced by the linear solves.
-pub(in crate::solver) fn solve<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> (SolveStatus, Residual) {
-    p.copy_from_slice(&scratch.nearest);
-    let size = p.iter().step_by(D).sum::<f64>().max(0.0) / data.mu.len() as f64;
+pub(in crate::solver) fn solve<const D: usize>(attempt: &mut Attempt<'_, D>) -> StageEnd {
+    let mu = attempt.data.mu;
+    attempt.p.copy_from_slice(&attempt.scratch.nearest);
+    let size = attempt.p.iter().step_by(D).sum::<f64>().max(0.0) / mu.len() as f64;
     let mut draws = Draws(0);
     let mut best = Residual::UNSOLVED;
     for _ in 0..STARTS {
-        let alpha = Some(pivoting::SMALL_ALPHA);
-        let found = pivoting::pivots::<D>(data, options, alpha, p, u, scratch, iterations);
+        let found = pivoting::pivots(attempt, Some(pivoting::SMALL_ALPHA));
         if found.0 == SolveStatus::Converged {
             return found;
         }
-        if found.1.relative < best.relative {
-            best = found.1;
-            scratch.best.copy_from_slice(p);
-        }
-        if scratch.work.is_exhausted || size <= 0.0 {
+        attempt.keep_if_better(found.1, &mut best);
+        if attempt.scratch.work.is_exhausted || size <= 0.0 {
             break;
         }
-        draw::<D>(data.mu, size, &mut draws, p);
+        draw::<D>(mu, size, &mut draws, attempt.p);
     }
-    p.copy_from_slice(&scratch.best);
-    data.W.multiply_add(p, data.q, u);
-    (SolveStatus::Stalled, data.measure::<D>(p, u))
+    attempt.take_best();
+    (SolveStatus::Stalled, attempt.residual())
 }

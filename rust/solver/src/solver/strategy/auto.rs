@@ -3,9 +3,9 @@
 
 use super::islands::{self, IslandSolver};
 use crate::problem::{Operator, Prepared, Residual};
-use crate::solver::options::{Method, SolverOptions};
+use crate::solver::options::Method;
 use crate::solver::report::{SolveStatus, Stage, StageResult};
-use crate::solver::scratch::SolveScratch;
+use crate::solver::scratch::{Attempt, StageEnd};
 use crate::solver::stage::{
     gauss_seidel, guided, interior_point, newton, pivoting, proximal, restarts,
 };
@@ -34,18 +34,18 @@ const AT_RANDOM: usize = 6;
 const NEAR: f64 = 1e-4;
 
 /// The stages of [`Method::Auto`] so far: the result of each, and the best answer.
-struct Ladder<'a> {
-    options: &'a SolverOptions,
+struct Ladder<'a, 'b, const D: usize> {
+    attempt: &'a mut Attempt<'b, D>,
     /// Iterations before the current stage.
     before: usize,
     /// The best answer, whose impulse is in the scratch.
     nearest: StageResult,
 }
 
-impl<'a> Ladder<'a> {
-    fn new(options: &'a SolverOptions) -> Self {
+impl<'a, 'b, const D: usize> Ladder<'a, 'b, D> {
+    fn new(attempt: &'a mut Attempt<'b, D>) -> Self {
         Self {
-            options,
+            attempt,
             before: 0,
             nearest: StageResult {
                 method: Method::Newton,
@@ -56,17 +56,10 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// Enters a stage that ended with `p`; an outcome if it is the answer.
+    /// Enters a stage; an outcome if it is the answer.
     #[inline]
-    fn enter(
-        &mut self,
-        stage: Stage,
-        found: (SolveStatus, Residual),
-        p: &[f64],
-        scratch: &mut SolveScratch,
-        iterations: usize,
-    ) -> Option<StageResult> {
-        self.enter_as(stage.method(), stage, found, p, scratch, iterations)
+    fn enter(&mut self, stage: Stage, found: StageEnd) -> Option<StageResult> {
+        self.enter_as(stage.method(), stage, found)
     }
 
     /// Enters a stage whose answer is another method's.
@@ -75,19 +68,19 @@ impl<'a> Ladder<'a> {
         &mut self,
         method: Method,
         stage: Stage,
-        (status, residual): (SolveStatus, Residual),
-        p: &[f64],
-        scratch: &mut SolveScratch,
-        iterations: usize,
+        (status, residual): StageEnd,
     ) -> Option<StageResult> {
-        let is_rounding = status != SolveStatus::NonFinite && self.options.is_rounding(residual);
+        let attempt = &mut *self.attempt;
+        let options = attempt.options;
+        let is_rounding = status != SolveStatus::NonFinite && options.is_rounding(residual);
         let status = if is_rounding {
             SolveStatus::Converged
         } else {
             status
         };
-        let status = scratch.list_stage(stage, status, iterations - self.before);
-        self.before = iterations;
+        let iterations = attempt.iterations - self.before;
+        let status = attempt.scratch.list_stage(stage, status, iterations);
+        self.before = attempt.iterations;
         let outcome = StageResult {
             method,
             stage,
@@ -97,304 +90,244 @@ impl<'a> Ladder<'a> {
         if status == SolveStatus::Converged {
             return Some(outcome);
         }
-        let is_nearer = self.options.excess(residual) < self.options.excess(self.nearest.residual);
+        let is_nearer = options.excess(residual) < options.excess(self.nearest.residual);
         if is_nearer {
             self.nearest = outcome;
-            scratch.nearest.copy_from_slice(p);
+            attempt.scratch.nearest.copy_from_slice(attempt.p);
         }
         None
     }
 
+    /// Goes back to the best answer.
+    fn take_nearest(&mut self) {
+        let Attempt { p, scratch, .. } = &mut *self.attempt;
+        p.copy_from_slice(&scratch.nearest);
+    }
+
+    fn is_exhausted(&self) -> bool {
+        self.attempt.scratch.work.is_exhausted
+    }
+
     /// Ends with the best answer and the reason of the last stage. `u` is `W p + q` on return.
-    fn give_nearest<const D: usize>(
-        &self,
-        data: &Prepared<'_>,
-        p: &mut [f64],
-        u: &mut [f64],
-        scratch: &SolveScratch,
-    ) -> StageResult {
+    fn give_nearest(&mut self) -> StageResult {
         if !self.nearest.residual.is_finite() {
             return StageResult {
                 status: SolveStatus::NonFinite,
                 ..self.nearest
             };
         }
-        p.copy_from_slice(&scratch.nearest);
-        data.W.multiply_add(p, data.q, u);
+        self.take_nearest();
+        self.attempt.find_velocity();
+        let rungs = self.attempt.scratch.rungs.as_slice();
         StageResult {
-            status: scratch
-                .rungs
-                .as_slice()
-                .last()
-                .map_or(self.nearest.status, |rung| rung.status),
-            residual: data.measure::<D>(p, u),
+            status: (rungs.last()).map_or(self.nearest.status, |rung| rung.status),
+            residual: self.attempt.residual(),
             ..self.nearest
         }
     }
-}
 
-/// Many contacts: sweeps, then islands. The sweeps' answer becomes the start.
-fn sweep_many<const D: usize>(
-    data: &Prepared<'_>,
-    ladder: &mut Ladder<'_>,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    islands: IslandSolver<'_>,
-    iterations: &mut usize,
-) -> Option<StageResult> {
-    let options = ladder.options;
-    let budget = SweepBudget {
-        sweeps: sweep_budget(data),
-        predict: true,
-    };
-    let found = gauss_seidel::sweeps::<D>(data, options, budget, p, u, scratch, iterations);
-    if let Some(outcome) = ladder.enter(Stage::Sweeps, found, p, scratch, *iterations) {
-        return Some(outcome);
-    }
-    if found.0 == SolveStatus::NonFinite {
-        return Some(ladder.give_nearest::<D>(data, p, u, scratch));
-    }
-    let work = &mut scratch.work;
-    if let Some((method, status, residual)) =
-        islands::solve::<D>(data, options, p, u, work, islands, iterations)
-    {
-        let (stage, found) = (Stage::Islands, (status, residual));
-        scratch.history.note(*iterations, residual);
-        let entered = ladder.enter_as(method, stage, found, p, scratch, *iterations);
-        if let Some(outcome) = entered {
+    /// Many contacts: sweeps, then islands. The sweeps' answer becomes the start.
+    fn sweep_many(&mut self, islands: IslandSolver<'_>) -> Option<StageResult> {
+        let budget = SweepBudget {
+            sweeps: sweep_budget(self.attempt.data),
+            predict: true,
+        };
+        let found = gauss_seidel::sweeps(self.attempt, budget);
+        if let Some(outcome) = self.enter(Stage::Sweeps, found) {
             return Some(outcome);
         }
-    }
-    scratch.start.copy_from_slice(p);
-    None
-}
-
-/// Pivoting from the start that the scratch keeps and `p` is: from it, with larger `α`, and from
-/// its loads alone. `p` is zero on return without an answer: a warm start may mislead, zero does
-/// not.
-fn pivot_from_start<const D: usize>(
-    data: &Prepared<'_>,
-    ladder: &mut Ladder<'_>,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> Option<StageResult> {
-    let options = ladder.options;
-    let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
-    if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
-        return Some(outcome);
-    }
-    let found = pivoting::further_pivots::<D>(data, options, p, u, scratch, iterations);
-    if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
-        return Some(outcome);
-    }
-    // Friction may point to modes that lead nowhere: the next path starts from the loads alone.
-    for (p, start) in p.chunks_exact_mut(D).zip(scratch.start.chunks_exact(D)) {
-        p.fill(0.0);
-        p[0] = start[0];
-    }
-    let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
-    if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
-        return Some(outcome);
-    }
-    p.fill(0.0);
-    None
-}
-
-/// Few contacts that share no body, without a warm start: one sweep solves each exactly, and as
-/// nothing couples them, their order does not matter. `p` is zero on return without an answer.
-fn sweep_separate<const D: usize>(
-    data: &Prepared<'_>,
-    ladder: &mut Ladder<'_>,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> Option<StageResult> {
-    let once = SweepBudget {
-        sweeps: 1,
-        predict: false,
-    };
-    let options = ladder.options;
-    let found = gauss_seidel::sweeps::<D>(data, options, once, p, u, scratch, iterations);
-    let outcome = ladder.enter(Stage::Sweeps, found, p, scratch, *iterations);
-    if outcome.is_none() {
-        p.fill(0.0);
-    }
-    outcome
-}
-
-/// Few contacts without a warm start. The next stage starts from zero.
-fn guide_from_rest<const D: usize>(
-    data: &Prepared<'_>,
-    ladder: &mut Ladder<'_>,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> Option<StageResult> {
-    if data.mu.len() > 1 && data.W.is_uncoupled::<D>(data.n) {
-        let found = sweep_separate::<D>(data, ladder, p, u, scratch, iterations);
-        if found.is_some() {
-            return found;
+        if found.0 == SolveStatus::NonFinite {
+            return Some(self.give_nearest());
         }
+        if let Some((method, found)) = islands::solve(self.attempt, islands) {
+            let Attempt {
+                scratch,
+                iterations,
+                ..
+            } = &mut *self.attempt;
+            scratch.history.note(*iterations, found.1);
+            if let Some(outcome) = self.enter_as(method, Stage::Islands, found) {
+                return Some(outcome);
+            }
+        }
+        self.attempt.scratch.start.copy_from_slice(self.attempt.p);
+        None
     }
-    let options = ladder.options;
-    let found = match guided::solve::<D>(data, options, p, u, scratch, iterations) {
-        Some(residual) => (SolveStatus::Converged, residual),
-        None => (SolveStatus::Stalled, Residual::UNSOLVED),
-    };
-    if let Some(outcome) = ladder.enter(Stage::GuidedNewton, found, p, scratch, *iterations) {
-        return Some(outcome);
-    }
-    p.fill(0.0);
-    None
-}
 
-/// The proximal point method from `p`.
-fn descend<const D: usize>(
-    data: &Prepared<'_>,
-    ladder: &mut Ladder<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> Option<StageResult> {
-    let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
-    ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
-}
-
-/// Many contacts: pivoting from the last attempt's answer `p`, if it is near.
-///
-/// Where bodies touch at many points, `W` has a large null space. An answer may then violate the
-/// laws by 1e-9 and lie far from a true one: impulses have to move through the null space until a
-/// contact opens. Pivoting goes there in one step, the proximal point method in thousands. Where
-/// its modes go in circles, it goes on from the nearest answer in a random order.
-fn pivot_from_attempt<const D: usize>(
-    data: &Prepared<'_>,
-    ladder: &mut Ladder<'_>,
-    at_random: usize,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> Option<StageResult> {
-    if data.measure::<D>(p, u).relative > NEAR {
-        return None;
-    }
-    scratch.start.copy_from_slice(p);
-    let found = pivot_from_start::<D>(data, ladder, p, u, scratch, iterations);
-    if found.is_some() || scratch.work.is_exhausted {
-        return found;
-    }
-    let options = ladder.options;
-    p.copy_from_slice(&scratch.nearest);
-    data.W.multiply_add(p, data.q, u);
-    let found = pivoting::random_pivots::<D>(data, options, at_random, p, u, scratch, iterations);
-    ladder.enter(Stage::Pivoting, found, p, scratch, *iterations)
-}
-
-/// Many contacts: the proximal point method from the nearest answer, from zero, and again from the
-/// nearest one, with pivoting after each attempt. What is near by its residual may be far by its
-/// modes, and then a start from zero takes a tenth of the steps; so the first two attempts are
-/// short.
-fn descend_many<const D: usize>(
-    data: &Prepared<'_>,
-    ladder: &mut Ladder<'_>,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
-    iterations: &mut usize,
-) -> Option<StageResult> {
-    let options = ladder.options;
-    let brief = SolverOptions {
-        max_newton_steps: ATTEMPT.min(options.max_newton_steps),
-        ..*options
-    };
-    let attempts = [
-        (false, &brief, FEW_AT_RANDOM),
-        (true, &brief, AT_RANDOM),
-        (false, options, AT_RANDOM),
-    ];
-    for (is_from_zero, options, at_random) in attempts {
-        if is_from_zero {
+    /// Pivoting from the start that the scratch keeps and `p` is: from it, with larger `α`, and
+    /// from its loads alone. `p` is zero on return without an answer: a warm start may mislead,
+    /// zero does not.
+    fn pivot_from_start(&mut self) -> Option<StageResult> {
+        let found = pivoting::pivots(self.attempt, None);
+        if let Some(outcome) = self.enter(Stage::Pivoting, found) {
+            return Some(outcome);
+        }
+        let found = pivoting::further_pivots(self.attempt);
+        if let Some(outcome) = self.enter(Stage::Pivoting, found) {
+            return Some(outcome);
+        }
+        // Friction may point to modes that lead nowhere: the next path starts from the loads alone.
+        let Attempt { p, scratch, .. } = &mut *self.attempt;
+        for (p, start) in p.chunks_exact_mut(D).zip(scratch.start.chunks_exact(D)) {
             p.fill(0.0);
-        } else {
-            p.copy_from_slice(&scratch.nearest);
+            p[0] = start[0];
         }
-        let found = descend::<D>(data, ladder, options, p, u, scratch, iterations);
-        if found.is_some() || scratch.work.is_exhausted {
-            return found;
+        let found = pivoting::pivots(self.attempt, None);
+        if let Some(outcome) = self.enter(Stage::Pivoting, found) {
+            return Some(outcome);
         }
-        let found = pivot_from_attempt::<D>(data, ladder, at_random, p, u, scratch, iterations);
-        if found.is_some() || scratch.work.is_exhausted {
-            return found;
-        }
+        self.attempt.p.fill(0.0);
+        None
     }
-    None
+
+    /// Few contacts that share no body, without a warm start: one sweep solves each exactly, and as
+    /// nothing couples them, their order does not matter. `p` is zero on return without an answer.
+    fn sweep_separate(&mut self) -> Option<StageResult> {
+        let once = SweepBudget {
+            sweeps: 1,
+            predict: false,
+        };
+        let found = gauss_seidel::sweeps(self.attempt, once);
+        let outcome = self.enter(Stage::Sweeps, found);
+        if outcome.is_none() {
+            self.attempt.p.fill(0.0);
+        }
+        outcome
+    }
+
+    /// Few contacts without a warm start. The next stage starts from zero.
+    fn guide_from_rest(&mut self) -> Option<StageResult> {
+        let data = self.attempt.data;
+        if data.mu.len() > 1 && data.W.is_uncoupled::<D>(data.n) {
+            let found = self.sweep_separate();
+            if found.is_some() {
+                return found;
+            }
+        }
+        let found = match guided::solve(self.attempt) {
+            Some(residual) => (SolveStatus::Converged, residual),
+            None => (SolveStatus::Stalled, Residual::UNSOLVED),
+        };
+        if let Some(outcome) = self.enter(Stage::GuidedNewton, found) {
+            return Some(outcome);
+        }
+        self.attempt.p.fill(0.0);
+        None
+    }
+
+    /// The proximal point method from `p`.
+    fn descend(&mut self, most_steps: usize) -> Option<StageResult> {
+        let found = proximal::solve(self.attempt, most_steps);
+        self.enter(Stage::ProximalPoint, found)
+    }
+
+    /// Many contacts: pivoting from the last attempt's answer `p`, if it is near.
+    ///
+    /// Where bodies touch at many points, `W` has a large null space. An answer may then violate
+    /// the laws by 1e-9 and lie far from a true one: impulses have to move through the null space
+    /// until a contact opens. Pivoting goes there in one step, the proximal point method in
+    /// thousands. Where its modes go in circles, it goes on from the nearest answer in a random
+    /// order.
+    fn pivot_from_attempt(&mut self, at_random: usize) -> Option<StageResult> {
+        if self.attempt.residual().relative > NEAR {
+            return None;
+        }
+        self.attempt.scratch.start.copy_from_slice(self.attempt.p);
+        let found = self.pivot_from_start();
+        if found.is_some() || self.is_exhausted() {
+            return found;
+        }
+        self.take_nearest();
+        self.attempt.find_velocity();
+        let found = pivoting::random_pivots(self.attempt, at_random);
+        self.enter(Stage::Pivoting, found)
+    }
+
+    /// Many contacts: the proximal point method from the nearest answer, from zero, and again from
+    /// the nearest one, with pivoting after each attempt. What is near by its residual may be far
+    /// by its modes, and then a start from zero takes a tenth of the steps; so the first two
+    /// attempts are short.
+    fn descend_many(&mut self) -> Option<StageResult> {
+        let all = self.attempt.options.max_newton_steps;
+        let few = ATTEMPT.min(all);
+        let attempts = [
+            (false, few, FEW_AT_RANDOM),
+            (true, few, AT_RANDOM),
+            (false, all, AT_RANDOM),
+        ];
+        for (is_from_zero, most_steps, at_random) in attempts {
+            if is_from_zero {
+                self.attempt.p.fill(0.0);
+            } else {
+                self.take_nearest();
+            }
+            let found = self.descend(most_steps);
+            if found.is_some() || self.is_exhausted() {
+                return found;
+            }
+            let found = self.pivot_from_attempt(at_random);
+            if found.is_some() || self.is_exhausted() {
+                return found;
+            }
+        }
+        None
+    }
 }
 
 /// [`Method::Auto`]: cheap stages first, robust ones last.
 pub(in crate::solver) fn escalate<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    scratch: &mut SolveScratch,
+    attempt: &mut Attempt<'_, D>,
     islands: IslandSolver<'_>,
-    iterations: &mut usize,
 ) -> StageResult {
-    let mut ladder = Ladder::new(options);
-    scratch.start.copy_from_slice(p);
-    let steps = newton::FULL_STEPS.min(options.max_newton_steps);
+    let (data, options) = (attempt.data, attempt.options);
+    attempt.scratch.start.copy_from_slice(attempt.p);
+    let most_steps = options.max_newton_steps;
     let is_few = data.mu.len() <= options.direct_contacts;
-    let is_warm = p.iter().any(|x| x.abs() > 0.0);
+    let is_warm = attempt.p.iter().any(|x| x.abs() > 0.0);
+    let mut ladder = Ladder::new(attempt);
     let found = if !is_few {
-        sweep_many::<D>(data, &mut ladder, p, u, scratch, islands, iterations)
+        ladder.sweep_many(islands)
     } else if is_warm {
-        pivot_from_start::<D>(data, &mut ladder, p, u, scratch, iterations)
+        ladder.pivot_from_start()
     } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
-        guide_from_rest::<D>(data, &mut ladder, p, u, scratch, iterations)
+        ladder.guide_from_rest()
     } else {
         None
     };
     if let Some(outcome) = found {
         return outcome;
     }
-    let found = newton::full_steps::<D>(data, options, steps, p, u, scratch, iterations);
-    if let Some(outcome) = ladder.enter(Stage::Newton, found, p, scratch, *iterations) {
+    let found = newton::full_steps(ladder.attempt, newton::FULL_STEPS.min(most_steps));
+    if let Some(outcome) = ladder.enter(Stage::Newton, found) {
         return outcome;
     }
+    let Attempt { p, scratch, .. } = &mut *ladder.attempt;
     p.copy_from_slice(&scratch.start);
     if !is_few {
-        let found = interior_point::solve::<D>(data, options, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::InteriorPoint, found, p, scratch, *iterations) {
+        let found = interior_point::solve(ladder.attempt);
+        if let Some(outcome) = ladder.enter(Stage::InteriorPoint, found) {
             return outcome;
         }
     }
     let found = if is_few {
-        descend::<D>(data, &mut ladder, options, p, u, scratch, iterations)
+        ladder.descend(most_steps)
     } else {
-        descend_many::<D>(data, &mut ladder, p, u, scratch, iterations)
+        ladder.descend_many()
     };
     if let Some(outcome) = found {
         return outcome;
     }
     if is_few && ladder.nearest.residual.is_finite() {
-        let found = restarts::solve::<D>(data, options, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::Restarts, found, p, scratch, *iterations) {
+        let found = restarts::solve(ladder.attempt);
+        if let Some(outcome) = ladder.enter(Stage::Restarts, found) {
             return outcome;
         }
         if ladder.nearest.residual.relative < NEAR {
-            p.copy_from_slice(&scratch.nearest);
-            let found = descend::<D>(data, &mut ladder, options, p, u, scratch, iterations);
-            if let Some(outcome) = found {
+            ladder.take_nearest();
+            if let Some(outcome) = ladder.descend(most_steps) {
                 return outcome;
             }
         }
     }
-    ladder.give_nearest::<D>(data, p, u, scratch)
+    ladder.give_nearest()
 }

@@ -7,12 +7,12 @@
 
 use crate::law::coulomb::Coulomb;
 use crate::problem::{
-    BlockSparseDelassus, Dimension, FrictionContactProblem, Operator, Prepared, Residual,
-    ViolationSums, evaluate_contact,
+    BlockSparseDelassus, Dimension, FrictionContactProblem, Operator, Residual, ViolationSums,
+    evaluate_contact,
 };
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{SolveReport, SolveStatus};
-use crate::solver::work::WorkBudget;
+use crate::solver::scratch::{Attempt, StageEnd};
 
 /// Most contacts of an island whose `W` is copied as a dense matrix.
 const DENSE_ISLAND: usize = 64;
@@ -102,15 +102,10 @@ fn root(parents: &mut [usize], mut i: usize) -> usize {
 /// Solves every unsolved island from `p` and returns the method that the hardest one needed; `None`
 /// if all contacts form one island or `W` is dense. `u = W p + q` on return.
 pub(in crate::solver) fn solve<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    work: &mut WorkBudget,
+    attempt: &mut Attempt<'_, D>,
     solver: IslandSolver<'_>,
-    iterations: &mut usize,
-) -> Option<(Method, SolveStatus, Residual)> {
-    let Operator::BlockSparse(W) = data.W else {
+) -> Option<(Method, StageEnd)> {
+    let Operator::BlockSparse(W) = attempt.data.W else {
         return None;
     };
     let IslandSolver { islands, solve } = solver;
@@ -124,31 +119,26 @@ pub(in crate::solver) fn solve<const D: usize>(
     order.sort_by_key(|&island| islands.starts[island + 1] - islands.starts[island]);
     for island in order {
         let range = islands.starts[island]..islands.starts[island + 1];
-        if is_solved::<D>(data, options, &islands.contacts[range], p, u) {
+        if is_solved(attempt, &islands.contacts[range]) {
             continue;
         }
-        let own = SolverOptions {
-            budget: Some(work.budget.saturating_sub(work.spent) / 2),
-            keeps_history: false,
-            ..*options
-        };
-        let report = solve_island::<D>(data, W, &own, island, p, islands, solve);
-        *iterations += report.iterations;
-        work.spent += report.work;
+        let report = solve_island(attempt, W, island, islands, solve);
+        attempt.iterations += report.iterations;
+        attempt.scratch.work.spent += report.work;
         if rank(report.method) > rank(hardest) {
             hardest = report.method;
         }
     }
-    data.W.multiply_add(p, data.q, u);
-    let residual = data.measure::<D>(p, u);
-    let status = if options.accepts(residual)
-        || (residual.relative < 1e-7 && data.is_within_rounding::<D>(p, u))
+    attempt.find_velocity();
+    let residual = attempt.residual();
+    let status = if attempt.options.accepts(residual)
+        || (residual.relative < 1e-7 && attempt.is_within_rounding())
     {
         SolveStatus::Converged
     } else {
         SolveStatus::Stalled
     };
-    Some((hardest, status, residual))
+    Some((hardest, (status, residual)))
 }
 
 /// Rank of the method in the escalation.
@@ -161,17 +151,13 @@ fn rank(method: Method) -> usize {
 }
 
 /// Whether the island's share of the residual, and each of its velocities, meet the tolerances.
-fn is_solved<const D: usize>(
-    data: &Prepared<'_>,
-    options: &SolverOptions,
-    contacts: &[usize],
-    p: &[f64],
-    u: &[f64],
-) -> bool {
+fn is_solved<const D: usize>(attempt: &Attempt<'_, D>, contacts: &[usize]) -> bool {
+    let (data, options) = (attempt.data, attempt.options);
     let share = contacts.len() as f64 / data.mu.len() as f64;
     let mut violations = ViolationSums::default();
     for &i in contacts {
-        let square = evaluate_contact::<D>(p, u, D * i, &Coulomb(data.mu[i]), data.modes[i]);
+        let law = Coulomb(data.mu[i]);
+        let square = evaluate_contact::<D>(attempt.p, attempt.u, D * i, &law, data.modes[i]);
         violations.add(square, data.masses[i]);
     }
     let Residual { relative, velocity } =
@@ -180,14 +166,21 @@ fn is_solved<const D: usize>(
 }
 
 fn solve_island<const D: usize>(
-    data: &Prepared<'_>,
+    attempt: &mut Attempt<'_, D>,
     W: &BlockSparseDelassus,
-    options: &SolverOptions,
     island: usize,
-    p: &mut [f64],
     islands: &mut Islands,
     solve: &mut SolvePart<'_>,
 ) -> SolveReport {
+    let Attempt {
+        data, p, scratch, ..
+    } = attempt;
+    let work = &scratch.work;
+    let options = &SolverOptions {
+        budget: Some(work.budget.saturating_sub(work.spent) / 2),
+        keeps_history: false,
+        ..*attempt.options
+    };
     let Islands {
         starts,
         contacts,

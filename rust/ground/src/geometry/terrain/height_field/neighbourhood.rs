@@ -12,7 +12,7 @@ use super::{HeightField, PIECES, index, narrow, number};
 use crate::geometry::shape::{OrientedBox, PlacedShape};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
 #[cfg(target_arch = "x86_64")]
-use friction_contact::scalar::{Eights, Fours};
+use friction_contact::scalar::{Eights, Fours, inlined};
 use friction_contact::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, Vec3};
 
 /// Cosine of the angle to the way from a part to a face from which on the face looks away, as in
@@ -65,24 +65,20 @@ impl HeightField {
         if self.tiles.highest_of(columns, rows) < floor {
             return;
         }
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                for j in rows[0]..=rows[1] {
-                    for i in (columns[0]..=columns[1]).step_by(T::LANES) {
-                        let mut rest = (!self.are_clear_of::<T>(token, &solid, [i, j])).bits();
-                        while rest != 0 {
-                            let cell = [i + rest.trailing_zeros() as usize, j];
-                            rest &= rest - 1;
-                            if cell[0] <= columns[1] {
-                                self.visit_kinds(cell, self.near_part(cell, part), visit);
-                            }
+        inlined!(T::vectorize, token, {
+            for j in rows[0]..=rows[1] {
+                for i in (columns[0]..=columns[1]).step_by(T::LANES) {
+                    let mut rest = (!self.are_clear_of::<T>(token, &solid, [i, j])).bits();
+                    while rest != 0 {
+                        let cell = [i + rest.trailing_zeros() as usize, j];
+                        rest &= rest - 1;
+                        if cell[0] <= columns[1] {
+                            self.visit_kinds(cell, self.near_part(cell, part), visit);
                         }
                     }
                 }
-            },
-        );
+            }
+        });
     }
 
     /// Which cells of a row, from one on, are clear of a box: beyond a plane along one of its sides
@@ -257,10 +253,7 @@ mod tests {
                 R,
                 half_size: Vector3::new(0.2, 0.05, 0.1),
             }),
-            PlacedShape::Sphere(Sphere {
-                centre,
-                radius: 0.12,
-            }),
+            PlacedShape::Sphere(Sphere::new(centre, 0.12)),
             PlacedShape::Cylinder(Roller::new(disc(0.15), 0.2, 0.0)),
             PlacedShape::Cylinder(Roller::new(disc(0.06), 0.3, 0.06)),
             PlacedShape::Ellipsoid(Ellipsoid {

@@ -18,7 +18,7 @@ use super::{HeightField, index, narrow};
 use crate::geometry::shape::{Disc, Roller, SupportMap};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
 #[cfg(target_arch = "x86_64")]
-use friction_contact::scalar::{Eights, Fours};
+use friction_contact::scalar::{Eights, Fours, inlined};
 use friction_contact::scalar::{Instructions, Lane, LaneMask, Single};
 
 /// How deep a wheel may be in the ground, in bounding radii, so that faces as far beside it are all
@@ -272,22 +272,18 @@ impl HeightField {
         wheel: &SweptWheel<'_>,
         cells: &Cells,
     ) -> [u32; KINDS] {
-        T::vectorize(
-            token,
-            #[inline(always)]
-            || {
-                let mut near = [0; KINDS];
-                let mut at = 0;
-                while at < cells.n {
-                    let own = wheel.compare::<T>(token, self.spacing, (cells, at));
-                    for kind in 0..KINDS {
-                        near[kind] |= own[kind].bits() << at;
-                    }
-                    at += T::LANES;
+        inlined!(T::vectorize, token, {
+            let mut near = [0; KINDS];
+            let mut at = 0;
+            while at < cells.n {
+                let own = wheel.compare::<T>(token, self.spacing, (cells, at));
+                for kind in 0..KINDS {
+                    near[kind] |= own[kind].bits() << at;
                 }
-                near
-            },
-        )
+                at += T::LANES;
+            }
+            near
+        })
     }
 }
 
