@@ -80,7 +80,7 @@ fn a_wheel_that_slides_is_slowed_by_the_friction_of_its_pair() {
         );
         wheel.step(20).unwrap();
         let expected = 1.5 - mu * 9.81 * 0.1;
-        let speed = wheel.state().v[0];
+        let speed = wheel.v()[0];
         assert!((speed - expected).abs() < 1e-9, "{mu}: {speed} {expected}");
     }
 }
@@ -117,7 +117,7 @@ fn a_ball_bounces_by_the_restitution_of_its_pair() {
         );
         let mut ball = moving(ball(material), ground, options, place, &v);
         ball.step(8).unwrap();
-        let rebound = ball.state().v[1];
+        let rebound = ball.v()[1];
         assert!(
             (rebound - 2.0 * e).abs() < 1e-9,
             "{material} {e}: {rebound}"
@@ -139,14 +139,14 @@ fn two_bodies_meet_by_the_law_of_their_materials() {
     };
     let mut balls =
         RoverSimulation::new(Arc::new(two), Arc::new(Plane::ground()), options).unwrap();
-    let mut start = balls.state().configuration.clone();
+    let mut start = balls.q().clone();
     start.position.y = 3.0;
     start.others[0].position = Vector3::new(0.21, 3.0, 0.0);
     let mut v = vec![0.0; 12];
     v[0] = 1.0;
     balls.set_state(start, v);
     balls.step(10).unwrap();
-    let (a, b) = (balls.state().v[0], balls.state().v[6]);
+    let (a, b) = (balls.v()[0], balls.v()[6]);
     assert!(
         (b - a - 0.6).abs() < 1e-9 && (a + b - 1.0).abs() < 1e-9,
         "{a} {b}"

@@ -187,7 +187,7 @@ fn rolling_in_a_valley(variant: Variant, h: f64) -> [f64; 3] {
 #[test]
 fn rolling_along_a_curve_is_of_second_order() {
     let exact = rolling_in_a_valley(Variant::Newton, 1e-5);
-    for variant in [Variant::Linearised, Variant::Newton] {
+    for variant in VARIANTS {
         let error = |h: f64| {
             let end = rolling_in_a_valley(variant, h);
             (end[0] - exact[0]).hypot(end[1] - exact[1])

@@ -110,12 +110,12 @@ fn largest_distance(
     reduced.set_state(q.as_slice(), &[0.0; 7]).unwrap();
     let (mut largest, mut way) = (0.0_f64, 0.0_f64);
     for _ in 0..200 {
-        let torque = torques(full.state().time);
+        let torque = torques(full.time());
         full.set_wheel_torques(&[torque; 6]).unwrap();
         reduced.set_inputs(&[torque; 3]).unwrap();
         assert!(full.step(10).unwrap().is_converged());
         assert!(reduced.step(10).unwrap().is_converged());
-        let full_q = coordinates::to_public(full.model(), &full.state().configuration);
+        let full_q = coordinates::to_public(full.model(), full.q());
         way = way.max(reduced.q()[0].abs());
         largest = largest.max(
             (DVector::from_vec(full_q) - &P * SVector::<f64, 7>::from_column_slice(reduced.q()))

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use nalgebra::{SMatrix, SVector, Vector2, Vector3};
-use rover_core::integrator::{Stabilisation, StepOptions, Variant};
+use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::planar::{ContactRule, Line, PlanarBall, PlanarGround, PlanarTree};
 use rover_core::simulation::PlanarSimulation;
 
-pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
+pub use crate::shared::VARIANTS;
+
 pub const G: f64 = 9.81;
 
 /// Options with gravity straight down.

@@ -113,7 +113,7 @@ fn a_rover_that_fails_fails_alone() {
         let mut mad = rovers(n).remove(1);
         let mut v = vec![0.0; mad.model().nv()];
         v[3] = 1e30;
-        let start = mad.state().configuration.clone();
+        let start = mad.q().clone();
         mad.set_state(start, v);
         broken.replace(1, mad, TARGET).unwrap();
         let width = sound.layout().size();
@@ -137,10 +137,10 @@ fn rovers_that_are_not_active_keep_still() {
     let mut batch = batch(3, 2);
     drive(&mut batch, 0..2, None);
     let before = batch.rovers()[1].snapshot();
-    let moving = batch.rovers()[2].state().time;
+    let moving = batch.rovers()[2].time();
     drive(&mut batch, 2..4, Some(&[true, false, true]));
     assert_eq!(batch.rovers()[1].snapshot(), before);
-    assert!(batch.rovers()[2].state().time > moving);
+    assert!(batch.rovers()[2].time() > moving);
 }
 
 #[test]

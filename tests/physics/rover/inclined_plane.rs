@@ -19,7 +19,7 @@ fn run(mut simulation: RoverSimulation, reference: &str) -> (f64, f64) {
             .fold(deepest, |m, c| m.min(c.gap));
     }
     let q = numbers(golden(reference)["q"].as_array().unwrap().last().unwrap());
-    let x = simulation.state().configuration.position;
+    let x = simulation.q().position;
     (
         (x - nalgebra::Vector3::new(q[0], q[1], q[2])).norm(),
         deepest,

@@ -25,8 +25,8 @@ fn bouncing_error(variant: Variant, h: f64, clearance: f64) -> f64 {
     let n = count(0.5, h);
     for _ in 0..n {
         simulation.step(1).unwrap();
-        let height = simulation.state().configuration.position.y - 0.35;
-        sum += h * (height - bouncing_ball(clearance, 0.5, simulation.state().time)).abs();
+        let height = simulation.q().position.y - 0.35;
+        sum += h * (height - bouncing_ball(clearance, 0.5, simulation.time())).abs();
     }
     sum
 }

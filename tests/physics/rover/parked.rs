@@ -6,6 +6,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, ModelDescription};
 
 use super::scenes::{VARIANTS, at_rest, on_slope, simulation};
+use crate::shared::stepping;
 
 /// Closed form, N: front (trunk 40/102 + group)/2, side (trunk 62/204 +
 /// group)/2, group = axle or bogie + 2 steering + 2 wheels.
@@ -16,7 +17,7 @@ const SIDE: f64 = 9.81 * (600.0 * 62.0 / 204.0 + 120.0) / 2.0;
 fn loads_on_the_flat_are_the_closed_form() {
     assert!((FRONT - 1742.718).abs() < 1e-3 && (SIDE - 1483.041).abs() < 1e-3);
     for variant in VARIANTS {
-        let mut simulation = at_rest(crate::stepping(variant, 0.005));
+        let mut simulation = at_rest(stepping(variant, 0.005));
         simulation.brake();
         for steps in [1, 1, 2000] {
             assert!(simulation.step(steps).unwrap().is_converged());
@@ -33,7 +34,7 @@ fn loads_on_the_flat_are_the_closed_form() {
                 );
             }
         }
-        assert!(simulation.state().v.iter().all(|v| v.abs() < 1e-12));
+        assert!(simulation.v().iter().all(|v| v.abs() < 1e-12));
     }
 }
 
@@ -83,14 +84,14 @@ fn braked_on_a_slope_it_does_not_creep() {
         let mut simulation = on_slope(degrees, StepOptions::default());
         simulation.brake();
         simulation.step(2000).unwrap();
-        let before = simulation.state().configuration.position;
+        let before = simulation.q().position;
         assert!(simulation.step(10_000).unwrap().is_converged());
-        let creep = (simulation.state().configuration.position - before).norm() / 50.0;
+        let creep = (simulation.q().position - before).norm() / 50.0;
         assert!(creep < 1e-9, "{degrees} degrees: {creep} m/s");
         assert!(
-            simulation.state().v.iter().all(|v| v.abs() < 1e-8),
+            simulation.v().iter().all(|v| v.abs() < 1e-8),
             "{degrees} degrees: {:?}",
-            simulation.state().v
+            simulation.v()
         );
     }
 }
@@ -105,9 +106,9 @@ fn beyond_the_friction_angle_it_slides_as_coulomb_says() {
         simulation.brake();
         simulation.step(200).unwrap();
         let speed = |v: &[f64]| Vector3::new(v[0], v[1], v[2]).norm();
-        let before = speed(&simulation.state().v);
+        let before = speed(simulation.v());
         simulation.step(200).unwrap();
-        let acceleration = speed(&simulation.state().v) - before;
+        let acceleration = speed(simulation.v()) - before;
         assert!(
             (acceleration - expected).abs() < 1e-6 * expected.max(0.1),
             "{degrees}: {acceleration}, not {expected}"

@@ -36,7 +36,7 @@ fn a_rover_on_hills_stands_on_all_six_wheels_and_stays() {
             RoverSimulation::new(Arc::clone(&model), Arc::clone(&field), options).unwrap();
         rover.set_state(configuration.clone(), vec![0.0; model.nv()]);
         rover.step(1).unwrap();
-        let speed = rover.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let speed = rover.v().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         assert!(speed < 0.2, "{speed}");
     }
     let off = resting_on(&model, &*field, [3.9, 0.0], 0.0).unwrap_err();

@@ -40,25 +40,22 @@ fn turning_the_scene_turns_the_answer() {
     for heading in [0.7, std::f64::consts::FRAC_PI_2, 3.0, -2.0] {
         let turned = driving(heading, 0.2);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);
-        let expected = turn * straight.state().configuration.position;
-        let miss = (turned.state().configuration.position - expected).norm();
+        let expected = turn * straight.q().position;
+        let miss = (turned.q().position - expected).norm();
         assert!(
             miss < 1e-6 && expected.norm() > 2.0,
             "heading {heading}: {miss} m over {} m",
             expected.norm()
         );
-        let attitude = turn * straight.state().configuration.attitude;
-        assert!(turned.state().configuration.attitude.angle_to(&attitude) < 1e-6);
+        let attitude = turn * straight.q().attitude;
+        assert!(turned.q().attitude.angle_to(&attitude) < 1e-6);
     }
 }
 
 #[test]
 fn steering_left_is_the_mirror_image_of_steering_right() {
     let (left, right) = (driving(0.0, 0.2), driving(0.0, -0.2));
-    let (a, b) = (
-        left.state().configuration.position,
-        right.state().configuration.position,
-    );
+    let (a, b) = (left.q().position, right.q().position);
     assert!(
         (a.x - b.x).abs() < 1e-6 && (a.y - b.y).abs() < 1e-6 && (a.z + b.z).abs() < 1e-6,
         "{a} {b}"

@@ -79,7 +79,7 @@ fn a_cart_with_three_wheels_and_a_tilted_joint_drives() {
     assert!((simulation.wheel_torques()[2] - 5.0).abs() < 1e-15);
     simulation.set_wheel_torques(&[2.0; 3]).unwrap();
     assert!(simulation.step(400).unwrap().is_converged());
-    assert!(simulation.state().configuration.position.x > 1.0);
+    assert!(simulation.q().position.x > 1.0);
 }
 
 #[test]
@@ -109,10 +109,6 @@ fn a_free_top_precesses_as_the_closed_form_says() {
     let L = Vector3::new(a * cross, c * w, 0.0);
     let about_L = UnitQuaternion::from_scaled_axis(L * (T / a));
     let about_axis = UnitQuaternion::from_scaled_axis(Vector3::y() * (-(c - a) / a * w * T));
-    let error = simulation
-        .state()
-        .configuration
-        .attitude
-        .angle_to(&(about_L * about_axis));
+    let error = simulation.q().attitude.angle_to(&(about_L * about_axis));
     assert!(error < 1e-5, "{error} rad");
 }

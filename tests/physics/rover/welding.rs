@@ -89,7 +89,7 @@ fn a_straight_drive_needs_no_steering_joints() {
         }
         simulation.set_wheel_torques(&[15.0; 6]).unwrap();
         assert!(simulation.step(800).unwrap().is_converged());
-        simulation.state().configuration.position
+        simulation.q().position
     });
     assert!(ends[0].x > 3.0, "{ends:?}");
     assert!((ends[0] - ends[1]).norm() < 1e-7, "{ends:?}");

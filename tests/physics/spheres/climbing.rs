@@ -70,7 +70,7 @@ fn climbs(height: f64, mu: f64) -> bool {
         &[0.0; 7],
         &[0.0; 7],
     );
-    let mut start = wheel.state().configuration.clone();
+    let mut start = wheel.q().clone();
     start.position = Vector3::new(-back, R - height, 0.0);
     wheel =
         RoverSimulation::new(wheel.model().clone(), std::sync::Arc::new(field), options).unwrap();
@@ -82,7 +82,7 @@ fn climbs(height: f64, mu: f64) -> bool {
         .unwrap();
     for _ in 0..4000 {
         assert!(wheel.step(1).unwrap().is_converged());
-        let position = wheel.state().configuration.position;
+        let position = wheel.q().position;
         if position.x > -0.2 * back {
             return position.y > R - 0.1 * height;
         }

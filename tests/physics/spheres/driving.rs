@@ -25,7 +25,7 @@ fn penetration_stays_below_a_millimetre_at_one_millisecond() {
         let (mut worst, mut unsolved, mut fastest, mut iterations) = (0.0_f64, 0, 0.0_f64, 0);
         let steps = 4000;
         for _ in 0..steps {
-            let v = &rover.state().v;
+            let v = rover.v();
             let speed = v[0].hypot(v[1]).hypot(v[2]);
             fastest = fastest.max(speed);
             // A cruise control: as much torque as keeps it below 1 m/s.
@@ -38,7 +38,7 @@ fn penetration_stays_below_a_millimetre_at_one_millisecond() {
         report(&format!(
             "seed {seed}: deepest {worst:.2e} m, {unsolved} of {steps} steps not converged, {:.2} iterations a step, fastest {fastest:.2} m/s, at {}",
             f64::from(u32::try_from(iterations).unwrap()) / f64::from(steps),
-            rover.state().configuration.position.transpose()
+            rover.q().position.transpose()
         ));
         assert!(worst > -1e-3, "seed {seed}: {worst} m");
     }

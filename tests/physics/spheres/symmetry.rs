@@ -42,7 +42,7 @@ fn driven(stones: &[[f64; 4]], heading: f64, steps: usize) -> RoverSimulation {
     let start = Configuration {
         position: turn * Vector3::new(0.0, 0.35, 0.0),
         attitude: turn,
-        ..simulation.state().configuration.clone()
+        ..simulation.q().clone()
     };
     simulation.set_state(start, vec![0.0; 21]);
     simulation.set_wheel_torques(&[35.0; 6]).unwrap();
@@ -74,8 +74,8 @@ fn turning_the_scene_turns_the_answer() {
     for heading in [0.7, 3.0] {
         let turned = driven(&stones, heading, 400);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);
-        let expected = turn * straight.state().configuration.position;
-        let miss = (turned.state().configuration.position - expected).norm();
+        let expected = turn * straight.q().position;
+        let miss = (turned.q().position - expected).norm();
         assert!(
             miss < 1e-5 && expected.norm() > 0.5,
             "heading {heading}: {miss} m"

@@ -41,11 +41,11 @@ fn leaving_the_map_is_an_error_that_names_the_place_and_keeps_the_state() {
     for field in fields {
         let start = Vector3::new(0.0, WHEEL_RADIUS, 0.0);
         let mut wheel = placed(lone_wheel(), field, StepOptions::default(), start);
-        let configuration = wheel.state().configuration.clone();
+        let configuration = wheel.q().clone();
         let spin = -2.0 / WHEEL_RADIUS;
         wheel.set_state(configuration, vec![2.0, 0.0, 0.0, 0.0, 0.0, spin]);
         let error = wheel.step(1000).unwrap_err();
-        let x = wheel.state().configuration.position.x;
+        let x = wheel.q().position.x;
         assert!((0.85..1.0).contains(&x), "{x}");
         let StepError::NoGround { x, .. } = error else {
             panic!("{error}")

@@ -20,8 +20,8 @@ fn drive(simulation: &mut RoverSimulation) -> Vec<f64> {
     let mut path = Vec::new();
     for _ in 0..20 {
         assert!(simulation.step(20).unwrap().is_converged());
-        path.extend(simulation.state().configuration.position.iter());
-        path.extend(simulation.state().configuration.attitude.coords.iter());
+        path.extend(simulation.q().position.iter());
+        path.extend(simulation.q().attitude.coords.iter());
     }
     path
 }
@@ -54,10 +54,7 @@ fn a_tilted_map_moves_the_rover_as_the_tilted_plane_does() {
         let slope = rise / spacing;
         let degrees = slope.atan().to_degrees();
         let mut on_plane = on_slope(degrees, StepOptions::default());
-        let q = rover_core::multibody::coordinates::to_public(
-            on_plane.model(),
-            &on_plane.state().configuration,
-        );
+        let q = rover_core::multibody::coordinates::to_public(on_plane.model(), on_plane.q());
         let expected = drive(&mut on_plane);
         let field = map(cells, spacing, |x, _| (x / spacing).round() * rise);
         let path = drive(&mut rover_on(Arc::new(field), &q));
@@ -85,7 +82,7 @@ fn a_wheel_feels_nothing_of_a_thousand_inner_edges() {
         let field = map(2400, 0.004, |_, _| 0.0);
         let start = Vector3::new(-3.0, WHEEL_RADIUS, 0.0);
         let mut wheel = placed(lone_wheel(), field, StepOptions::default(), start);
-        let mut configuration = wheel.state().configuration.clone();
+        let mut configuration = wheel.q().clone();
         let turn =
             rover_core::nalgebra::UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -heading);
         configuration.attitude = turn;

@@ -136,7 +136,7 @@ fn a_wheel_lands_on_a_rock_that_lies_on_a_map() {
         );
         let mut wheel = placed(lone_wheel(), both, options, start);
         wheel.step(33).unwrap();
-        let y = wheel.state().configuration.position.y;
+        let y = wheel.q().position.y;
         assert!(
             y > 0.2 && deepest(&wheel) > -0.02,
             "{phase}: {y} {}",

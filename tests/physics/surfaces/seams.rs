@@ -118,7 +118,7 @@ fn slide(
 /// Place along the slope, and how far its axes have turned from it.
 fn end(sim: &RoverSimulation, turn: f64) -> [f64; 2] {
     let attitude = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
-    let own = &sim.state().configuration;
+    let own = sim.q();
     let place = attitude.inverse() * own.position;
     [place.x, (attitude.inverse() * own.attitude).angle()]
 }
@@ -297,7 +297,7 @@ fn a_rover_drives_over_hills_in_tiles_as_over_the_whole_map() {
         sim.step(60).unwrap();
         sim.set_wheel_torques(&[60.0; 6]).unwrap();
         sim.step(340).unwrap();
-        sim.state().configuration.position
+        sim.q().position
     });
     assert!(ends[0].x > 0.3, "{}", ends[0]);
     for end in &ends[1..] {

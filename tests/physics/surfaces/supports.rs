@@ -174,7 +174,7 @@ fn unrest(
     let mut simulation = RoverSimulation::new(model.clone(), ground.clone(), options).unwrap();
     simulation.set_state(start, vec![0.0; model.nv()]);
     simulation.step(400).unwrap();
-    let before = simulation.state().configuration.clone();
+    let before = simulation.q().clone();
     let mut fastest = 0.0;
     for _ in 0..40 {
         simulation.step(1).unwrap();
@@ -183,7 +183,7 @@ fn unrest(
             .iter()
             .fold(fastest, |most: f64, v| most.max(v.abs()));
     }
-    let after = &simulation.state().configuration;
+    let after = simulation.q();
     let (drift, aside) = (
         (after.position - before.position).norm(),
         after.position - place,

@@ -11,6 +11,7 @@ use rover_core::simulation::RoverSimulation;
 
 use super::wheel_scenes::{lone, wide_rover};
 use crate::rover::scenes::VARIANTS;
+use crate::shared::stepping;
 use crate::spheres::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, placed};
 use crate::surfaces::surface_scenes::map;
 
@@ -61,12 +62,12 @@ fn the_loads_of_a_resting_rover_do_not_jump_with_its_lean() {
 #[test]
 fn a_cylinder_stands_on_two_points_without_rocking() {
     for variant in VARIANTS {
-        let options = crate::stepping(variant, 0.005);
+        let options = stepping(variant, 0.005);
         let start = Vector3::new(0.0, WHEEL_RADIUS, 0.0);
         let mut wheel = placed(lone(0.08, 0.01), Plane::ground(), options.clone(), start);
         for _ in 0..20 {
             wheel.step(20).unwrap();
-            let speed = wheel.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            let speed = wheel.v().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             assert!(speed < 1e-9, "{variant:?}: {speed}");
         }
         let parts: Vec<Part> = wheel.contacts().iter().map(|c| c.contact.part).collect();
@@ -104,16 +105,16 @@ fn a_cylinder_that_leans_falls_back_on_its_tread() {
         StepOptions::default(),
         start,
     );
-    let mut q = wheel.state().configuration.clone();
+    let mut q = wheel.q().clone();
     q.attitude = UnitQuaternion::from_euler_angles(0.3, 0.0, 0.0);
     wheel.set_state(q, vec![0.0; 6]);
     wheel.step(600).unwrap();
-    let axle = wheel.state().configuration.attitude * Vector3::z();
+    let axle = wheel.q().attitude * Vector3::z();
     // Where a step ends within the last of its impacts, it comes to rest.
     assert!(axle.y.abs() < 1e-3, "{axle}");
-    let speed = wheel.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let speed = wheel.v().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     assert!(speed < 1e-9, "{speed}");
-    let y = wheel.state().configuration.position.y;
+    let y = wheel.q().position.y;
     assert!((y - WHEEL_RADIUS).abs() < 1e-4, "{y}");
 }
 
@@ -123,7 +124,7 @@ fn drive(model: Model, terrain: Arc<dyn Terrain>, steering: [f64; 6]) -> Vec<Vec
     rover.step(100).unwrap();
     rover.set_steering(&steering).unwrap();
     rover.set_wheel_torques(&[20.0; 6]).unwrap();
-    let place = |rover: &RoverSimulation| rover.state().configuration.position;
+    let place = |rover: &RoverSimulation| rover.q().position;
     (0..40)
         .map(|_| {
             assert!(rover.step(10).unwrap().is_converged());
