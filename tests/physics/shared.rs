@@ -9,7 +9,7 @@ use rover_core::integrator::moreau_jean::MoreauJean;
 use rover_core::integrator::{StepOptions, StepReport, Variant};
 use rover_core::multibody::{
     Configuration, CouplingDescription, JointLimits, LoopDescription, LoopKind, Model,
-    ModelDescription, Spring,
+    ModelDescription, Spring, coordinates,
 };
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::RoverSimulation;
@@ -87,6 +87,20 @@ pub fn resting(
     place(&mut q);
     let v = vec![0.0; model.nv()];
     moving(model, ground, options, q, v)
+}
+
+/// A machine at rest in public coordinates, with the default options.
+pub fn in_public(
+    model: impl Into<Arc<Model>>,
+    ground: Arc<dyn Terrain>,
+    q: &[f64],
+) -> RoverSimulation {
+    let model = model.into();
+    let (q, v) = (
+        coordinates::from_public(&model, q).unwrap(),
+        vec![0.0; model.nv()],
+    );
+    moving(model, ground, StepOptions::default(), q, v)
 }
 
 /// Names of all joints of a rover but its base.

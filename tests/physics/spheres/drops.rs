@@ -9,6 +9,7 @@ use rover_core::multibody::{Configuration, Model};
 use rover_core::simulation::RoverSimulation;
 
 use super::sphere_scenes::{Random, rocks};
+use crate::shared::{joints, moving};
 
 /// Worst of so many drops.
 struct Worst {
@@ -57,8 +58,6 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
         steps: 0,
     };
     for _ in 0..drops {
-        let mut simulation =
-            RoverSimulation::new(model.clone(), field.clone(), options.clone()).unwrap();
         let tilt = [
             random.between(-0.6, 0.6),
             random.between(-3.1, 3.1),
@@ -78,15 +77,9 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
         };
         let mut v: Vec<f64> = (0..21).map(|_| random.between(-0.5, 0.5)).collect();
         v[1] = random.between(-4.0, -2.0);
-        simulation.set_state(start, v);
+        let mut simulation = moving(model.clone(), field.clone(), options.clone(), start, v);
         // The energy does not include the steering springs: release them.
-        let held: Vec<String> = simulation
-            .model()
-            .bodies()
-            .iter()
-            .skip(1)
-            .map(|b| b.name.clone())
-            .collect();
+        let held = joints(&simulation);
         simulation.release(&held).unwrap();
         let start = simulation.energy();
         let mut before = start.total();
@@ -132,12 +125,10 @@ fn without_restitution_energy_never_grows() {
     // Measured 0.05, and 0.01 to 0.06 with other seeds: projection lifts parts that an impact left
     // inside a rock.
     assert!(worst.rise < 0.1, "{}", worst.rise);
-    assert!(
-        worst.unsolved <= 10,
-        "{} of {}",
-        worst.unsolved,
-        worst.steps
-    );
+    let Worst {
+        unsolved, steps, ..
+    } = worst;
+    assert!(unsolved <= 10, "{unsolved} of {steps}");
 }
 
 #[test]
@@ -160,10 +151,8 @@ fn with_restitution_and_friction_the_worst_gain_is_known() {
     // it, and that drop ends with 1.9 times what it began with.
     assert!(worst.work < 4.0, "{}", worst.work);
     assert!(worst.gain < 4.0, "{}", worst.gain);
-    assert!(
-        worst.unsolved <= 10,
-        "{} of {}",
-        worst.unsolved,
-        worst.steps
-    );
+    let Worst {
+        unsolved, steps, ..
+    } = worst;
+    assert!(unsolved <= 10, "{unsolved} of {steps}");
 }

@@ -11,7 +11,7 @@ use rover_core::simulation::RoverSimulation;
 
 use super::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, field, lone_wheel, placed};
 use crate::rover::scenes::VARIANTS;
-use crate::shared::stepping;
+use crate::shared::{near, stepping};
 
 const R: f64 = WHEEL_RADIUS;
 const G: f64 = 9.81;
@@ -76,14 +76,8 @@ fn wedged_between_two_spheres_each_carries_its_share_of_the_triangle_of_forces()
             let forces = normal_forces(&wheel);
             assert_eq!(forces.len(), 2, "one contact a sphere");
             let total = WHEEL_MASS * G / (alpha + beta).sin();
-            assert!(
-                (forces[0].1 - total * beta.sin()).abs() < 1e-6,
-                "{forces:?}"
-            );
-            assert!(
-                (forces[1].1 - total * alpha.sin()).abs() < 1e-6,
-                "{forces:?}"
-            );
+            near(forces[0].1, total * beta.sin(), 1e-6);
+            near(forces[1].1, total * alpha.sin(), 1e-6);
             assert!(wheel.q().position.norm() < 1e-8);
         }
     }
@@ -104,12 +98,8 @@ fn lying_on_three_spheres_each_carries_a_third() {
                     Vector3::new(a.cos(), 0.0, a.sin()) * (0.6 * R)
                 })
                 .collect();
-            let ground = field(
-                &places
-                    .iter()
-                    .map(|p| [p.x, -0.2, p.z, 0.2])
-                    .collect::<Vec<_>>(),
-            );
+            let spheres: Vec<_> = places.iter().map(|p| [p.x, -0.2, p.z, 0.2]).collect();
+            let ground = field(&spheres);
             let mut wheel = placed(lone_wheel(), ground, options, Vector3::zeros());
             let mut flat = wheel.q().clone();
             flat.attitude =
@@ -156,14 +146,9 @@ fn wedged_between_three_spheres_the_triangle_is_a_pyramid() {
     let forces = normal_forces(&wheel);
     assert_eq!(forces.len(), 3);
     let total = WHEEL_MASS * G / (alpha + beta).sin();
-    assert!(
-        (forces[0].1 - total * beta.sin()).abs() < 1e-6,
-        "{forces:?}"
-    );
+    near(forces[0].1, total * beta.sin(), 1e-6);
     // The in-plane part of each of the pair's normals is cos of its lean, √(1 − (side/r)²).
     let each = total * alpha.sin() / (2.0 * (1.0 - (side / r).powi(2)).sqrt());
-    assert!(
-        (forces[1].1 - each).abs() < 1e-6 && (forces[2].1 - each).abs() < 1e-6,
-        "{forces:?}"
-    );
+    near(forces[1].1, each, 1e-6);
+    near(forces[2].1, each, 1e-6);
 }

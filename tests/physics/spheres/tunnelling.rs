@@ -7,7 +7,7 @@ use rover_core::multibody::Model;
 
 use super::sphere_scenes::{WHEEL_RADIUS, deepest, field, lone_wheel, placed};
 use crate::rover::scenes::VARIANTS;
-use crate::shared::{joints, stepping};
+use crate::shared::{joints, near, stepping};
 
 const R: f64 = WHEEL_RADIUS;
 
@@ -73,12 +73,8 @@ fn the_rover_dropped_from_two_metres_at_20_ms_comes_to_rest_on_pebbles_and_bould
                     .map(|s| [s[0] + pitch / 2.0, s[1] - 0.1, s[2] + pitch / 2.0, s[3]]),
             );
             let options = stepping(variant, 0.02);
-            let mut rover = placed(
-                Model::rover(),
-                field(&below),
-                options,
-                Vector3::new(0.0, 2.4, 0.0),
-            );
+            let start = Vector3::new(0.0, 2.4, 0.0);
+            let mut rover = placed(Model::rover(), field(&below), options, start);
             rover.brake();
             let mut converged = 0;
             for _ in 0..300 {
@@ -121,12 +117,8 @@ fn high_centred_on_a_boulder_the_trunk_carries_the_rover() {
     for variant in VARIANTS {
         let boulder = field(&[[-0.02, 0.0, 0.0, 0.5]]);
         let options = stepping(variant, 0.005);
-        let mut rover = placed(
-            Model::rover(),
-            boulder,
-            options,
-            Vector3::new(0.0, 0.72, 0.0),
-        );
+        let start = Vector3::new(0.0, 0.72, 0.0);
+        let mut rover = placed(Model::rover(), boulder, options, start);
         let joints = joints(&rover);
         rover.hold(&joints, None, None, None).unwrap();
         rover.step(60).unwrap();
@@ -136,11 +128,7 @@ fn high_centred_on_a_boulder_the_trunk_carries_the_rover() {
             .filter(|a| a.contact.part == Part::Box(0));
         assert_eq!(on_trunk.count(), 1);
         let weight = rover.model().mass() * 9.81;
-        assert!(
-            (rover.body_force() / weight - 1.0).abs() < 0.1,
-            "{}",
-            rover.body_force()
-        );
+        near(rover.body_force() / weight, 1.0, 0.1);
         rover.step(1000).unwrap();
         assert!(rover.q().is_finite());
     }

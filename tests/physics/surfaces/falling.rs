@@ -24,9 +24,7 @@ pub fn bumpy(seed: u64, spacing: f64, height: f64) -> HeightField {
 
 #[test]
 fn the_rover_drops_onto_a_rough_map_and_comes_to_rest_on_it() {
-    let mut q = [0.0; 21];
-    q[1] = 1.0;
-    let mut rover = rover_on(Arc::new(bumpy(7, 0.1, 0.06)), &q);
+    let mut rover = rover_on(Arc::new(bumpy(7, 0.1, 0.06)), 1.0);
     for _ in 0..4 {
         rover.step(100).unwrap();
     }
