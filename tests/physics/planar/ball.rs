@@ -144,13 +144,12 @@ fn a_ball_in_a_valley_narrower_than_itself_rests_on_two_points() {
 fn rolling_in_a_valley(variant: Variant, h: f64) -> [f64; 3] {
     let sine = Sine::new(0.5, 6.0, 0.3, 0.0).unwrap();
     let options = options_of(variant, G, 0.9, 0.0, h);
-    let mut simulation = ball_on(sine, disc(), options);
     // On the curve, at rest: the centre r away along the normal.
     let (x, k) = (0.0_f64, TAU / 6.0);
     let slope = 0.5 * k * (k * x + 0.3).cos();
     let n = nalgebra::Vector2::new(-slope, 1.0).normalize();
     let q = [x + 0.3 * n.x, 0.5 * (k * x + 0.3).sin() + 0.3 * n.y, 0.0];
-    simulation.set_state(&q, &[0.0; 3]).unwrap();
+    let mut simulation = at_rest(sine, disc(), options, q);
     assert!(simulation.step(count(2.0, h)).unwrap().is_converged());
     [
         simulation.q()[0],

@@ -177,7 +177,7 @@ fn a_pair_of_unlike_motors_is_refused_by_name() {
 #[test]
 fn the_torques_are_those_that_the_motors_can_give() {
     let options = options(G, 0.7, 0.0, 0.005);
-    let mut rover = placed(level(), planar(), options, [0.0; 7], [0.0; 7]);
+    let mut rover = at_rest(level(), planar(), options, [0.0; 7]);
     rover.set_inputs(&[1e3, -1e3, 10.0]).unwrap();
     // They once stood there as given, while a different torque acted.
     assert_eq!(*rover.command(), [150.0, -150.0, 10.0]);

@@ -7,15 +7,13 @@ use rover_core::multibody::{Model, coordinates};
 use rover_core::simulation::RoverSimulation;
 
 use super::scenes::{VARIANTS, count, order, simulation};
-use crate::shared::joints;
+use crate::shared::{joints, stepping};
 
 /// The rover tumbling high above the ground with all joints turning.
 fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> RoverSimulation {
     let options = StepOptions {
-        variant,
-        time_step,
         gravity,
-        ..StepOptions::default()
+        ..stepping(variant, time_step)
     };
     let mut q = [0.0; 21];
     q[1] = 1000.0;

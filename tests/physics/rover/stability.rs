@@ -9,7 +9,7 @@ use rover_core::multibody::{Model, ModelDescription, coordinates};
 use rover_core::simulation::RoverSimulation;
 
 use super::scenes::{VARIANTS, at_rest, count, simulation};
-use crate::shared::{joints, stepping};
+use crate::shared::{flat, joints, largest, near_in, resting, stepping};
 
 fn dropped(
     model: Model,
@@ -63,18 +63,11 @@ fn drops_from_two_metres_land_on_the_wheels() {
     for variant in VARIANTS {
         for h in [0.001, 0.005, 0.02, 0.05] {
             let options = stepping(variant, h);
-            let landed = settle(
-                dropped(Model::rover(), options, 2.35, [0.0; 3]),
-                6.0,
-                1e-6,
-                "2 m drop",
-            );
+            let start = dropped(Model::rover(), options, 2.35, [0.0; 3]);
+            let landed = settle(start, 6.0, 1e-6, "2 m drop");
             let height = landed.q().position.y;
-            assert!(
-                (height - 0.35).abs() < 1e-6,
-                "{variant:?}, {h}: rests at {height}"
-            );
-            let fastest = landed.v().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            near_in(&(variant, h), height, 0.35, 1e-6);
+            let fastest = largest(landed.v());
             assert!(fastest < 1e-6, "{variant:?}, {h}: {fastest}");
         }
     }
@@ -86,10 +79,8 @@ fn drops_from_two_metres_land_on_the_wheels() {
 #[test]
 fn an_iterate_that_runs_away_is_reported_and_the_step_is_taken() {
     let options = stepping(Variant::Newton, 0.02);
-    let mut q = [0.0; 21];
-    q[1] = 0.35;
     let model = Model::rover().with_motors(None).unwrap();
-    let mut spun = simulation(model, Plane::ground(), options, &q, &[0.0; 21]);
+    let mut spun = resting(model, flat(), options, |q| q.position.y = 0.35);
     spun.set_steering(&[0.22, 0.44, -0.33, 0.47, 0.45, -0.58])
         .unwrap();
     let mut n_unsettled = 0;
@@ -108,17 +99,10 @@ fn upside_down_it_comes_to_rest_on_its_trunk() {
     for variant in VARIANTS {
         for h in [0.005, 0.02, 0.05] {
             let options = stepping(variant, h);
-            let landed = settle(
-                dropped(Model::rover(), options, 1.5, [PI, 0.0, 0.0]),
-                6.0,
-                1e-6,
-                "upside down",
-            );
+            let start = dropped(Model::rover(), options, 1.5, [PI, 0.0, 0.0]);
+            let landed = settle(start, 6.0, 1e-6, "upside down");
             let height = landed.q().position.y;
-            assert!(
-                (height - 0.2).abs() < 1e-3,
-                "{variant:?}, {h}: trunk at {height}"
-            );
+            near_in(&(variant, h), height, 0.2, 1e-3);
             let up = landed.q().attitude * nalgebra::Vector3::y();
             assert!(up.y < -0.999, "{variant:?}, {h}: {up:?}");
         }
@@ -137,12 +121,8 @@ fn rolling_over_and_nose_dives_stay_finite_and_lose_energy() {
             ] {
                 let options = stepping(variant, h);
                 let start = dropped(Model::rover(), options, 1.6, angles);
-                let end = settle(
-                    start,
-                    4.0,
-                    1e-6,
-                    &format!("{variant:?}, h = {h}, {angles:?}"),
-                );
+                let scene = format!("{variant:?}, h = {h}, {angles:?}");
+                let end = settle(start, 4.0, 1e-6, &scene);
                 assert!(end.q().position.y > 0.05);
             }
         }
@@ -154,12 +134,8 @@ fn a_wheel_lying_flat_carries_the_rover_without_a_jump() {
     // On its side the rover stands on the faces of three wheels (and a
     // corner of the trunk as it settles).
     let options = StepOptions::default();
-    let mut end = settle(
-        dropped(Model::rover(), options, 0.75, [PI / 2.0, 0.0, 0.0]),
-        6.0,
-        1e-6,
-        "on its side",
-    );
+    let start = dropped(Model::rover(), options, 0.75, [PI / 2.0, 0.0, 0.0]);
+    let mut end = settle(start, 6.0, 1e-6, "on its side");
     let before = end.q().position;
     end.step(1000).unwrap();
     assert!((end.q().position - before).norm() < 1e-6);
@@ -180,20 +156,11 @@ fn mass_ratios_of_a_hundred_thousand_rest() {
                 }
                 let model = Model::from_description(description).unwrap();
                 let options = stepping(variant, h);
-                let rest = settle(
-                    dropped(model, options, 0.5, [0.0; 3]),
-                    3.0,
-                    1e-6 * mass.max(1.0),
-                    part,
-                );
-                assert!(
-                    rest.v().iter().all(|v| v.abs() < 1e-6),
-                    "{part}, {variant:?}, {h}"
-                );
-                assert!(
-                    (rest.q().position.y - 0.35).abs() < 1e-6,
-                    "{part}, {variant:?}, {h}"
-                );
+                let start = dropped(model, options, 0.5, [0.0; 3]);
+                let rest = settle(start, 3.0, 1e-6 * mass.max(1.0), part);
+                let scene = (part, variant, h);
+                assert!(largest(rest.v()) < 1e-6, "{scene:?}");
+                near_in(&scene, rest.q().position.y, 0.35, 1e-6);
             }
         }
     }
@@ -214,15 +181,12 @@ fn turning_through_a_full_circle_is_smooth() {
         let (mut last, mut rate) = (heading(&simulation), simulation.v()[4]);
         let mut steps = 0;
         while turned.abs() < 2.0 * PI {
-            simulation
-                .set_wheel_torques(
-                    &[if simulation.v()[4].abs() > 0.6 {
-                        0.0
-                    } else {
-                        8.0
-                    }; 6],
-                )
-                .unwrap();
+            let torque = if simulation.v()[4].abs() > 0.6 {
+                0.0
+            } else {
+                8.0
+            };
+            simulation.set_wheel_torques(&[torque; 6]).unwrap();
             assert!(simulation.step(10).unwrap().is_converged());
             let now = heading(&simulation);
             turned += (now - last + PI).rem_euclid(2.0 * PI) - PI;
@@ -242,16 +206,13 @@ fn turning_through_a_full_circle_is_smooth() {
 fn no_gain_and_no_step_make_a_held_joint_unstable() {
     for (stiffness, damping) in [(1e2, 0.0), (1e9, 0.0), (0.0, 1e9), (1e9, 1e9), (1e12, 1e6)] {
         for h in [0.001, 0.05] {
-            let mut simulation = at_rest(StepOptions {
-                time_step: h,
-                ..StepOptions::default()
-            });
+            let mut simulation = at_rest(stepping(Variant::default(), h));
             let joints = joints(&simulation);
             simulation
                 .hold(&joints, Some(&[0.05; 15]), Some(stiffness), Some(damping))
                 .unwrap();
             simulation.step(200).unwrap();
-            let fastest = simulation.v().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            let fastest = largest(simulation.v());
             assert!(
                 fastest < 200.0,
                 "K_p {stiffness}, K_d {damping}, h {h}: {fastest} rad/s"

@@ -1,31 +1,25 @@
 //! Rotating the whole scene about gravity rotates the answer; a mirror image moves as a mirror
 //! image.
 
+use std::sync::Arc;
+
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Model};
+use rover_core::multibody::Model;
 use rover_core::simulation::RoverSimulation;
 
-use super::scenes::simulation;
+use crate::shared::resting;
 
 fn driving(heading: f64, steering: f64) -> RoverSimulation {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);
     let n = turn * Vector3::new(-0.1, 1.0, 0.0);
     let plane = Plane::new(n.into(), 0.0).unwrap();
-    let mut simulation = simulation(
-        Model::rover(),
-        plane,
-        StepOptions::default(),
-        &[0.0; 21],
-        &[0.0; 21],
-    );
-    let start = Configuration {
-        position: turn * Vector3::new(0.0, 0.5, 0.0),
-        attitude: turn,
-        ..Configuration::zero(simulation.model())
-    };
-    simulation.set_state(start, vec![0.0; 21]);
+    let options = StepOptions::default();
+    let mut simulation = resting(Model::rover(), Arc::new(plane), options, |q| {
+        q.position = turn * Vector3::new(0.0, 0.5, 0.0);
+        q.attitude = turn;
+    });
     simulation
         .set_steering(&[steering, steering, 0.0, -steering, 0.0, -steering])
         .unwrap();
