@@ -56,7 +56,7 @@ fn machine(
 ) -> RoverSimulation {
     let model = Model::from_description(description).unwrap();
     resting(model, terrain, options.clone(), |q| {
-        q.position = place.into()
+        q.position = place.into();
     })
 }
 

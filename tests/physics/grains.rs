@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use rover_core::integrator::StepReport;
 use rover_core::nalgebra::{SVector, Vector3};
 use rover_core::planar::PlanarBall;
 use rover_core::problem::{BodyPairs, FrictionContactProblem};
@@ -48,14 +47,6 @@ fn coordinates<const D: usize>(centres: &[SVector<f64, D>]) -> Vec<f64> {
     padded.copied().collect()
 }
 
-/// Takes steps, each of which is finite.
-fn step<const D: usize>(heap: &mut GrainSimulation<D>, n: usize) -> StepReport
-where
-    BodyPairs<D>: Swept<D>,
-{
-    heap.step(n).expect("finite steps")
-}
-
 /// Gives a bed other velocities.
 fn set_v<const D: usize>(heap: &mut GrainSimulation<D>, change: impl FnOnce(&mut [f64]))
 where
@@ -81,10 +72,8 @@ fn impulse<const D: usize>(contact: &GrainContact<D>, local: [f64; D]) -> SVecto
 
 /// Impulse of the last step's contacts with walls on the grains, N s.
 fn impulse_of_walls(heap: &GrainSimulation<3>) -> Vector3<f64> {
-    let with_walls = heap
-        .contacts()
-        .iter()
-        .filter(|a| !a.contact.is_with_grain());
+    let all = heap.contacts().iter();
+    let with_walls = all.filter(|a| !a.contact.is_with_grain());
     with_walls.map(|a| impulse(&a.contact, a.impulse)).sum()
 }
 
@@ -103,7 +92,7 @@ where
     let ahead =
         (axis::<D>(0) * 3.0 + axis::<D>(D - 1) * if D == 3 { 4.0 } else { 0.0 }).normalize();
     set_v(&mut heap, |v| v[..D].copy_from_slice(ahead.as_slice()));
-    step(&mut heap, 200);
+    heap.step(200).unwrap();
     let off = (SVector::<f64, D>::from_column_slice(&heap.v()[..D]) - ahead * expected).norm();
     assert!(off < 1e-9, "{off} m/s in {D} dimensions");
     // v = r ω.
@@ -131,7 +120,7 @@ where
     let normal = axis::<D>(0) * alpha.sin() + axis::<D>(1) * alpha.cos();
     let wall = Wall::new(SVector::zeros(), normal).expect("a slope");
     let mut heap = on_a_wall(wall, &[normal * 0.1], mu);
-    step(&mut heap, 500);
+    heap.step(500).unwrap();
     // Rolls with g sin α/(1 + κ) where tan α ≤ (1 + 1/κ) μ, slides with g
     // (sin α − μ cos α) where not.
     let kappa = kappa::<D>();
@@ -186,7 +175,7 @@ where
     let (centres, sine) = small_pyramid::<D>(1.1);
     let needed = (0.5 * sine.asin()).tan();
     let mut stands = on_a_floor(&centres, 1.05 * needed);
-    assert!(step(&mut stands, 100).is_converged());
+    assert!(stands.step(100).unwrap().is_converged());
     let weight = MASS * G;
     let h = stands.options().time_step;
     let mut seen = [0, 0];
@@ -207,7 +196,7 @@ where
     assert_eq!(seen, [D, D]);
     assert!((centre(&stands, D) - centres[D]).norm() < 1e-7);
     let mut slips = on_a_floor(&centres, 0.95 * needed);
-    step(&mut slips, 100);
+    slips.step(100).unwrap();
     assert!(centre(&slips, D)[1] < centres[D][1] - 1e-4, "{D}: it sinks");
 }
 
@@ -240,7 +229,7 @@ fn a_pyramid_of_balls_stands_on_glued_ones_which_carry_its_weight() {
     let scene = between(vec![], grains, rough(0.5));
     let options = exact(&scene, TOLERANCE);
     let mut heap = awake(scene, options, &coordinates(&centres));
-    assert!(step(&mut heap, 200).is_converged());
+    assert!(heap.step(200).unwrap().is_converged());
     let on_glued = heap.contacts().iter();
     let on_glued = on_glued.filter(|a| a.contact.key.a < 6 && a.contact.key.b >= 6);
     let pressed: Vector3<f64> = on_glued.map(|a| impulse(&a.contact, a.impulse)).sum();
@@ -291,9 +280,9 @@ fn falling() -> GrainSimulation<3> {
         if heap.parts().pairs().round.len() >= 1200 {
             break;
         }
-        step(&mut heap, 1);
+        heap.step(1).unwrap();
     }
-    step(&mut heap, 5);
+    heap.step(5).unwrap();
     heap
 }
 
@@ -318,7 +307,7 @@ fn contacts_that_rest_between_sweeps_obey_the_law_within_the_tolerance() {
     let mut heap = falling();
     for _ in 0..20 {
         let before = heap.energy().total();
-        assert!(step(&mut heap, 1).is_converged());
+        assert!(heap.step(1).unwrap().is_converged());
         let pairs = heap.parts().pairs();
         let p: Vec<f64> = heap.contacts().iter().flat_map(|a| a.impulse).collect();
         let mut y = vec![0.0; pairs.n_coordinates];
@@ -354,7 +343,7 @@ fn balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows() {
     let (mut momentum, _) = heap.momentum();
     let mut converged = 0;
     for k in 0..900 {
-        converged += usize::from(step(&mut heap, 1).is_converged());
+        converged += usize::from(heap.step(1).unwrap().is_converged());
         let now = heap.energy().total();
         assert!(now <= energy + 1e-13 * scale, "step {k}: {}", now - energy);
         energy = now;
@@ -393,7 +382,7 @@ fn balls_that_collide_in_free_space_keep_their_momentum() {
     let before = heap.momentum();
     let mut contacts = 0;
     for _ in 0..100 {
-        contacts += step(&mut heap, 1).n_contacts;
+        contacts += heap.step(1).unwrap().n_contacts;
     }
     assert!(contacts > 500, "they did meet: {contacts}");
     let after = heap.momentum();
@@ -410,12 +399,12 @@ fn sweeps_and_a_factorisation_give_balls_the_same_velocities() {
         solve_to(&mut options, 1e-10, 1e-9, 100_000);
         // Into the middle of the bed.
         let mut heap = awake(scene.clone(), options.clone(), &q);
-        step(&mut heap, 80);
+        heap.step(80).unwrap();
         let (q, v) = (heap.q(), heap.v());
         options.solver.method = method;
         let mut heap = awake(scene, options, q);
         set_v(&mut heap, |own| own.copy_from_slice(v));
-        let report = step(&mut heap, 1);
+        let report = heap.step(1).unwrap();
         assert!(
             report.is_converged() && report.n_contacts > 40,
             "{report:?}"
@@ -433,14 +422,18 @@ fn balls_that_rest_fall_asleep_and_wake_when_one_is_struck() {
     let (scene, options) = (heap.description().clone(), heap.options().clone());
     let sleep = Some(SleepOptions::default());
     let mut heap = GrainSimulation::new(scene, options, sleep, heap.q().clone()).expect("a bed");
-    step(&mut heap, 100);
+    heap.step(100).unwrap();
     assert!(heap.asleep().iter().all(|sleeps| *sleeps));
-    assert_eq!(step(&mut heap, 1).n_contacts, 0, "nothing is left to solve");
+    assert_eq!(
+        heap.step(1).unwrap().n_contacts,
+        0,
+        "nothing is left to solve"
+    );
     // An impact on one of the three keeps all awake that are near.
     set_v(&mut heap, |v| v[0] = 0.5);
-    step(&mut heap, 1);
+    heap.step(1).unwrap();
     assert!(heap.asleep().iter().all(|sleeps| !sleeps));
-    let report = step(&mut heap, 1);
+    let report = heap.step(1).unwrap();
     assert!(report.n_contacts >= 3, "{report:?}");
 }
 
@@ -460,7 +453,7 @@ where
     let struck = |mut heap: GrainSimulation<D>, at: usize| {
         let turn = heap.v().len() - 1;
         set_v(&mut heap, |v| (v[at], v[turn]) = (0.3, 2.0));
-        assert!(step(&mut heap, 300).is_converged());
+        assert!(heap.step(300).unwrap().is_converged());
         [0, 1, D, at, at + 1, turn].map(|k| heap.v()[k])
     };
     let at = 2 * body_velocities(D);
@@ -497,7 +490,7 @@ fn a_ball_that_is_thrown_within_a_step_does_not_end_inside_another() {
         let centres = [0.0, 0.2, 0.4 + way].map(|x| Vector3::new(x, 1.0, 0.0));
         let mut heap = awake(scene, options, &coordinates(&centres));
         set_v(&mut heap, |v| v[0] = speed);
-        let report = step(&mut heap, 1);
+        let report = heap.step(1).unwrap();
         let overlap = heap.penetration();
         assert!(overlap < 1e-3 * RADIUS, "{share}: {overlap} {report:?}");
         assert!(report.retaken > 0, "{share}");

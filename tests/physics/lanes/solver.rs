@@ -183,7 +183,7 @@ fn drive(largest: f64, steps: usize) -> Vec<ContactProblem> {
 fn drive_of(model: Model, height: f64, largest: f64, steps: usize) -> Vec<ContactProblem> {
     let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
     let mut simulation = resting(model, flat(), StepOptions::default(), |q| {
-        q.position.y = height
+        q.position.y = height;
     });
     simulation.step(100).expect("steps at rest");
     let mut problems = Vec::new();

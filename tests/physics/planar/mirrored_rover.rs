@@ -99,7 +99,8 @@ fn largest_distance(
     let plane = Arc::new(Plane::new(normal.into(), 0.0).unwrap());
     let mut full = moving(model, plane, options.clone(), start, v);
     let line = Line::new(slope, 0.0).unwrap();
-    let mut reduced = at_rest(line, planar, options.clone(), q.into());
+    let start: [f64; 7] = q.into();
+    let mut reduced = at_rest(line, planar, options.clone(), start);
     let (mut largest, mut way) = (0.0_f64, 0.0_f64);
     for _ in 0..200 {
         let torque = torques(full.time());

@@ -12,7 +12,7 @@ fn cart() -> Model {
         format!(
             r#"
 [[solids]]
-name = "{name}"
+name = "wheel {name}"
 parent = "frame"
 position = {place:?}
 axis = {axis:?}
@@ -20,7 +20,7 @@ mass = 2.0
 shape = {{ kind = "disc", radius = 0.2 }}
 [[wheels]]
 name = "{name}"
-solid = "{name}"
+solid = "wheel {name}"
 axle = [0.0, 0.0, 1.0]
 radius = 0.2
 torque_limit = 5.0
@@ -48,7 +48,7 @@ fn a_cart_with_three_wheels_and_a_tilted_joint_drives() {
     let model = cart();
     assert_eq!(model.nv(), 9);
     let mut simulation = resting(model, flat(), StepOptions::default(), |q| {
-        q.position.y = 0.31
+        q.position.y = 0.31;
     });
     // beyond its limit of 5 N m the motor saturates
     simulation.set_wheel_torques(&[2.0, 2.0, 50.0]).unwrap();
