@@ -176,16 +176,20 @@ pub fn near_in(scene: &dyn Debug, found: f64, expected: f64, tolerance: f64) {
     );
 }
 
-/// Largest difference of two lists of numbers.
+/// Largest difference of two lists of numbers; not a number if one of them has such.
 pub fn apart(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
-    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    differences.fold(0.0, f64::max)
+    greatest(a.iter().zip(b).map(|(a, b)| (a - b).abs()))
 }
 
-/// Largest magnitude of a list of numbers.
+/// Largest magnitude of a list of numbers; not a number if the list has such.
 pub fn largest(numbers: &[f64]) -> f64 {
-    numbers.iter().fold(0.0, |most, x| most.max(x.abs()))
+    greatest(numbers.iter().map(|x| x.abs()))
+}
+
+fn greatest(sizes: impl Iterator<Item = f64>) -> f64 {
+    let larger = |most: f64, x: f64| if x.is_nan() || x > most { x } else { most };
+    sizes.fold(0.0, larger)
 }
 
 /// The number below which this share of a list lies, per cent.

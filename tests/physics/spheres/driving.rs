@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 use rover_core::geometry::SphereField;
-use rover_core::integrator::StepOptions;
+use rover_core::integrator::Variant;
 use rover_core::multibody::Model;
 
 use super::sphere_scenes::{deepest, placed, rocks};
+use crate::shared::stepping;
 
 #[allow(clippy::print_stderr)] // figures that are reported beside what is asserted
 fn report(line: &str) {
@@ -16,10 +17,7 @@ fn report(line: &str) {
 fn penetration_stays_below_a_millimetre_at_one_millisecond() {
     for seed in [1, 2, 3] {
         let field = SphereField::rocks(&rocks(seed)).unwrap();
-        let options = StepOptions {
-            time_step: 0.001,
-            ..StepOptions::default()
-        };
+        let options = stepping(Variant::default(), 0.001);
         let mut rover = placed(Model::rover(), field, options, Vector3::new(-4.0, 0.6, 0.0));
         rover.step(800).unwrap();
         let (mut worst, mut unsolved, mut fastest, mut iterations) = (0.0_f64, 0, 0.0_f64, 0);

@@ -316,10 +316,7 @@ fn a_rover_stands_on_a_map_below_a_bridge() {
         .map(|x| [x.x, 3.0, x.z])
         .collect();
     let bridge = TriangleMesh::new(&bridge, &[[0, 2, 1], [0, 3, 2]]).unwrap();
-    let mut sim = rover_on(
-        union(vec![Arc::new(tile(-5.0, 5.0)), Arc::new(bridge)]),
-        0.36,
-    );
+    let mut sim = rover_on(two(tile(-5.0, 5.0), bridge), 0.36);
     sim.step(100).unwrap();
     assert!(sim.contacts().len() >= 6);
 }
