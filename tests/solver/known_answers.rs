@@ -705,16 +705,16 @@ fn the_report_names_the_stage_that_answered_and_those_before_it() {
         rungs.iter().map(|rung| (rung.stage, rung.status)).collect()
     };
     let problem = parked_rover();
-    let (mut p, _, cold) = solved(&problem);
+    let (mut p, _, first) = solved(&problem);
     // At rest some mode is ambiguous, which the guess leaves to Newton.
     assert_eq!(
-        stages(&cold),
+        stages(&first),
         [
             (Stage::GuidedNewton, SolveStatus::Stalled),
             (Stage::Newton, SolveStatus::Converged)
         ]
     );
-    assert_eq!(cold.stage, Stage::Newton);
+    assert_eq!(first.stage, Stage::Newton);
     let (_, warm) = solve_with(&problem, &SolverOptions::default(), &mut p);
     assert_eq!(stages(&warm), [(Stage::Pivoting, SolveStatus::Converged)]);
     let column = pile(&[1.0; 12], 0.9).problem(&falling(12, 9.81e-3));

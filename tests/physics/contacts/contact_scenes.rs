@@ -88,7 +88,7 @@ pub fn tips() -> Vec<(&'static str, f64)> {
 }
 
 /// Contacts between a machine's bodies with a gap of at most 20 cm.
-pub fn near(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
+pub fn nearby(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
     let activation = Activation {
         lead: 0.0,
         hover: 0.2,

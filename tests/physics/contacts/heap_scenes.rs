@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use rover_core::geometry::Terrain;
+use rover_core::integrator::Variant;
 use rover_core::multibody::Configuration;
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
@@ -33,7 +34,7 @@ pub fn heap(
         }
     }
     let v = vec![0.0; model.nv()];
-    moving(model, ground, stepping(Variant::Linearised, 2e-3), q, v)
+    moving(model, ground, stepping(Variant::default(), 2e-3), q, v)
 }
 
 /// `side³` boxes of about 0.2 m and 6 to 10 kg, turned anyhow, on a grid that leaves some

@@ -1,12 +1,11 @@
 //! Free bodies: colliding balls, stacked and pushed stones, colliding machines.
 
 use rover_core::contact::{ContactKey, Part, generalized_impulse};
-use rover_core::geometry::Terrain;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Configuration, JointKind, Kinematics, Model, ModelDescription};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 
-use super::contact_scenes::{near, overlap};
+use super::contact_scenes::{nearby, overlap};
 use crate::shared::{VARIANTS, flat, largest, model, moving, nothing, step_without_gain, stepping};
 
 const BALL: &str = "shape = { kind = \"sphere\", radius = 0.1 }";
@@ -79,7 +78,7 @@ fn an_impulse_between_two_bodies_is_no_force_and_no_couple_on_both_together() {
         ];
         let q = at(&model, &places);
         let kinematics = Kinematics::of(&model, &q);
-        let contacts = near(&model, &kinematics);
+        let contacts = nearby(&model, &kinematics);
         assert!(!contacts.is_empty(), "{shapes:?}");
         for contact in contacts {
             // A nonzero gap, and friction across it.

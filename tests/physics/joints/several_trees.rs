@@ -105,7 +105,7 @@ fn a_machine_without_any_velocity_is_a_machine() {
     );
     assert_eq!(run.model().nv(), 0);
     run.step(3).unwrap();
-    assert_eq!(run.q(), Configuration::zero(run.model()));
+    assert_eq!(*run.q(), Configuration::zero(run.model()));
 }
 
 /// Boxes with arms between stops, pushed by constant torques, fell in a heap. An audit from outside

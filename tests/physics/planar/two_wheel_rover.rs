@@ -140,16 +140,16 @@ fn the_normal_row_is_the_gaps_gradient_and_the_tangential_one_the_rims_velocity(
             let disc = tree.disc(i, &poses);
             let mut facing = Vec::new();
             sine.facing(&disc.centre, 5.0, &mut facing);
-            let near = facing
+            let foot = facing
                 .iter()
                 .min_by(|a, b| a.distance.total_cmp(&b.distance))
                 .unwrap();
             let (point, t) = (
-                disc.centre - near.n * disc.radius,
-                Vector2::new(near.n.y, -near.n.x),
+                disc.centre - foot.n * disc.radius,
+                Vector2::new(foot.n.y, -foot.n.x),
             );
             let mut rows = Vec::new();
-            tree.push_rows(i, &poses, &point, &[near.n, t], &mut rows);
+            tree.push_rows(i, &poses, &point, &[foot.n, t], &mut rows);
             let [normal, tangential] = [0, 5].map(|k| Q::from_column_slice(&rows[k..k + 5]));
             let rate = (after[i] - before[i]) / (2.0 * step);
             near(normal.dot(&v), rate, 1e-6);
