@@ -6,7 +6,9 @@ use rover_core::multibody::{Configuration, JointKind, Kinematics, Model, ModelDe
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 
 use super::contact_scenes::{nearby, overlap};
-use crate::shared::{VARIANTS, flat, largest, model, moving, nothing, step_without_gain, stepping};
+use crate::shared::{
+    VARIANTS, flat, largest, model, moving, near, nothing, step_without_gain, stepping,
+};
 
 const BALL: &str = "shape = { kind = \"sphere\", radius = 0.1 }";
 const BLOCK: &str = "shape = { kind = \"box\", size = [0.4, 0.2, 0.3] }";
