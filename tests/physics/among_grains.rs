@@ -13,12 +13,12 @@ use rover_core::simulation::{
     GrainSimulation, RoverInGrains, RoverSimulation, Scene as _, TogetherError, grain_options,
 };
 use rover_core::solver::SolverOptions;
-use rover_core::system::grains::{
-    COORDINATES, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
-};
+use rover_core::system::grains::{COORDINATES, GrainFriction, Grains, Packing, SleepOptions, Wall};
 use rover_core::system::{CompositeContact, CompositeScratch, TreeAmongGrains};
 
+use super::grain_scenes::{awake, between};
 use super::rover_kinds::{dry, mecanum, with_a_bar};
+use crate::shared::{apart, flat, resting};
 
 /// μ of the rover's parts on grains.
 const ON_GRAINS: f64 = 0.7;
@@ -54,13 +54,10 @@ fn machine(
     place: [f64; 3],
     options: &StepOptions,
 ) -> RoverSimulation {
-    let model = Arc::new(Model::from_description(description).unwrap());
-    let mut rover = RoverSimulation::new(model, terrain, options.clone()).unwrap();
-    let nv = rover.model().nv();
-    let mut configuration = rover.q().clone();
-    configuration.position = Vector3::from(place);
-    rover.set_state(configuration, vec![0.0; nv]);
-    rover
+    let model = Model::from_description(description).unwrap();
+    resting(model, terrain, options.clone(), |q| {
+        q.position = place.into();
+    })
 }
 
 /// The report's rover with a thing that the step has to know of, and its name.
@@ -134,15 +131,10 @@ fn balls_with(
 ) -> GrainSimulation<3> {
     let n = centres.len();
     let grains = Grains::new(vec![radius; n], vec![mass; n]).unwrap();
-    let scene = GrainScene {
-        grains: grains.with_kinematic(vec![kinematic; n]).unwrap(),
-        walls: Vec::new(),
-        ground: None,
-        machine: None,
-        friction,
-    };
+    let grains = grains.with_kinematic(vec![kinematic; n]).unwrap();
+    let scene = between(Vec::new(), grains, friction);
     let q = centres.concat();
-    GrainSimulation::new(Arc::new(scene), options.clone(), None, q).unwrap()
+    awake(scene, options.clone(), &q)
 }
 
 #[test]
@@ -226,13 +218,7 @@ fn bed(options: &StepOptions, sleep: Option<SleepOptions>) -> GrainSimulation<3>
         wall([0.0, 0.0, -0.9], [0.0, 0.0, 1.0]),
         wall([0.0, 0.0, 0.9], [0.0, 0.0, -1.0]),
     ];
-    let scene = GrainScene {
-        grains,
-        walls,
-        ground: None,
-        machine: None,
-        friction: GrainFriction::default(),
-    };
+    let scene = between(walls, grains, GrainFriction::default());
     let mut bed = GrainSimulation::new(Arc::new(scene), options.clone(), sleep, q).unwrap();
     bed.step(200).unwrap();
     bed
@@ -264,11 +250,8 @@ fn a_rover_on_a_bed_is_borne_by_it() {
     let missing = impulse - borne - change;
     assert!(missing.abs() < 1e-3 * borne, "{impulse} {borne} {change}");
     assert!((impulse / borne - 1.0).abs() < 0.2, "{impulse} {borne}");
-    assert!(
-        scene.bed.penetration() < 0.01 * 0.04,
-        "{}",
-        scene.bed.penetration()
-    );
+    let depth = scene.bed.penetration();
+    assert!(depth < 0.01 * 0.04, "{depth}");
     let down = scene.rover.q().position.y;
     assert!(down > 0.1 && down < top + 0.36, "{down}");
 }
@@ -368,8 +351,7 @@ fn the_assembled_operator_is_that_of_the_impulses() {
 
 fn is_that_of_the_impulses(own: &ModelDescription, touch_it: bool) {
     let options = options(9.81, 1e-3, 1e-9);
-    let ground = || -> Arc<dyn Terrain> { Arc::new(Plane::new([0.0, 1.0, 0.0], 0.0).unwrap()) };
-    let placed = |y: f64| machine(own.clone(), ground(), [0.0, y, 0.0], &options);
+    let placed = |y: f64| machine(own.clone(), flat(), [0.0, y, 0.0], &options);
     // Its wheels rest on the ground, and one of them by a ball, which another one lies on.
     let centre = |rover: &RoverSimulation| {
         let (model, kinematics) = (rover.model(), rover.kinematics());
@@ -435,7 +417,6 @@ fn is_that_of_the_impulses(own: &ModelDescription, touch_it: bool) {
     let (zero, mu, mut found) = (vec![0.0; n], vec![0.5; contacts.len()], vec![0.0; n]);
     let problem = system.problem(&zero, &mu);
     problem.operator().multiply_add(&p, &zero, &mut found);
-    for (a, b) in expected.iter().zip(&found) {
-        assert!((a - b).abs() < 1e-12, "{a} {b}");
-    }
+    let off = apart(&expected, &found);
+    assert!(off < 1e-12, "{off:e}");
 }

@@ -2,7 +2,7 @@
 //! pushed, machines that meet.
 #![allow(clippy::unwrap_used)]
 
-mod contact_scenes;
+pub mod contact_scenes;
 pub mod heap_scenes;
 
 mod derivatives;

@@ -39,19 +39,6 @@ fn on_every_register(work: &mut impl OverLanes) {
     }
 }
 
-/// Repeatable numbers in [−1, 1).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 * 2.0_f64.powi(-52) - 1.0
-    }
-}
-
 /// The numbers of several rovers, one rover a lane.
 fn spread<T: Lane, R>(token: T::Token, rovers: &[R], of: impl Fn(&R) -> Vec<f64>) -> Vec<T> {
     let mut out = vec![T::splat(token, 0.0); of(&rovers[0]).len()];

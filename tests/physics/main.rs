@@ -2,13 +2,11 @@
 //!
 //! One program, so that the core is linked once.
 
-use rover_core::integrator::{StepOptions, Variant};
-use rover_core::simulation::RoverSimulation;
-
 mod among_grains;
 mod colliders;
 mod contacts;
 mod exploring_scenes;
+mod grain_scenes;
 mod grains;
 mod joints;
 mod lanes;
@@ -19,22 +17,8 @@ mod rover;
 mod rover_kinds;
 mod sand;
 mod shapes;
+mod shared;
 mod spheres;
 mod surfaces;
 mod vessels;
 mod wheels;
-
-/// Default options with a variant and a time step, s.
-fn stepping(variant: Variant, time_step: f64) -> StepOptions {
-    StepOptions {
-        variant,
-        time_step,
-        ..StepOptions::default()
-    }
-}
-
-/// Names of all joints of a rover but its base.
-fn joints(rover: &RoverSimulation) -> Vec<String> {
-    let bodies = rover.model().bodies();
-    bodies[1..].iter().map(|body| body.name.clone()).collect()
-}

@@ -4,41 +4,47 @@
 use std::sync::Arc;
 
 use rover_core::geometry::Drum;
-use rover_core::integrator::StepOptions;
 use rover_core::law::rolling::RollingFriction;
 use rover_core::nalgebra::{SVector, Vector3};
 use rover_core::problem::BodyPairs;
 use rover_core::simulation::{GrainSimulation, grain_options};
 use rover_core::solver::Swept;
 use rover_core::spatial::space::body_velocities;
-use rover_core::system::grains::{Cohesion, GrainFriction, GrainScene, Grains, Packing, Wall};
+use rover_core::system::grains::{Cohesion, GrainFriction, GrainScene, Packing, Wall};
 
-const G: f64 = 9.81;
-const RADIUS: f64 = 0.1;
-const MASS: f64 = 2.0;
+use super::grain_scenes::{G, RADIUS, alike, awake, between, exact, rough};
+use super::shared::{apart, bits, largest, near};
 
 fn scene<const D: usize>(n: usize, rolling: f64, drilling: f64) -> GrainScene<D> {
-    GrainScene {
-        grains: Grains::new(vec![RADIUS; n], vec![MASS; n]).expect("grains"),
-        walls: vec![Wall::floor(0.0)],
-        ground: None,
-        machine: None,
-        friction: GrainFriction {
-            grains: 0.9,
-            walls: 0.9,
-            wheels: 0.9,
-            rolling: RollingFriction { rolling, drilling },
-        },
-    }
+    let rolling = RollingFriction { rolling, drilling };
+    let friction = GrainFriction {
+        rolling,
+        ..rough(0.9)
+    };
+    between(vec![Wall::floor(0.0)], alike(n), friction)
 }
 
-fn exact<const D: usize>(scene: &GrainScene<D>) -> StepOptions {
-    let mut options = grain_options(&scene.grains);
-    options.solver.tolerance = 1e-10;
-    options.solver.velocity_tolerance = 1e-10;
-    options.solver.max_sweeps = 20_000;
-    options
+/// Tolerance of the steps.
+const TOLERANCE: f64 = 1e-10;
+
+/// A bed in a state, every step of which is solved well.
+fn moving<const D: usize>(
+    scene: GrainScene<D>,
+    gravity: Vector3<f64>,
+    q: &[f64],
+    v: &[f64],
+) -> GrainSimulation<D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    let mut options = exact(&scene, TOLERANCE);
+    options.gravity = gravity;
+    let mut run = awake(scene, options, q);
+    run.set_state(q, v).expect("a state");
+    run
 }
+
+const DOWN: Vector3<f64> = Vector3::new(0.0, -G, 0.0);
 
 /// One grain on the floor with gravity tilted by `angle` towards +x, at the speed `speed` along x,
 /// and rolling without slip.
@@ -46,16 +52,11 @@ fn one<const D: usize>(rolling: f64, angle: f64, speed: f64) -> GrainSimulation<
 where
     BodyPairs<D>: Swept<D>,
 {
-    let scene = scene::<D>(1, rolling, 0.0);
-    let mut options = exact(&scene);
-    options.gravity = G * Vector3::new(angle.sin(), -angle.cos(), 0.0);
-    let q = [0.0, RADIUS, 0.0].to_vec();
-    let mut run = GrainSimulation::new(Arc::new(scene), options, None, q.clone()).expect("a bed");
+    let gravity = G * Vector3::new(angle.sin(), -angle.cos(), 0.0);
     let mut v = vec![0.0; body_velocities(D)];
     v[0] = speed;
     v[body_velocities(D) - 1] = -speed / RADIUS;
-    run.set_state(&q, &v).expect("a state");
-    run
+    moving(scene(1, rolling, 0.0), gravity, &[0.0, RADIUS, 0.0], &v)
 }
 
 /// Moment of inertia over m r².
@@ -76,11 +77,11 @@ where
     let n = 500;
     assert!(run.step(n).expect("finite").is_converged());
     let expected = speed - braking * h * n as f64;
-    assert!((run.v()[0] - expected).abs() < 1e-9, "{} m/s", run.v()[0]);
+    near(run.v()[0], expected, 1e-9);
     let spin = run.v()[body_velocities(D) - 1];
     assert!((spin + expected / RADIUS).abs() < 1e-8, "without slip");
     run.step(1000).expect("finite");
-    assert!(run.v().iter().all(|v| v.abs() < 1e-12), "{:?}", run.v());
+    assert!(largest(run.v()) < 1e-12, "{:?}", run.v());
 }
 
 #[test]
@@ -103,7 +104,7 @@ where
         let time = run.options().time_step * n as f64;
         let pull = (angle.sin() - rolling * angle.cos()).max(0.0);
         let expected = G * pull / (1.0 + inertia::<D>()) * time;
-        assert!((run.v()[0] - expected).abs() < 1e-8, "{} m/s", run.v()[0]);
+        near(run.v()[0], expected, 1e-8);
     }
 }
 
@@ -118,37 +119,26 @@ fn a_ball_and_a_disk_rest_on_a_slope_up_to_the_angle_of_rolling_friction() {
 fn a_ball_rolls_on_over_a_smooth_floor() {
     let mut scene = scene::<3>(1, 0.3, 0.3);
     scene.friction.walls = 0.0;
-    let options = exact(&scene);
-    let q = vec![0.0, RADIUS, 0.0];
-    let mut run = GrainSimulation::new(Arc::new(scene), options, None, q.clone()).expect("a bed");
     let v = [0.2, 0.0, 0.0, 0.0, 1.0, -2.0];
-    run.set_state(&q, &v).expect("a state");
+    let mut run = moving(scene, DOWN, &[0.0, RADIUS, 0.0], &v);
     run.step(100).expect("finite");
-    assert!(
-        run.v().iter().zip(v).all(|(a, b)| (a - b).abs() < 1e-9),
-        "{:?}",
-        run.v()
-    );
+    assert!(apart(run.v(), &v) < 1e-9, "{:?}", run.v());
 }
 
 /// A ball that spins about the vertical: `dω/dt = −μ_d r m g/J = −5/2 μ_d g/r`.
 #[test]
 fn a_spinning_ball_stops() {
     let drilling = 0.02;
-    let scene = scene::<3>(1, 0.0, drilling);
-    let options = exact(&scene);
-    let q = vec![0.0, RADIUS, 0.0];
-    let mut run = GrainSimulation::new(Arc::new(scene), options, None, q.clone()).expect("a bed");
-    let spin = 3.0;
-    run.set_state(&q, &[0.0, 0.0, 0.0, 0.0, spin, 0.0])
-        .expect("a state");
+    let (scene, spin) = (scene::<3>(1, 0.0, drilling), 3.0);
+    let v = [0.0, 0.0, 0.0, 0.0, spin, 0.0];
+    let mut run = moving(scene, DOWN, &[0.0, RADIUS, 0.0], &v);
     let n = 400;
     run.step(n).expect("finite");
     let time = run.options().time_step * n as f64;
     let expected = spin - 2.5 * drilling * G / RADIUS * time;
-    assert!((run.v()[4] - expected).abs() < 1e-8, "{} rad/s", run.v()[4]);
+    near(run.v()[4], expected, 1e-8);
     run.step(400).expect("finite");
-    assert!(run.v().iter().all(|v| v.abs() < 1e-12), "{:?}", run.v());
+    assert!(largest(run.v()) < 1e-12, "{:?}", run.v());
 }
 
 /// Two balls that attract each other by F in free space, one of them spinning about the line of
@@ -162,24 +152,17 @@ fn two_balls_share_their_spin_and_keep_the_momentum() {
     scene.grains = scene.grains.with_cohesion(attraction);
     scene.walls.clear();
     let inertia = scene.grains.inertia(0);
-    let mut options = exact(&scene);
-    options.gravity = Vector3::zeros();
-    let q = vec![0.0, 0.0, 0.0, 2.0 * RADIUS, 0.0, 0.0];
-    let mut run = GrainSimulation::new(Arc::new(scene), options, None, q.clone()).expect("a bed");
+    let q = [0.0, 0.0, 0.0, 2.0 * RADIUS, 0.0, 0.0];
     let mut v = vec![0.0; 12];
     v[3] = 2.0;
-    run.set_state(&q, &v).expect("a state");
+    let mut run = moving(scene, Vector3::zeros(), &q, &v);
     let before = run.momentum();
     let n = 100;
     run.step(n).expect("finite");
     let time = run.options().time_step * n as f64;
     let rate = drilling * 0.5 * RADIUS * force / inertia;
-    assert!(
-        (run.v()[3] - (2.0 - rate * time)).abs() < 1e-8,
-        "{:?}",
-        run.v()
-    );
-    assert!((run.v()[9] - rate * time).abs() < 1e-8, "{:?}", run.v());
+    near(run.v()[3], 2.0 - rate * time, 1e-8);
+    near(run.v()[9], rate * time, 1e-8);
     // Now one that rolls on the other, too.
     v[5] = 5.0;
     run.set_state(&q, &v).expect("a state");
@@ -209,16 +192,10 @@ fn a_ball_held_by_a_turning_drum_turns_with_it() {
     scene.friction.walls = 50.0;
     let drum = Drum::new(Vector3::zeros(), 1.0, 2.0, rate).expect("a drum");
     scene.ground = Some(Arc::new(drum));
-    let options = exact(&scene);
-    let q = vec![0.0, RADIUS - 1.0, 0.0];
-    let mut run = GrainSimulation::new(Arc::new(scene), options, None, q).expect("a bed");
+    let mut run = moving(scene, DOWN, &[0.0, RADIUS - 1.0, 0.0], &[0.0; 6]);
     run.step(50).expect("finite");
-    assert!((run.v()[5] - rate).abs() < 1e-6, "{:?}", run.v());
-    assert!(
-        (run.v()[0] - rate * (1.0 - RADIUS)).abs() < 1e-3,
-        "{:?}",
-        run.v()
-    );
+    near(run.v()[5], rate, 1e-6);
+    near(run.v()[0], rate * (1.0 - RADIUS), 1e-3);
 }
 
 /// A heap of balls on a floor of glued ones.
@@ -240,7 +217,7 @@ fn heap(rolling: f64, threads: usize) -> GrainSimulation<3> {
     let mut options = grain_options(&scene.grains);
     options.time_step = 2e-3;
     options.solver.threads = threads;
-    GrainSimulation::new(Arc::new(scene), options, None, q).expect("a bed")
+    awake(scene, options, &q)
 }
 
 /// Mean height of the balls, m.
@@ -291,9 +268,7 @@ fn snapshots_and_threads_keep_every_bit() {
     let mut other = heap(0.2, 2);
     run.step(60).expect("finite");
     other.step(60).expect("finite");
-    let bits = |run: &GrainSimulation<3>| -> Vec<u64> {
-        run.q().iter().chain(run.v()).map(|x| x.to_bits()).collect()
-    };
+    let bits = |run: &GrainSimulation<3>| [bits(run.q()), bits(run.v())];
     assert_eq!(bits(&run), bits(&other), "threads");
     let snapshot = run.snapshot();
     run.step(30).expect("finite");

@@ -4,5 +4,4 @@
 
 mod descriptions;
 mod inertia;
-mod machines;
 mod resting;

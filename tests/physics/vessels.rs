@@ -3,14 +3,13 @@
 use std::sync::Arc;
 
 use rover_core::geometry::{Drum, Floor, Silo, Support};
-use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::simulation::{GrainSimulation, grain_options};
-use rover_core::system::grains::{Cohesion, GrainFriction, GrainScene, Grains, Wall};
+use rover_core::simulation::GrainSimulation;
+use rover_core::system::grains::{Cohesion, GrainScene, Wall};
 
-const G: f64 = 9.81;
-const RADIUS: f64 = 0.1;
-const MASS: f64 = 2.0;
+use super::grain_scenes::{G, MASS, RADIUS, alike, awake, between, exact, rough};
+use super::shared::{bits, near};
+
 const MU: f64 = 0.3;
 
 fn scene(
@@ -20,31 +19,15 @@ fn scene(
     cohesion: f64,
 ) -> GrainScene<3> {
     let attraction = Cohesion::new(cohesion, None, RADIUS).expect("a force");
-    let grains = Grains::new(vec![RADIUS; n], vec![MASS; n]).expect("grains");
     GrainScene {
-        grains: grains.with_cohesion(attraction),
-        walls,
         ground,
-        machine: None,
-        friction: GrainFriction {
-            grains: MU,
-            walls: MU,
-            wheels: MU,
-            ..GrainFriction::default()
-        },
+        ..between(walls, alike(n).with_cohesion(attraction), rough(MU))
     }
 }
 
-fn exact(scene: &GrainScene<3>) -> StepOptions {
-    let mut options = grain_options(&scene.grains);
-    options.solver.tolerance = 1e-9;
-    options.solver.velocity_tolerance = 1e-9;
-    options
-}
-
 fn simulation(scene: GrainScene<3>, q: &[f64]) -> GrainSimulation<3> {
-    let options = exact(&scene);
-    GrainSimulation::new(Arc::new(scene), options, None, q.to_vec()).expect("a bed")
+    let options = exact(&scene, 1e-9);
+    awake(scene, options, q)
 }
 
 fn moving_floor(velocity: Vector3<f64>) -> Wall<3> {
@@ -60,10 +43,8 @@ fn a_belt_leaves_a_ball_two_sevenths_of_its_speed() {
     assert!((early - MU * G * 0.1).abs() < 1e-6, "dragged by friction");
     ball.step(400).expect("steps");
     let v = ball.v();
-    assert!(
-        (v[0] - 0.4).abs() < 1e-6 && (v[2] + 0.2).abs() < 1e-6,
-        "{v:?}"
-    );
+    near(v[0], 0.4, 1e-6);
+    near(v[2], -0.2, 1e-6);
 }
 
 #[test]
@@ -81,7 +62,6 @@ fn a_floor_lifts_a_ball_and_a_snapshot_knows_where_it_is() {
         .restore(&snapshot)
         .expect("a snapshot of the same bed");
     other.step(100).expect("steps");
-    let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(ball.q()), bits(other.q()));
     ball.set_state(&[0.0, RADIUS, 0.0], &[0.0; 6])
         .expect("a state");
@@ -159,10 +139,10 @@ fn cohesion_adds_to_the_load_of_friction() {
 #[test]
 fn two_balls_that_cohere_move_as_one_and_keep_their_momentum() {
     let own = scene(2, Vec::new(), None, 50.0);
-    let mut options = exact(&own);
+    let mut options = exact(&own, 1e-9);
     options.gravity = Vector3::zeros();
     let q = [0.0, 0.0, 0.0, 2.0 * RADIUS, 0.0, 0.0];
-    let mut pair = GrainSimulation::new(Arc::new(own), options, None, q.to_vec()).expect("a bed");
+    let mut pair = awake(own, options, &q);
     let mut v = [0.0; 12];
     (v[1], v[7]) = (-0.5, 0.5);
     pair.set_state(&q, &v).expect("a state");

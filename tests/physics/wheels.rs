@@ -1,7 +1,7 @@
 //! Wheels with a width: their contacts, how they rest, roll, fall and drive.
 #![allow(clippy::unwrap_used)]
 
-mod wheel_scenes;
+pub mod wheel_scenes;
 
 mod descriptions;
 mod falling;

@@ -8,16 +8,16 @@ use std::sync::Arc;
 use rover_comparison::free_spheres::SphereKind;
 use rover_comparison::scenes::{G, options};
 use rover_comparison::slab::Slab;
-use rover_comparison::sphere_scenes::{KIND, Push, SphereScene, Treatment, run};
+use rover_comparison::sphere_scenes::{KIND, Push, SphereRun, SphereScene, Treatment, run};
 use rover_comparison::sphere_simulation::SphereSimulation;
 use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::GrainSimulation;
 use rover_core::system::grains::{GrainFriction, GrainScene, Grains, Wall};
 
-/// No CPU time is measured here.
-fn no_clock() -> f64 {
-    0.0
+/// What a scene shows in so many seconds; no CPU time is measured.
+fn shown(scene: SphereScene, step: f64, treatment: Treatment, seconds: f64) -> SphereRun {
+    run(scene, step, treatment, seconds, || 0.0).unwrap()
 }
 
 fn weightless(friction: f64, restitution: f64, time_step: f64) -> StepOptions {
@@ -30,14 +30,7 @@ fn weightless(friction: f64, restitution: f64, time_step: f64) -> StepOptions {
 #[test]
 fn bouncing_keeps_its_energy_at_any_step() {
     for step in [0.02, 0.01, 0.003, 0.001] {
-        let shown = run(
-            SphereScene::Bouncing,
-            step,
-            Treatment::VelocityLevel,
-            4.0,
-            no_clock,
-        )
-        .unwrap();
+        let shown = shown(SphereScene::Bouncing, step, Treatment::VelocityLevel, 4.0);
         assert!((shown.energy - 24034.5).abs() < 1e-8);
         assert!(shown.n_contacts == 49, "the balls did strike");
         assert!(shown.energy_change < 1e-13, "{shown:?}");
@@ -47,14 +40,12 @@ fn bouncing_keeps_its_energy_at_any_step() {
 #[test]
 fn elastic_impacts_of_the_block_keep_its_energy() {
     for step in [0.01, 0.005] {
-        let shown = run(
+        let shown = shown(
             SphereScene::ElasticBlock,
             step,
             Treatment::VelocityLevel,
             1.0,
-            no_clock,
-        )
-        .unwrap();
+        );
         assert!(shown.n_contacts > 100, "many at once: {shown:?}");
         assert!(shown.energy_change < 1e-12, "{shown:?}");
     }
@@ -62,26 +53,12 @@ fn elastic_impacts_of_the_block_keep_its_energy() {
 
 #[test]
 fn projection_keeps_the_block_apart() {
-    let projected = run(
-        SphereScene::Block,
-        1e-3,
-        Treatment::Projection,
-        0.6,
-        no_clock,
-    )
-    .unwrap();
+    let projected = shown(SphereScene::Block, 1e-3, Treatment::Projection, 0.6);
     assert!(projected.n_contacts > 200 && projected.converged > 0.99);
     assert!(projected.penetration < 1e-5, "{projected:?}");
     assert!(projected.deepest < 5e-3, "{projected:?}");
     // The velocity law alone lets penetration stay.
-    let left = run(
-        SphereScene::Block,
-        1e-3,
-        Treatment::VelocityLevel,
-        0.6,
-        no_clock,
-    )
-    .unwrap();
+    let left = shown(SphereScene::Block, 1e-3, Treatment::VelocityLevel, 0.6);
     assert!(left.penetration > projected.penetration, "{left:?}");
     assert!(left.penetration < 1e-4, "{left:?}");
 }
@@ -114,7 +91,7 @@ fn balls_roll_on_a_pushed_box_with_two_sevenths_of_its_acceleration() {
         let [slab, ball] = scene.accelerations().unwrap().map(|a| a.norm());
         assert!((slab - 0.7385).abs() < 5e-5 && (ball - 0.2110).abs() < 5e-5);
         for step in [0.01, 0.002] {
-            let shown = run(scene, step, Treatment::Projection, 4.0, no_clock).unwrap();
+            let shown = shown(scene, step, Treatment::Projection, 4.0);
             assert!(shown.velocity_error.unwrap() < 1e-20, "{push:?}: {shown:?}");
             assert!(shown.penetration < 1e-20, "{push:?}: {shown:?}");
         }

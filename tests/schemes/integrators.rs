@@ -11,8 +11,22 @@ use rover_comparison::scenes::{G, ball_above, ball_on, flight_at, options};
 use rover_comparison::{Penalty, SCHEMES, Scheme, SchemeFamily};
 use rover_core::planar::Line;
 
+/// Motions in persistent contact.
+const ON_THE_GROUND: [BenchmarkMotion; 3] = [
+    BenchmarkMotion::Rolling,
+    BenchmarkMotion::Sliding,
+    BenchmarkMotion::Driving,
+];
+
 fn named(start: &str) -> &'static Scheme {
     SCHEMES.iter().find(|s| s.name.starts_with(start)).unwrap()
+}
+
+/// Panics unless a number of a scheme is nearer to the expected one than the tolerance.
+#[track_caller]
+fn near(scheme: &Scheme, found: f64, expected: f64, tolerance: f64) {
+    let off = (found - expected).abs();
+    assert!(off < tolerance, "{}: {found} for {expected}", scheme.name);
 }
 
 fn check(scheme: &Scheme, curve: &ConvergenceCurve, expected: f64) {
@@ -60,11 +74,7 @@ fn across_impacts_every_scheme_is_of_first_order_and_the_event_driven_is_exact()
 
 #[test]
 fn the_reference_agrees_with_itself_at_half_the_step() {
-    for motion in [
-        BenchmarkMotion::Rolling,
-        BenchmarkMotion::Sliding,
-        BenchmarkMotion::Driving,
-    ] {
+    for motion in ON_THE_GROUND {
         let (fine, coarse) = (
             reference(motion).unwrap(),
             end_of(&reference_scheme(), motion, 256).unwrap(),
@@ -112,11 +122,7 @@ fn the_others_pass_the_zeno_point_and_rest() {
                 last_move = simulation.time();
             }
         }
-        assert!(
-            (last_move - zeno).abs() < 0.05,
-            "{}: {last_move} s of {zeno} s",
-            scheme.name
-        );
+        near(scheme, last_move, zeno, 0.05);
         let v = simulation.v();
         let speed = v.iter().map(|v| v * v).sum::<f64>().sqrt();
         assert!(speed < 3.0 * G * h, "{}: {v:?}", scheme.name);
@@ -143,18 +149,8 @@ fn a_sliding_ball_rolls_at_two_thirds_of_its_speed() {
             }
         }
         let time = v0 / (3.0 * mu * G);
-        let began = began.unwrap();
-        assert!(
-            (began - time).abs() < 5e-3,
-            "{}: {began} {time}",
-            scheme.name
-        );
-        let speed = simulation.v()[0];
-        assert!(
-            (speed - v0 * 2.0 / 3.0).abs() < 2e-2,
-            "{}: {speed}",
-            scheme.name
-        );
+        near(scheme, began.unwrap(), time, 5e-3);
+        near(scheme, simulation.v()[0], v0 * 2.0 / 3.0, 2e-2);
     }
 }
 
@@ -167,10 +163,7 @@ fn a_block_on_a_slope_stays_but_for_the_penalty_which_creeps() {
         let speed = creep(scheme).unwrap();
         if let SchemeFamily::Penalty(_, slip_speed) = scheme.kind {
             let expected = slip_speed * alpha.tan() / (mu * mu - alpha.tan().powi(2)).sqrt();
-            assert!(
-                (speed - expected).abs() < 0.01 * expected,
-                "{speed} {expected}"
-            );
+            near(scheme, speed, expected, 0.01 * expected);
         } else {
             assert!(speed < 1e-10, "{}: {speed:e} m/s", scheme.name);
         }
@@ -247,11 +240,7 @@ fn in_persistent_contact_each_has_its_order() {
             SchemeFamily::MoreauJean { .. } => 32,
             _ => 16,
         };
-        for motion in [
-            BenchmarkMotion::Rolling,
-            BenchmarkMotion::Sliding,
-            BenchmarkMotion::Driving,
-        ] {
+        for motion in ON_THE_GROUND {
             let curve = order_in(scheme, motion, coarsest).unwrap();
             check(scheme, &curve, expected);
         }

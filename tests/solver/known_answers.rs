@@ -1,6 +1,7 @@
 //! Whole behaviour of the friction-contact solvers on small mechanisms with known answers.
 
 use crate::scenes::{Problem, ROVER_NV, Scene, falling, pile, rover, table};
+use crate::solving::{by, cold, dimension, distance, lone, size};
 use friction_contact::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, PairContact, RoundPair,
     evaluate,
@@ -19,40 +20,22 @@ const METHODS: [Method; 5] = [
     Method::Admm,
 ];
 
+/// Solves from the impulses `p`: velocities and report.
 fn solve_with(
     problem: &Problem,
     options: &SolverOptions,
     p: &mut [f64],
 ) -> (Vec<f64>, SolveReport) {
-    let mut u = vec![0.0; p.len()];
-    let report = solve(
-        &problem.view(),
-        options,
-        p,
-        &mut u,
-        &mut SolverWorkspace::new(),
-    );
+    let (mut u, mut workspace) = (vec![0.0; p.len()], SolverWorkspace::new());
+    let report = solve(&problem.view(), options, p, &mut u, &mut workspace);
     (u, report)
 }
 
 /// Cold start with the default options, which must converge.
 fn solved(problem: &Problem) -> (Vec<f64>, Vec<f64>, SolveReport) {
-    let mut p = vec![0.0; problem.q.len()];
-    let (u, report) = solve_with(problem, &SolverOptions::default(), &mut p);
+    let (p, u, report) = cold(&problem.view(), &SolverOptions::default());
     assert!(report.is_converged(), "{report:?}");
     (p, u, report)
-}
-
-fn size(v: &[f64]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(x, y)| (x - y).powi(2))
-        .sum::<f64>()
-        .sqrt()
 }
 
 /// Coulomb's and Signorini's laws, written out case by case and without the code under test:
@@ -95,11 +78,6 @@ fn coulomb_violation(problem: &Problem, p: &[f64]) -> f64 {
 #[test]
 fn one_contact_opens_sticks_and_slides_with_every_method() {
     // m = 2 kg, mu = 0.5.
-    let W = |d: usize| -> Vec<f64> {
-        (0..d * d)
-            .map(|k| if k % (d + 1) == 0 { 0.5 } else { 0.0 })
-            .collect()
-    };
     let cases: [(&[f64], &[f64]); 6] = [
         (&[0.1, 3.0, -1.0], &[0.0, 0.0, 0.0]),
         (&[-0.1, 0.03, -0.04], &[0.2, -0.06, 0.08]),
@@ -110,27 +88,9 @@ fn one_contact_opens_sticks_and_slides_with_every_method() {
         (&[-0.1, -0.9], &[0.2, 0.1]),
     ];
     for (q, expected) in cases {
-        let dimension = if q.len() == 2 {
-            Dimension::Two
-        } else {
-            Dimension::Three
-        };
-        let problem = Problem {
-            dimension,
-            W: W(q.len()),
-            q: q.to_vec(),
-            mu: vec![0.5],
-        };
+        let problem = lone(0.5, q, 0.5);
         for method in METHODS {
-            let mut p = vec![0.0; q.len()];
-            let (_, report) = solve_with(
-                &problem,
-                &SolverOptions {
-                    method,
-                    ..SolverOptions::default()
-                },
-                &mut p,
-            );
+            let (p, _, report) = cold(&problem.view(), &by(method));
             assert!(report.is_converged(), "{method:?} {report:?}");
             assert!(
                 distance(&p, expected) < 1e-12,
@@ -210,7 +170,7 @@ const PILE_ITERATIONS: [usize; 8] = [8, 10, 20, 20, 20, 22, 38, 24];
 fn parked_rover() -> Problem {
     let mut v = vec![0.0; ROVER_NV];
     v[1] = -9.81 * 2e-3;
-    rover([0.0; 6], 0.7).problem(&v)
+    straight().problem(&v)
 }
 
 /// Rank of a symmetric matrix by elimination with full diagonal pivoting.
@@ -278,6 +238,11 @@ fn six_straight_wheels_have_rank_fourteen_and_newton_does_not_mind() {
     );
 }
 
+/// The rover with all wheels straight.
+fn straight() -> Scene {
+    rover([0.0; 6], 0.7)
+}
+
 /// Cases whose answer must be canonical: name, problem.
 fn canonical_cases() -> Vec<(&'static str, Problem)> {
     let free = |change: &[(usize, f64)]| {
@@ -292,14 +257,11 @@ fn canonical_cases() -> Vec<(&'static str, Problem)> {
     let skidding: Vec<(usize, f64)> = (9..15).map(|k| (k, 30.0)).collect();
     vec![
         ("parked", parked_rover()),
-        ("driving", rover([0.0; 6], 0.7).problem(&free(&spinning))),
-        (
-            "spinning wheels",
-            rover([0.0; 6], 0.7).problem(&free(&skidding)),
-        ),
+        ("driving", straight().problem(&free(&spinning))),
+        ("spinning wheels", straight().problem(&free(&skidding))),
         (
             "sliding sideways",
-            rover([0.0; 6], 0.7).problem(&free(&[(2, 0.4), (4, 0.2)])),
+            straight().problem(&free(&[(2, 0.4), (4, 0.2)])),
         ),
         (
             "steered",
@@ -307,7 +269,7 @@ fn canonical_cases() -> Vec<(&'static str, Problem)> {
         ),
         (
             "landing on one side",
-            rover([0.0; 6], 0.7).problem(&free(&[(1, -0.5), (3, 1.2)])),
+            straight().problem(&free(&[(1, -0.5), (3, 1.2)])),
         ),
         (
             "six-legged table",
@@ -486,29 +448,15 @@ fn the_workspace_leaves_no_trace() {
     let answer = |problem: &Problem, workspace: &mut SolverWorkspace| {
         let n = problem.q.len();
         let (mut p, mut u) = (vec![0.0; n], vec![0.0; n]);
-        solve(
-            &problem.view(),
-            &SolverOptions::default(),
-            &mut p,
-            &mut u,
-            workspace,
-        );
-        p
+        let options = SolverOptions::default();
+        solve(&problem.view(), &options, &mut p, &mut u, workspace);
+        p.into_iter().map(f64::to_bits).collect::<Vec<_>>()
     };
     for (name, problem) in canonical_cases() {
         let fresh = answer(&problem, &mut SolverWorkspace::new());
-        answer(
-            &pile(&[1.0, 1e2], 0.9).problem(&falling(2, 0.01)),
-            &mut workspace,
-        );
-        let used = answer(&problem, &mut workspace);
-        assert!(
-            fresh
-                .iter()
-                .zip(&used)
-                .all(|(a, b)| a.to_bits() == b.to_bits()),
-            "{name}"
-        );
+        let other = pile(&[1.0, 1e2], 0.9).problem(&falling(2, 0.01));
+        answer(&other, &mut workspace);
+        assert_eq!(fresh, answer(&problem, &mut workspace), "{name}");
     }
 }
 
@@ -524,11 +472,7 @@ fn random_problem() -> impl Strategy<Value = Problem> {
         )
             .prop_map(move |(entries, inverse_mass, v, mu)| {
                 let scene = Scene {
-                    dimension: if planar {
-                        Dimension::Two
-                    } else {
-                        Dimension::Three
-                    },
+                    dimension: dimension(planar),
                     rows: entries.chunks_exact(nv).map(<[f64]>::to_vec).collect(),
                     inverse_mass,
                     mu,
@@ -547,8 +491,7 @@ proptest! {
         let d = problem.dimension.components();
         let n = problem.q.len();
         prop_assume!((0..n).step_by(d).all(|k| problem.W[k * (n + 1)] > 1e-3));
-        let mut p = vec![0.0; n];
-        let (u, report) = solve_with(&problem, &SolverOptions::default(), &mut p);
+        let (p, u, report) = cold(&problem.view(), &SolverOptions::default());
         prop_assert!(p.iter().chain(&u).all(|x| x.is_finite()));
         let judged = evaluate(&problem.view(), &p);
         prop_assert!((judged.relative - report.residual).abs() <= 1e-12 + 1e-6 * report.residual);
@@ -634,11 +577,7 @@ fn scaled_problem() -> impl Strategy<Value = Problem> {
                     .wrapping_add(0x1405_7b7e_f767_814f);
                 (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
             };
-            let dimension = if planar {
-                Dimension::Two
-            } else {
-                Dimension::Three
-            };
+            let dimension = dimension(planar);
             let d = dimension.components();
             let scene = Scene {
                 dimension,
@@ -663,8 +602,7 @@ proptest! {
     fn converged_means_signorini_and_coulomb_at_every_scale(problem in scaled_problem()) {
         for method in METHODS {
             let options = SolverOptions { method, max_sweeps: 300, ..SolverOptions::default() };
-            let mut p = vec![0.0; problem.q.len()];
-            let (u, report) = solve_with(&problem, &options, &mut p);
+            let (p, u, report) = cold(&problem.view(), &options);
             prop_assert!(p.iter().chain(&u).all(|x| x.is_finite()));
             if report.is_converged() {
                 let broken = broken_laws(&problem, &p);
@@ -681,20 +619,13 @@ proptest! {
 fn no_friction_coefficient_lets_a_contact_approach() {
     for exponent in -300..=300 {
         let mu = 10.0_f64.powi(exponent);
-        let problem = Problem {
-            dimension: Dimension::Three,
-            W: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            q: vec![-1.0, 1.0, 1.0],
-            mu: vec![mu],
-        };
+        let problem = lone(1.0, &[-1.0, 1.0, 1.0], mu);
         for method in METHODS {
             let options = SolverOptions {
-                method,
                 max_sweeps: 100,
-                ..SolverOptions::default()
+                ..by(method)
             };
-            let mut p = vec![0.0; 3];
-            let (_, report) = solve_with(&problem, &options, &mut p);
+            let (p, _, report) = cold(&problem.view(), &options);
             assert!(
                 report.is_converged() || method == Method::Admm,
                 "{method:?}, mu {mu:e}: {report:?}"
@@ -716,24 +647,18 @@ fn no_friction_coefficient_lets_a_contact_approach() {
 fn the_answer_does_not_depend_on_the_units() {
     let sound = parked_rover();
     let (reference, _, _) = solved(&sound);
-    for stiffness in [
-        2.0_f64.powi(-900),
-        2.0_f64.powi(-40),
-        2.0_f64.powi(40),
-        2.0_f64.powi(900),
-    ] {
-        for speed in [2.0_f64.powi(-100), 1.0, 2.0_f64.powi(100)] {
+    for stiffness in [-900, -40, 40, 900].map(|k| 2.0_f64.powi(k)) {
+        for speed in [-100, 0, 100].map(|k| 2.0_f64.powi(k)) {
             let problem = Problem {
                 W: sound.W.iter().map(|w| w * stiffness).collect(),
                 q: sound.q.iter().map(|q| q * speed).collect(),
                 ..sound.clone()
             };
-            let mut p = vec![0.0; 18];
             let options = SolverOptions {
                 velocity_tolerance: 1e-9 * speed,
                 ..SolverOptions::default()
             };
-            let (_, report) = solve_with(&problem, &options, &mut p);
+            let (p, _, report) = cold(&problem.view(), &options);
             assert!(
                 report.is_converged(),
                 "{stiffness:e}, {speed:e}: {report:?}"
@@ -759,11 +684,7 @@ fn a_problem_without_contacts_is_solved_by_every_method() {
             mu: vec![],
         };
         for method in Method::ALL {
-            let options = SolverOptions {
-                method,
-                ..SolverOptions::default()
-            };
-            let (_, report) = solve_with(&problem, &options, &mut []);
+            let (_, _, report) = cold(&problem.view(), &by(method));
             let expected = if method == Method::Relaxed {
                 SolveStatus::SolvedRelaxed
             } else {
@@ -784,16 +705,16 @@ fn the_report_names_the_stage_that_answered_and_those_before_it() {
         rungs.iter().map(|rung| (rung.stage, rung.status)).collect()
     };
     let problem = parked_rover();
-    let (mut p, _, cold) = solved(&problem);
+    let (mut p, _, first) = solved(&problem);
     // At rest some mode is ambiguous, which the guess leaves to Newton.
     assert_eq!(
-        stages(&cold),
+        stages(&first),
         [
             (Stage::GuidedNewton, SolveStatus::Stalled),
             (Stage::Newton, SolveStatus::Converged)
         ]
     );
-    assert_eq!(cold.stage, Stage::Newton);
+    assert_eq!(first.stage, Stage::Newton);
     let (_, warm) = solve_with(&problem, &SolverOptions::default(), &mut p);
     assert_eq!(stages(&warm), [(Stage::Pivoting, SolveStatus::Converged)]);
     let column = pile(&[1.0; 12], 0.9).problem(&falling(12, 9.81e-3));
@@ -804,18 +725,8 @@ fn the_report_names_the_stage_that_answered_and_those_before_it() {
         many.rungs.as_slice().last().map(|rung| rung.stage),
         Some(many.stage)
     );
-    for method in [
-        Method::GaussSeidel,
-        Method::Newton,
-        Method::ProximalPoint,
-        Method::Admm,
-    ] {
-        let mut p = vec![0.0; 18];
-        let options = SolverOptions {
-            method,
-            ..SolverOptions::default()
-        };
-        let (_, report) = solve_with(&problem, &options, &mut p);
+    for method in &METHODS[1..] {
+        let (_, _, report) = cold(&problem.view(), &by(*method));
         assert_eq!(report.rungs.as_slice().len(), 1, "{method:?}");
         assert_eq!(report.rungs.as_slice()[0].stage, report.stage);
     }
@@ -824,14 +735,8 @@ fn the_report_names_the_stage_that_answered_and_those_before_it() {
 /// A problem with nothing to do lists that, and one in other units the same stages.
 #[test]
 fn every_solve_lists_its_stages() {
-    let mut p = vec![0.0; 2];
-    let rest = Problem {
-        dimension: Dimension::Two,
-        W: vec![1.0, 0.0, 0.0, 1.0],
-        q: vec![0.0; 2],
-        mu: vec![0.5],
-    };
-    let (_, report) = solve_with(&rest, &SolverOptions::default(), &mut p);
+    let rest = lone(1.0, &[0.0; 2], 0.5);
+    let (_, _, report) = cold(&rest.view(), &SolverOptions::default());
     let rungs = report.rungs.as_slice();
     assert_eq!(rungs.len(), 1);
     assert_eq!(
@@ -842,9 +747,7 @@ fn every_solve_lists_its_stages() {
     let problem = parked_rover();
     let tiny = Problem {
         q: problem.q.iter().map(|q| q * 1e-100).collect(),
-        W: problem.W.clone(),
-        mu: problem.mu.clone(),
-        dimension: problem.dimension,
+        ..problem.clone()
     };
     let (_, _, usual) = solved(&problem);
     let (_, _, scaled) = solved(&tiny);
@@ -950,14 +853,12 @@ fn a_budget_ends_every_method_with_the_nearest_answer_known() {
         let mut ends = 0;
         for budget in [0, 1 << 16, 1 << 18, 1 << 20, 1 << 22, 1 << 24] {
             let options = SolverOptions {
-                method,
                 budget: Some(budget),
                 tolerance: 1e-14,
                 velocity_tolerance: 1e-14,
-                ..SolverOptions::default()
+                ..by(method)
             };
-            let mut p = vec![0.0; n];
-            let (u, report) = solve_with(&problem, &options, &mut p);
+            let (p, u, report) = cold(&problem.view(), &options);
             assert!(report.work <= budget, "{method:?}: {report:?}");
             assert!(p.iter().chain(&u).all(|x| x.is_finite()));
             let judged = evaluate(&problem.view(), &p);
@@ -968,9 +869,7 @@ fn a_budget_ends_every_method_with_the_nearest_answer_known() {
             );
             last = report.residual;
             ends += usize::from(report.status == SolveStatus::BudgetExhausted);
-            let mut again = vec![0.0; n];
-            let (_, same) = solve_with(&problem, &options, &mut again);
-            assert_eq!((same, again), (report, p));
+            assert_eq!(cold(&problem.view(), &options), (p, u, report));
         }
         assert!(ends >= 2, "{method:?}: the budget never mattered");
         // Full Newton steps alone get nowhere here.
@@ -1009,8 +908,7 @@ fn most_random_mechanisms_are_solved() {
         };
         let v: Vec<f64> = (0..nv).map(|_| 2.0 * uniform() - 1.0).collect();
         let problem = scene.problem(&v);
-        let mut p = vec![0.0; 3 * n_c];
-        let (_, report) = solve_with(&problem, &SolverOptions::default(), &mut p);
+        let (_, _, report) = cold(&problem.view(), &SolverOptions::default());
         converged += usize::from(report.is_converged());
         iterations += report.iterations;
     }

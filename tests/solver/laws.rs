@@ -1,6 +1,7 @@
 //! Laws of friction that are not in the core, as the recipe "Add a contact law" has them, and
 //! Poisson's impact law beside Newton's.
 
+use crate::solving::cold;
 use friction_contact::law::coulomb::Coulomb;
 use friction_contact::law::friction_law::FrictionLaw;
 use friction_contact::law::frictionless::Frictionless;
@@ -8,7 +9,7 @@ use friction_contact::law::mode::ContactMode;
 use friction_contact::law::newton_impact::rebound;
 use friction_contact::problem::{Dimension, FrictionContactProblem};
 use friction_contact::solver::{
-    SolveReport, SolverOptions, SolverWorkspace, solve, solve_poisson_impact, solve_with_laws,
+    SolveReport, SolverOptions, SolverWorkspace, solve_poisson_impact, solve_with_laws,
 };
 
 /// Friction that depends on the direction, as on a brushed surface: the section is an ellipse,
@@ -144,9 +145,8 @@ fn a_round_ellipse_is_coulombs_law() {
     assert!(report.is_converged() && by_sweeps.is_converged());
     let mu = [0.4; 4];
     let problem = FrictionContactProblem::new(Dimension::Three, &data.0, &data.1, &mu).unwrap();
-    let (mut p, mut exact) = (vec![0.0; 12], vec![0.0; 12]);
-    let mut workspace = SolverWorkspace::new();
-    assert!(solve(&problem, &tight(), &mut p, &mut exact, &mut workspace).is_converged());
+    let (_, exact, report) = cold(&problem, &tight());
+    assert!(report.is_converged());
     for ((a, b), c) in u.iter().zip(&same).zip(exact.as_chunks::<3>().0) {
         for k in 0..3 {
             assert!(
@@ -205,16 +205,8 @@ fn gain(p: &[f64], before: &[f64], after: &[f64]) -> f64 {
 #[test]
 fn poisson_agrees_with_newton_on_a_row_of_balls() {
     let mut W = vec![0.0; 16];
-    for (at, w) in [
-        (0, 2.0),
-        (2, -1.0),
-        (8, -1.0),
-        (10, 2.0),
-        (5, 1.0),
-        (15, 1.0),
-    ] {
-        W[at] = w;
-    }
+    (W[0], W[10], W[2], W[8]) = (2.0, 2.0, -1.0, -1.0);
+    (W[5], W[15]) = (1.0, 1.0);
     let q = [-1.0, 0.0, 0.0, 0.0];
     for e in [0.0, 0.4, 1.0] {
         let (report, p, u) = poisson(&W, &q, &[0.0; 2], e);
@@ -251,11 +243,8 @@ fn poisson_gains_no_energy_where_newton_does() {
                 most_poisson = most_poisson.max(gain(&p, &q, &u));
                 let shifted = [q[0] + rebound(1.0, q[0]), slip];
                 let mu = [mu];
-                let problem =
-                    FrictionContactProblem::new(Dimension::Two, &W, &shifted, &mu).unwrap();
-                let (mut p, mut u) = ([0.0; 2], [0.0; 2]);
-                let mut workspace = SolverWorkspace::new();
-                let report = solve(&problem, &tight(), &mut p, &mut u, &mut workspace);
+                let problem = FrictionContactProblem::new(Dimension::Two, &W, &shifted, &mu);
+                let (p, mut u, report) = cold(&problem.unwrap(), &tight());
                 assert!(report.is_converged());
                 u[0] -= rebound(1.0, q[0]);
                 most_newton = most_newton.max(gain(&p, &q, &u));

@@ -7,3 +7,4 @@ mod npz;
 mod row;
 mod scenes;
 mod shelf;
+mod solving;

@@ -1,35 +1,14 @@
 //! Every method: manufactured answers, unsymmetric operators, the relaxed law, many contacts.
 
 use crate::scenes::{Problem, falling, pile};
+use crate::solving::{by, cold, dimension, distance, lone, size, within};
 use friction_contact::problem::{
     BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact,
 };
 use friction_contact::solver::{
-    ContactLaw, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage, solve,
+    ContactLaw, Method, SolveStatus, SolverOptions, SolverWorkspace, Stage, solve,
 };
 use proptest::prelude::*;
-
-fn solve_with(
-    method: Method,
-    problem: &FrictionContactProblem<'_>,
-    options: &SolverOptions,
-) -> (Vec<f64>, Vec<f64>, SolveReport) {
-    let n = problem.n_unknowns();
-    let (mut p, mut u) = (vec![0.0; n], vec![0.0; n]);
-    let report = solve(
-        problem,
-        &SolverOptions { method, ..*options },
-        &mut p,
-        &mut u,
-        &mut SolverWorkspace::new(),
-    );
-    (p, u, report)
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    let square: f64 = a.iter().zip(b).map(|(x, y)| (x - y).powi(2)).sum();
-    square.sqrt()
-}
 
 /// The methods of Coulomb's law.
 fn coulomb_methods() -> impl Iterator<Item = Method> {
@@ -123,11 +102,10 @@ proptest! {
         skew in prop_oneof![Just(0.0), -0.1..0.1f64],
         planar in prop::bool::ANY,
     ) {
-        let dimension = if planar { Dimension::Two } else { Dimension::Three };
+        let dimension = dimension(planar);
         let (problem, p, u) = manufactured(dimension, &numbers, &modes, mu, skew);
-        let options = SolverOptions { tolerance: 1e-10, ..SolverOptions::default() };
         for method in coulomb_methods() {
-            let (found_p, found_u, report) = solve_with(method, &problem.view(), &options);
+            let (found_p, found_u, report) = cold(&problem.view(), &within(1e-10, method));
             prop_assert!(report.is_converged(), "{}: {report:?}", method.name());
             prop_assert!(distance(&found_p, &p) < 1e-7, "{}: {report:?}", method.name());
             prop_assert!(distance(&found_u, &u) < 1e-7, "{}: {report:?}", method.name());
@@ -148,12 +126,9 @@ fn an_unsymmetric_operator_is_not_symmetrised() {
         }
     }
     for method in coulomb_methods() {
-        let options = SolverOptions {
-            tolerance: 1e-10,
-            ..SolverOptions::default()
-        };
-        let (found, _, _) = solve_with(method, &problem.view(), &options);
-        let (other, _, _) = solve_with(method, &symmetrised.view(), &options);
+        let options = within(1e-10, method);
+        let (found, _, _) = cold(&problem.view(), &options);
+        let (other, _, _) = cold(&symmetrised.view(), &options);
         assert!(distance(&found, &p) < 1e-8, "{}", method.name());
         assert!(distance(&other, &p) > 1e-2, "{}", method.name());
     }
@@ -167,18 +142,10 @@ fn newton_takes_the_friction_of_a_first_guess_from_a_contact_without_any() {
     (0..6).for_each(|k| W[7 * k] = 1.0);
     let q = [-1.0, 0.5, 0.2, -1.0, 0.3, 0.0];
     let problem = FrictionContactProblem::new(Dimension::Three, &W, &q, &[0.0, 0.5]).unwrap();
-    let options = SolverOptions {
-        method: Method::Newton,
-        ..SolverOptions::default()
-    };
     let mut p = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
-    let report = solve(
-        &problem,
-        &options,
-        &mut p,
-        &mut [0.0; 6],
-        &mut SolverWorkspace::new(),
-    );
+    let (mut u, mut workspace) = ([0.0; 6], SolverWorkspace::new());
+    let options = by(Method::Newton);
+    let report = solve(&problem, &options, &mut p, &mut u, &mut workspace);
     assert!(report.is_converged(), "{report:?}");
     assert!(
         distance(&p, &[1.0, 0.0, 0.0, 1.0, -0.3, 0.0]) < 1e-9,
@@ -191,28 +158,12 @@ fn newton_takes_the_friction_of_a_first_guess_from_a_contact_without_any() {
 #[test]
 fn the_relaxed_law_lifts_what_slides() {
     let (mu, m) = (0.5, 2.0);
-    let diagonal = |d: usize| -> Vec<f64> {
-        (0..d * d)
-            .map(|k| if k % (d + 1) == 0 { 1.0 / m } else { 0.0 })
-            .collect()
-    };
     for q in [vec![-1.0, 1.2, 1.6], vec![-1.0, -2.0]] {
-        let d = q.len();
-        let problem = Problem {
-            dimension: if d == 2 {
-                Dimension::Two
-            } else {
-                Dimension::Three
-            },
-            W: diagonal(d),
-            q: q.clone(),
-            mu: vec![mu],
-        };
-        let options = SolverOptions::default();
-        let (p, u, report) = solve_with(Method::Relaxed, &problem.view(), &options);
+        let problem = lone(1.0 / m, &q, mu);
+        let (p, u, report) = cold(&problem.view(), &by(Method::Relaxed));
         // |q_T| = 2: p_N = m (1 + 2 mu)/(1 + mu²) = 3.2, p_T = mu p_N against q_T.
         assert!((p[0] - 3.2).abs() < 1e-10, "{p:?}");
-        let slip: f64 = u[1..].iter().map(|x| x * x).sum::<f64>().sqrt();
+        let slip = size(&u[1..]);
         assert!(
             (slip - 1.2).abs() < 1e-10 && (u[0] - mu * slip).abs() < 1e-10,
             "{u:?}"
@@ -225,7 +176,7 @@ fn the_relaxed_law_lifts_what_slides() {
             !report.is_converged() && report.velocity_error > 0.1,
             "{report:?}"
         );
-        let (p, u, report) = solve_with(Method::Auto, &problem.view(), &options);
+        let (p, u, report) = cold(&problem.view(), &by(Method::Auto));
         assert!(report.is_converged() && u[0].abs() < 1e-12);
         assert!((p[0] - m).abs() < 1e-11);
     }
@@ -235,11 +186,7 @@ fn the_relaxed_law_lifts_what_slides() {
 #[test]
 fn the_relaxed_law_is_coulombs_where_nothing_slides() {
     let problem = pile(&[1.0, 2.0], 0.9).problem(&falling(2, 0.01));
-    let options = SolverOptions {
-        tolerance: 1e-10,
-        ..SolverOptions::default()
-    };
-    let (_, u, report) = solve_with(Method::Relaxed, &problem.view(), &options);
+    let (_, u, report) = cold(&problem.view(), &within(1e-10, Method::Relaxed));
     assert_eq!(report.status, SolveStatus::SolvedRelaxed);
     assert!(
         report.residual < 1e-9 && u.iter().all(|x| x.abs() < 1e-9),
@@ -254,11 +201,10 @@ fn a_wrong_velocity_is_not_accepted_at_a_large_mass_ratio() {
     let problem = pile(&[1.0, 1e6], 0.9).problem(&falling(2, 9.81e-3));
     for method in coulomb_methods() {
         let options = SolverOptions {
-            tolerance: 1e-4,
             max_sweeps: 500,
-            ..SolverOptions::default()
+            ..within(1e-4, method)
         };
-        let (_, u, report) = solve_with(method, &problem.view(), &options);
+        let (_, u, report) = cold(&problem.view(), &options);
         let moves = u.iter().any(|x| x.abs() > 3e-9);
         assert!(
             !(moves && report.is_converged()),
@@ -269,8 +215,7 @@ fn a_wrong_velocity_is_not_accepted_at_a_large_mass_ratio() {
         let last = report.rungs.as_slice().last().map(|rung| rung.status);
         assert_eq!(last, Some(report.status), "{}", method.name());
     }
-    let options = SolverOptions::default();
-    let (_, u, report) = solve_with(Method::Auto, &problem.view(), &options);
+    let (_, u, report) = cold(&problem.view(), &by(Method::Auto));
     assert!(report.is_converged() && u.iter().all(|x| x.abs() < 1e-9));
 }
 
@@ -350,12 +295,8 @@ fn columns_of_disks_rest_whatever_the_storage() {
             FrictionContactProblem::new_sparse(Dimension::Two, &W, &q, &mu).expect("sound");
         let full = FrictionContactProblem::new(Dimension::Two, &dense, &q, &mu).expect("sound");
         for method in coulomb_methods() {
-            let options = SolverOptions {
-                tolerance: 1e-9,
-                ..SolverOptions::default()
-            };
             for problem in [&sparse, &full] {
-                let (p, u, report) = solve_with(method, problem, &options);
+                let (p, u, report) = cold(problem, &within(1e-9, method));
                 assert!(report.is_converged(), "{}: {report:?}", method.name());
                 assert!(
                     u.iter().all(|x| x.abs() < 3e-9),
@@ -382,7 +323,7 @@ fn contacts_that_share_no_body_take_one_sweep() {
     W.assemble(&contacts, &masses);
     let (dense, mu) = (W.to_dense(), vec![0.5; contacts.len()]);
     let problem = FrictionContactProblem::from_assembled(Dimension::Two, &dense, &q, &mu);
-    let (p, _, report) = solve_with(Method::Auto, &problem, &SolverOptions::default());
+    let (p, _, report) = cold(&problem, &SolverOptions::default());
     assert!(report.is_converged(), "{report:?}");
     assert_eq!((report.stage, report.iterations), (Stage::Sweeps, 1));
     for p in p.chunks_exact(2) {
@@ -400,8 +341,7 @@ fn many_contacts_take_few_iterations() {
         W.assemble(&contacts, &masses);
         let mu = vec![0.5; contacts.len()];
         let problem = FrictionContactProblem::from_assembled_sparse(&W, &q, &mu);
-        let options = SolverOptions::default();
-        let (_, u, report) = solve_with(Method::Auto, &problem, &options);
+        let (_, u, report) = cold(&problem, &by(Method::Auto));
         assert!(report.is_converged(), "{report:?}");
         assert!(report.iterations <= bound, "{n_columns}: {report:?}");
         assert!(u.iter().all(|x| x.abs() < 1e-9));
@@ -414,18 +354,10 @@ fn no_method_allocates_in_a_sized_workspace() {
     let large = pile(&[1.0, 1e2, 1.0], 0.9).problem(&falling(3, 0.01));
     let small = pile(&[1.0], 0.5).problem(&[0.3, -0.01, 0.0, 0.0, 0.1, 0.0]);
     let mut workspace = SolverWorkspace::with_capacity(large.mu.len(), 3);
-    for method in [
-        Method::Auto,
-        Method::GaussSeidel,
-        Method::Newton,
-        Method::ProximalPoint,
-        Method::Admm,
-        Method::Relaxed,
-    ] {
+    for method in Method::ALL {
         let options = SolverOptions {
-            method,
             max_sweeps: 100,
-            ..SolverOptions::default()
+            ..by(method)
         };
         for problem in [&large, &small, &large] {
             let n = problem.q.len();

@@ -4,8 +4,9 @@
 use std::collections::BTreeMap;
 
 use crate::npz::{Recorded, shelf};
+use crate::solving::cold;
 use friction_contact::problem::FrictionContactProblem;
-use friction_contact::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
+use friction_contact::solver::{SolveReport, SolverOptions};
 use serde::Deserialize;
 
 /// `tests/shelf/bounds.json`: the relative residual that every problem is
@@ -25,21 +26,14 @@ fn answer(recorded: &Recorded, tolerance: f64, budget: Option<u64>) -> SolveRepo
     let problem =
         FrictionContactProblem::new(recorded.dimension, &recorded.W, &recorded.q, &recorded.mu)
             .expect("a sound problem");
-    let n = problem.n_unknowns();
-    let (mut p, mut u) = (vec![0.0; n], vec![0.0; n]);
     let options = SolverOptions {
         tolerance,
         velocity_tolerance: tolerance.max(1e-9),
         budget,
         ..SolverOptions::default()
     };
-    solve(
-        &problem,
-        &options,
-        &mut p,
-        &mut u,
-        &mut SolverWorkspace::new(),
-    )
+    let (_, _, report) = cold(&problem, &options);
+    report
 }
 
 #[test]

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 
 use rover_core::contact::Part;
-use rover_core::geometry::{Plane, Terrain};
+use rover_core::geometry::Terrain;
 use rover_core::integrator::StepOptions;
-use rover_core::integrator::moreau_jean::MoreauJean;
 use rover_core::multibody::{Configuration, Model, ModelDescription, Shape, ShapeDescription};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
+use crate::shared::{apart, flat, moving, quantile, step_beside_the_general_one};
 use crate::spheres::sphere_scenes::Random;
 use crate::surfaces::surface_scenes::map;
 
@@ -42,38 +42,31 @@ fn with_hulls() -> ModelDescription {
 }
 
 fn fallen(description: ModelDescription, ground: &Arc<dyn Terrain>) -> RoverSimulation {
-    let model = Arc::new(Model::from_description(description).unwrap());
-    let options = StepOptions::default();
-    let mut rover = RoverSimulation::new(Arc::clone(&model), ground.clone(), options).unwrap();
-    let mut start = Configuration::zero(&model);
-    start.position.y = 0.6;
-    start.attitude = UnitQuaternion::from_scaled_axis(Vector3::new(2.9, 0.2, 0.1));
+    let model = Model::from_description(description).unwrap();
+    let mut q = Configuration::zero(&model);
+    q.position.y = 0.6;
+    q.attitude = UnitQuaternion::from_scaled_axis(Vector3::new(2.9, 0.2, 0.1));
     let mut random = Random(9);
-    rover.set_state(
-        start,
-        (0..model.nv()).map(|_| random.between(-0.3, 0.3)).collect(),
-    );
-    rover
+    let v = (0..model.nv()).map(|_| random.between(-0.3, 0.3)).collect();
+    moving(model, ground.clone(), StepOptions::default(), q, v)
 }
 
 #[test]
 fn hulls_of_boxes_move_as_the_boxes_do() {
     let rough = map(40, 0.2, |x, z| 0.04 * ((3.0 * x).sin() + (4.0 * z).cos()));
-    let grounds: [Arc<dyn Terrain>; 2] = [Arc::new(Plane::ground()), Arc::new(rough)];
+    let grounds: [Arc<dyn Terrain>; 2] = [flat(), Arc::new(rough)];
     for (k, ground) in grounds.iter().enumerate() {
         let mut boxes = fallen(ModelDescription::rover(), ground);
         let mut hulls = fallen(with_hulls(), ground);
         let (mut met, mut fallbacks) = (0, 0);
-        let mut differences = Vec::new();
+        let mut differences = [Vec::new(), Vec::new()];
         for _ in 0..120 {
             // The same start for both, and for the general step: without a memory of impulses.
-            let (q, v) = (boxes.state().configuration.clone(), boxes.v().to_vec());
+            let (q, v) = (boxes.q().clone(), boxes.v().to_vec());
             boxes.set_state(q.clone(), v.clone());
             hulls.set_state(q, v);
-            let mut general = hulls.clone();
             boxes.step(1).unwrap();
-            let report = hulls.step(1).unwrap();
-            general.step_with(&MoreauJean, 1).unwrap();
+            let (report, difference) = step_beside_the_general_one(&mut hulls);
             assert!(report.is_converged());
             fallbacks += report.fallbacks;
             let is_hull = |part: &Part| matches!(part, Part::Collider(_));
@@ -82,19 +75,14 @@ fn hulls_of_boxes_move_as_the_boxes_do() {
                 .iter()
                 .filter(|a| is_hull(&a.contact.part))
                 .count();
-            let differs = |other: &RoverSimulation| {
-                let pairs = hulls.v().iter().zip(other.v());
-                pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()))
-            };
-            differences.push([differs(&boxes), differs(&general)]);
+            differences[0].push(apart(hulls.v(), boxes.v()));
+            differences[1].push(difference);
         }
         assert!(met > 50, "{k}: {met}");
         assert!(fallbacks < 30, "{k}: {fallbacks}");
-        for other in 0..2 {
-            let mut own: Vec<f64> = differences.iter().map(|both| both[other]).collect();
-            own.sort_by(f64::total_cmp);
+        for (other, differences) in differences.into_iter().enumerate() {
             // A few friction problems have several answers.
-            let typical = own[own.len() * 85 / 100];
+            let typical = quantile(differences, 85);
             assert!(typical < 1e-8, "{k} {other}: {typical:e}");
         }
     }

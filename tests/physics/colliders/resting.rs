@@ -5,6 +5,7 @@ use rover_core::integrator::Variant;
 use rover_core::multibody::Configuration;
 
 use super::collider_scenes::{GRAVITY, STEP, body, placed, prism, take};
+use crate::shared::{VARIANTS, largest, near_in};
 
 const CYLINDER: &str = "kind = 'cylinder', radius = 0.2, height = 0.3";
 const CAPSULE: &str = "kind = 'capsule', radius = 0.1, height = 0.4";
@@ -22,14 +23,14 @@ fn dropped_with_a_tilt_it_lies_at_its_height_and_bears_its_weight() {
         (&prism, [0.1, 0.4, 0.05], 0.1, 6),
         (&prism, [QUARTER, 0.0, 0.1], 0.25 * 0.75_f64.sqrt(), 4),
     ];
-    for variant in [Variant::Linearised, Variant::Newton] {
+    for variant in VARIANTS {
         for (shape, turn, height, n_contacts) in cases {
             let start = [0.0, height + 0.06, 0.0];
             let mut simulation = placed(body(shape), start, turn, 0.0, variant);
             // An ellipsoid rocks: nothing but impacts dissipates.
             let steps = if shape == ELLIPSOID { 100 } else { 800 };
             take(&mut simulation, steps);
-            let centre = simulation.state().configuration.position.y;
+            let centre = simulation.q().position.y;
             if shape == ELLIPSOID {
                 assert!(centre > height - 2e-4, "{centre}");
             } else {
@@ -60,22 +61,15 @@ fn on_a_slope_it_stays_where_its_side_is_flat_and_slides_where_friction_ends() {
             );
             if slope < 0.7_f64.atan() {
                 take(&mut simulation, 400);
-                let place = simulation.state().configuration.position;
+                let place = simulation.q().position;
                 assert!(place.x.abs() < 1e-3, "{shape}: {place}");
-                let v = simulation
-                    .v()
-                    .iter()
-                    .fold(0.0, |most: f64, v| most.max(v.abs()));
+                let v = largest(simulation.v());
                 assert!(v < 1e-6, "{shape}: {v}");
             } else {
                 // a = g (sin − μ cos)
                 simulation.step(200).unwrap();
                 let v = GRAVITY * (slope.sin() - 0.7 * slope.cos());
-                assert!(
-                    (simulation.v()[0] - v).abs() < 0.02 * v,
-                    "{} {v}",
-                    simulation.v()[0]
-                );
+                near_in(&shape, simulation.v()[0], v, 0.02 * v);
             }
         }
     }
@@ -93,7 +87,7 @@ fn a_falling_rod_ends_on_its_side() {
         take(&mut simulation, 600);
         let Configuration {
             position, attitude, ..
-        } = &simulation.state().configuration;
+        } = simulation.q();
         assert!((position.y - 0.03).abs() < 2e-4, "{position}");
         let axis = attitude * rover_core::nalgebra::Vector3::y();
         assert!(axis.y.abs() < 1e-3, "{axis}");

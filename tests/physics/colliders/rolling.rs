@@ -1,8 +1,7 @@
 //! Bodies that roll down a slope without sliding, against a = g sin α / (1 + I / (m r²)).
 
-use rover_core::integrator::Variant;
-
 use super::collider_scenes::{GRAVITY, STEP, body, placed, take};
+use crate::shared::{VARIANTS, near_in};
 
 #[test]
 fn a_cylinder_a_capsule_and_an_ellipsoid_roll_as_fast_as_their_inertia_lets_them() {
@@ -19,7 +18,7 @@ fn a_cylinder_a_capsule_and_an_ellipsoid_roll_as_fast_as_their_inertia_lets_them
         ("kind = 'ellipsoid', radii = [0.1, 0.3, 0.1]", 0.4),
     ];
     let slope = 0.2_f64;
-    for variant in [Variant::Linearised, Variant::Newton] {
+    for variant in VARIANTS {
         for (shape, inertia) in cases {
             let mut simulation = placed(body(shape), [0.0, r, 0.0], turn, slope, variant);
             let steps = 200;
@@ -27,11 +26,7 @@ fn a_cylinder_a_capsule_and_an_ellipsoid_roll_as_fast_as_their_inertia_lets_them
             let v = simulation.v();
             let time = STEP * steps as f64;
             let expected = GRAVITY * slope.sin() * time / (1.0 + inertia);
-            assert!(
-                (v[0] - expected).abs() < 1e-3 * expected,
-                "{shape}: {} {expected}",
-                v[0]
-            );
+            near_in(&shape, v[0], expected, 1e-3 * expected);
             // It does not slide, and does not turn aside.
             assert!((v[0] + v[5] * r).abs() < 1e-6, "{shape}: {v:?}");
             assert!(

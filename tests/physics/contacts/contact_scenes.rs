@@ -1,12 +1,11 @@
 //! Machines whose parts touch each other.
 
-use std::sync::Arc;
-
 use rover_core::contact::{Activation, Contact, PairSearch, detect_pairs};
-use rover_core::geometry::Plane;
 use rover_core::integrator::Variant;
-use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
+use rover_core::multibody::{Kinematics, Model};
 use rover_core::simulation::RoverSimulation;
+
+use crate::shared::{flat, model, resting, stepping};
 
 /// A chassis with a two-link arm; the second link, a box, a ball or a wheel, folds down onto the
 /// chassis.
@@ -49,7 +48,7 @@ mass = 3.0
 {last}
 "#
     );
-    Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap()
+    model(&text)
 }
 
 /// The tips that an arm may have.
@@ -89,7 +88,7 @@ pub fn tips() -> Vec<(&'static str, f64)> {
 }
 
 /// Contacts between a machine's bodies with a gap of at most 20 cm.
-pub fn near(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
+pub fn nearby(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
     let activation = Activation {
         lead: 0.0,
         hover: 0.2,
@@ -126,13 +125,8 @@ pub fn overlap(simulation: &RoverSimulation) -> f64 {
 
 /// A simulation on flat ground that starts at rest, with its base centre at the given height.
 pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> RoverSimulation {
-    let mut start = Configuration::zero(&model);
-    start.position.y = height;
-    start.joints.copy_from_slice(joints);
-    let options = crate::stepping(variant, 0.005);
-    let v = vec![0.0; model.nv()];
-    let model = Arc::new(model);
-    let mut simulation = RoverSimulation::new(model, Arc::new(Plane::ground()), options).unwrap();
-    simulation.set_state(start, v);
-    simulation
+    resting(model, flat(), stepping(variant, 0.005), |q| {
+        q.position.y = height;
+        q.joints.copy_from_slice(joints);
+    })
 }

@@ -6,7 +6,7 @@ use rover_core::contact::{Contact, generalized_impulse, relocate};
 use rover_core::geometry::Plane;
 use rover_core::multibody::{Configuration, Kinematics, Model};
 
-use super::contact_scenes::{folding, near, tips};
+use super::contact_scenes::{folding, nearby, tips};
 
 /// The configuration of the machine, and its self-contacts with a gap of at most 20 cm.
 fn contacts(model: &Model, joints: [f64; 3], turn: [f64; 3]) -> (Configuration, Vec<Contact>) {
@@ -18,7 +18,7 @@ fn contacts(model: &Model, joints: [f64; 3], turn: [f64; 3]) -> (Configuration, 
         .chain([0.0; 3])
         .collect();
     q.advance(model, &v, 1.0);
-    let found = near(model, &Kinematics::of(model, &q));
+    let found = nearby(model, &Kinematics::of(model, &q));
     (q, found)
 }
 

@@ -2,28 +2,13 @@
 
 use std::sync::Arc;
 
-use rover_core::geometry::{Plane, Terrain};
-use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::geometry::Terrain;
+use rover_core::integrator::Variant;
+use rover_core::multibody::Configuration;
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
-/// Numbers in [−1, 1] that look random.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self) -> Vector3<f64> {
-        Vector3::new(self.next(), self.next(), self.next())
-    }
-}
+use crate::shared::{Numbers, flat, model, moving, stepping};
 
 /// Free bodies at rest on a ground, with steps of 2 ms. `solids`: what the description says of each
 /// but its name and joint. `places`: position and scaled axis of rotation of each.
@@ -37,8 +22,7 @@ pub fn heap(
         .map(|(i, own)| format!("[[solids]]\nname = 'b{i}'\njoint = 'free'\n{own}\n"))
         .collect();
     let text = format!("name = 'heap'\n{}", solids.concat());
-    let description = ModelDescription::from_toml(&text).unwrap();
-    let model = Arc::new(Model::from_description(description).unwrap());
+    let model = model(&text);
     let mut q = Configuration::zero(&model);
     for (i, [position, turn]) in places.enumerate() {
         let attitude = UnitQuaternion::from_scaled_axis(turn);
@@ -50,13 +34,7 @@ pub fn heap(
         }
     }
     let v = vec![0.0; model.nv()];
-    let options = StepOptions {
-        time_step: 2e-3,
-        ..StepOptions::default()
-    };
-    let mut simulation = RoverSimulation::new(model, ground, options).unwrap();
-    simulation.set_state(q, v);
-    simulation
+    moving(model, ground, stepping(Variant::default(), 2e-3), q, v)
 }
 
 /// `side³` boxes of about 0.2 m and 6 to 10 kg, turned anyhow, on a grid that leaves some
@@ -81,5 +59,5 @@ pub fn heap_of_boxes(side: usize, seed: u64) -> RoverSimulation {
         let position = grid + Vector3::new(0.0, 0.2, 0.0) + 0.02 * numbers.vector();
         [position, numbers.vector()]
     });
-    heap(Arc::new(Plane::ground()), &boxes, places)
+    heap(flat(), &boxes, places)
 }

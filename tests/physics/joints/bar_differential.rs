@@ -1,38 +1,31 @@
 //! A rocker-bogie whose differential is a bar with two rods, beside one whose rockers are coupled.
 
-use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::{Plane, SphereField};
 use rover_core::integrator::Variant;
-use rover_core::multibody::{Model, ModelDescription, coordinates};
+use rover_core::multibody::{Model, ModelDescription};
 use rover_core::simulation::RoverSimulation;
 use std::sync::Arc;
 
-use super::machines::options;
+use super::machines::{joint, standing};
 use crate::rover_kinds::with_a_bar;
+use crate::shared::{VARIANTS, moving, stepping};
 
 fn on_stones(description: ModelDescription, variant: Variant) -> RoverSimulation {
-    let model = Arc::new(Model::from_description(description).unwrap());
-    let flat = || Plane::new([0.0, 1.0, 0.0], 0.0).unwrap();
-    let q = resting_pose(&model, &flat(), [0.0, 0.0], 0.0).unwrap();
+    let model = Model::from_description(description).unwrap();
+    let q = standing(&model);
     let centres = [[0.6, -0.12, -0.2], [1.1, -0.13, 0.2], [1.6, -0.1, -0.15]];
-    let stones = SphereField::new(&centres, &[0.16; 3], Some(flat())).unwrap();
-    let mut run = RoverSimulation::new(model, Arc::new(stones), options(5e-3, variant)).unwrap();
-    let q = coordinates::from_public(run.model(), &q).unwrap();
-    let nv = run.model().nv();
-    run.set_state(q, vec![0.0; nv]);
+    let stones = SphereField::new(&centres, &[0.16; 3], Some(Plane::ground())).unwrap();
+    let v = vec![0.0; model.nv()];
+    let mut run = moving(model, Arc::new(stones), stepping(variant, 5e-3), q, v);
     let torques = vec![0.9; run.model().wheels().len()];
     run.set_wheel_torques(&torques).unwrap();
     run
 }
 
-fn joint(run: &RoverSimulation, name: &str) -> f64 {
-    run.q().joints[run.model().joint_index(name).unwrap()]
-}
-
 /// Both climb the stones in the same way; the bar and its rods weigh 3 g.
 #[test]
 fn a_bar_differential_drives_as_coupled_rockers() {
-    for variant in [Variant::Linearised, Variant::Newton] {
+    for variant in VARIANTS {
         let mut bar = on_stones(with_a_bar(), variant);
         let mut coupled = on_stones(ModelDescription::named("open-rover").unwrap(), variant);
         let mut steepest = 0.0_f64;

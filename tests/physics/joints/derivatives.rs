@@ -6,6 +6,7 @@ use rover_core::multibody::{Configuration, Factor, Kinematics, MassMatrix, Model
 use rover_core::scalar::Single;
 
 use super::machines::{GRAVITY, ROOTS, menagerie, somewhere};
+use crate::shared::{apart, near_in};
 
 const H: f64 = 1e-5;
 
@@ -37,12 +38,7 @@ fn the_mass_matrix_is_that_of_the_moving_points() {
                 // A rigid body is equivalent to its mass at the centre and a pair of points along
                 // each principal axis.
                 let c = body.centre_of_mass;
-                let axes = body.principal_axes.unwrap_or_default();
-                let axes = if body.principal_axes.is_some() {
-                    axes
-                } else {
-                    nalgebra::Matrix3::identity()
-                };
+                let axes = (body.principal_axes).unwrap_or_else(nalgebra::Matrix3::identity);
                 let I = body.principal_inertia;
                 let speed = |p: &Vector3<f64>| {
                     let ahead = point(&model, &moved(&model, &q, &v, H), b, p);
@@ -65,10 +61,7 @@ fn the_mass_matrix_is_that_of_the_moving_points() {
             let M = mass_matrix(&model, &q);
             let v_column = DVector::from_column_slice(&v);
             let expected = 0.5 * v_column.dot(&(&M * &v_column));
-            assert!(
-                (kinetic - expected).abs() < 1e-8 * expected,
-                "{root:?}: {kinetic} {expected}"
-            );
+            near_in(&root, kinetic, expected, 1e-8 * expected);
             let kinematics = Kinematics::of(&model, &q);
             let swept = kinematics.energy(&model, &v, &GRAVITY).kinetic;
             assert!((swept - expected).abs() < 1e-12 * expected);
@@ -93,9 +86,7 @@ fn the_factor_solves_what_the_mass_matrix_multiplies() {
         assert!(M.factorise(mechanism, &mut factor));
         factor.half_solve(mechanism, &mut y);
         factor.half_solve_back(mechanism, &mut y);
-        for (x, y) in v.iter().zip(&y) {
-            assert!((x - y).abs() < 1e-11, "{root:?} {x} {y}");
-        }
+        assert!(apart(&v, &y) < 1e-11, "{root:?}");
     }
 }
 
@@ -146,11 +137,7 @@ fn gravity_is_the_slope_of_the_potential_energy() {
                 kinematics.energy(&model, &at_rest, &GRAVITY).potential
             };
             let slope = (potential(H) - potential(-H)) / (2.0 * H);
-            assert!(
-                (slope - G[k]).abs() < 1e-7,
-                "{root:?} {k}: {slope} {}",
-                G[k]
-            );
+            near_in(&(root, k), slope, G[k], 1e-7);
         }
     }
 }
@@ -181,10 +168,7 @@ fn jacobians_are_the_derivatives_of_the_points() {
             for k in 0..model.nv() {
                 let mut e = vec![0.0; model.nv()];
                 e[k] = 1.0;
-                assert!(
-                    (speed(&e).dot(&d) - along[k]).abs() < 1e-8,
-                    "{root:?} {b} {k}"
-                );
+                near_in(&(root, b, k), speed(&e).dot(&d), along[k], 1e-8);
             }
         }
     }
@@ -211,10 +195,8 @@ fn coordinates_survive_both_ways() {
         let later = to_report(&model, &moved(&model, &q, &v, H), &v).unwrap().0;
         let sooner = to_report(&model, &moved(&model, &q, &v, -H), &v).unwrap().0;
         for k in 0..model.nv() {
-            assert!(
-                ((later[k] - sooner[k]) / (2.0 * H) - rates[k]).abs() < 1e-7,
-                "{root:?} {k}"
-            );
+            let rate = (later[k] - sooner[k]) / (2.0 * H);
+            near_in(&(root, k), rate, rates[k], 1e-7);
         }
     }
 }

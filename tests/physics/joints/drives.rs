@@ -3,7 +3,8 @@
 use rover_core::integrator::Variant;
 use rover_core::multibody::{DriveDescription, JointKind, Motor, SolidDescription};
 
-use super::machines::{model, options, simulation, solid};
+use super::machines::{model, simulation, solid};
+use crate::shared::{VARIANTS, stepping};
 
 /// About y, so that gravity exerts no torque.
 const INERTIA: f64 = 0.25 * 0.1 * 0.1;
@@ -32,12 +33,12 @@ fn a_torque_saturates_at_the_drives_limit() {
         free.axis = Some([0.0, 1.0, 0.0]);
         let mut run = simulation(
             model(vec![turret(None), free]),
-            options(1e-3, Variant::Linearised),
+            stepping(Variant::Linearised, 1e-3),
         );
         // The other joint has no drive and no limit; its torque acts back on the turret.
         run.set_joint_torques(&[asked, 0.5]).unwrap();
         run.step(10).unwrap();
-        let v = &run.state().v;
+        let v = run.v();
         let expected = 0.01 * (given - 0.5) / INERTIA;
         assert!((v[0] - expected).abs() < 1e-9, "{v:?} {expected}");
         let last = run.last_call();
@@ -49,16 +50,16 @@ fn a_torque_saturates_at_the_drives_limit() {
 /// `I ω̇ = τ₀ (1 − ω/ω₀)` on the motor's line, from rest: `ω = ω₀ (1 − exp(−τ₀ t / (I ω₀)))`.
 #[test]
 fn a_joint_runs_up_along_its_motors_line() {
-    for variant in [Variant::Linearised, Variant::Newton] {
+    for variant in VARIANTS {
         let h = 1e-4;
-        let mut run = simulation(model(vec![turret(Some(MOTOR))]), options(h, variant));
+        let mut run = simulation(model(vec![turret(Some(MOTOR))]), stepping(variant, h));
         run.set_joint_torques(&[0.01]).unwrap();
         for n in [1, 2] {
             run.step(1000).unwrap();
             let t = 0.1 * f64::from(n);
             let rate = MOTOR.stall_torque / (INERTIA * MOTOR.no_load_speed);
             let expected = MOTOR.no_load_speed * (1.0 - (-rate * t).exp());
-            let found = run.state().v[0];
+            let found = run.v()[0];
             assert!((found - expected).abs() < 1e-5, "{found} {expected}");
         }
         let snapshot = run.snapshot();

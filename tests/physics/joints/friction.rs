@@ -2,18 +2,14 @@
 
 use std::sync::Arc;
 
-use rover_core::contact::placement::resting_pose;
-use rover_core::geometry::Plane;
 use rover_core::integrator::Variant;
 use rover_core::multibody::{
-    Configuration, CouplingDescription, JointKind, JointLimits, LoopDescription, LoopKind, Model,
-    ModelDescription, SolidDescription, coordinates,
+    Configuration, JointKind, LoopKind, Model, ModelDescription, SolidDescription,
 };
 use rover_core::simulation::RoverSimulation;
 
-use super::machines::{energy, machine, model, options, simulation, solid};
-
-const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
+use super::machines::{energy, machine, model, simulation, solid, standing};
+use crate::shared::{VARIANTS, closure, flat, follows, largest, limits, moving, near_in, stepping};
 
 /// Length of a pendulum of 1 kg, m, and its largest torque, N m.
 const LENGTH: f64 = 0.8;
@@ -27,7 +23,7 @@ fn pendulum(friction: f64) -> SolidDescription {
 }
 
 fn at(model: Model, h: f64, variant: Variant, angle: f64, rate: f64) -> RoverSimulation {
-    let mut run = simulation(model, options(h, variant));
+    let mut run = simulation(model, stepping(variant, h));
     let mut q = Configuration::zero(run.model());
     q.joints[0] = angle;
     let mut v = vec![0.0; run.model().nv()];
@@ -124,16 +120,8 @@ fn a_gear_train_holds_its_load() {
         arm
     };
     for share in [0.999, 1.01] {
-        let gear = LoopDescription {
-            name: "gear".into(),
-            kind: LoopKind::Joint,
-            solid: "shaft".into(),
-            other: Some("arm".into()),
-            position: None,
-            other_position: None,
-            other_rotation: None,
-            polynomial: Some(vec![0.0, ratio]),
-        };
+        let mut gear = closure("gear", LoopKind::Joint, "shaft", Some("arm"));
+        gear.polynomial = Some(vec![0.0, ratio]);
         let looped = Model::from_description(ModelDescription {
             loops: vec![gear],
             ..machine(vec![load(share), shaft()])
@@ -142,11 +130,7 @@ fn a_gear_train_holds_its_load() {
         base.mass = 1.0;
         let (mut arm, mut coupled) = (load(share), shaft());
         (arm.parent, coupled.parent) = (Some("base".into()), Some("base".into()));
-        coupled.coupled = Some(CouplingDescription {
-            joint: "arm".into(),
-            ratio,
-            offset: 0.0,
-        });
+        coupled.coupled = Some(follows("arm", ratio, 0.0));
         let coupled = model(vec![base, arm, coupled]);
         for variant in VARIANTS {
             for model in [looped.clone().unwrap(), coupled.clone()] {
@@ -165,10 +149,7 @@ fn a_gear_train_holds_its_load() {
 fn a_joint_with_friction_rests_on_its_stop() {
     for variant in VARIANTS {
         let mut bob = pendulum(0.2 * WEIGHT);
-        bob.limits = Some(JointLimits {
-            lower: 0.7,
-            upper: 1.5,
-        });
+        bob.limits = limits(0.7, 1.5);
         let mut run = at(model(vec![bob]), 5e-3, variant, 1.0, 0.0);
         assert!(run.step(600).unwrap().is_converged());
         assert!((run.q().joints[0] - 0.7).abs() < 1e-9 && run.v()[0].abs() < 1e-9);
@@ -190,30 +171,19 @@ fn a_rover_that_rolls_is_braked_by_its_bearings() {
     let rolling = model.mass() + 6.0 * 0.5 * 30.0;
     let braking = 6.0 * 4.0 / radius / rolling;
     for variant in VARIANTS {
-        let plane = || Plane::new([0.0, 1.0, 0.0], 0.0).unwrap();
-        let q = resting_pose(&model, &plane(), [0.0, 0.0], 0.0).unwrap();
-        let q = coordinates::from_public(&model, &q).unwrap();
-        let options = options(5e-3, variant);
-        let mut run = RoverSimulation::new(model.clone(), Arc::new(plane()), options).unwrap();
+        let q = standing(&model);
         let mut v = vec![0.0; model.nv()];
         v[0] = 0.5;
         for wheel in model.wheels() {
             v[model.joint_velocity(wheel.joint.unwrap())] = -0.5 / radius;
         }
-        run.set_state(q, v);
+        let mut run = moving(model.clone(), flat(), stepping(variant, 5e-3), q, v);
         let report = run.step(200).unwrap();
         assert!(report.is_converged() && report.fallbacks == 0);
         let expected = 0.5 - braking;
-        assert!(
-            (run.v()[0] - expected).abs() < 1e-3,
-            "{variant:?}: {} {expected}",
-            run.v()[0]
-        );
+        near_in(&variant, run.v()[0], expected, 1e-3);
         run.step(400).unwrap();
-        assert!(
-            run.v().iter().all(|v| v.abs() < 1e-9),
-            "{variant:?}: it parks"
-        );
+        assert!(largest(run.v()) < 1e-9, "{variant:?}: it parks");
     }
 }
 

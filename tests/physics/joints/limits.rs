@@ -4,16 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use rover_core::contact::{ContactKey, Side};
-use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{
-    Configuration, JointKind, JointLimits, ModelDescription, Shape, SolidDescription,
-};
+use rover_core::multibody::{Configuration, JointKind, ModelDescription, Shape, SolidDescription};
 use rover_core::simulation::RoverSimulation;
 
-use super::machines::{energy, model, options, simulation, solid};
+use super::machines::{energy, model, simulation, solid};
+use crate::shared::{VARIANTS, flat, limits, near, resting, stepping};
 
-const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
 const G: f64 = 9.81;
 const LENGTH: f64 = 0.8;
 /// Inertia of the pendulum about its axis, kg m².
@@ -23,7 +20,7 @@ const INERTIA: f64 = LENGTH * LENGTH + 0.5 * 0.1 * 0.1;
 fn pendulum(lower: f64, upper: f64) -> SolidDescription {
     let mut bob = solid("bob", None, JointKind::Revolute);
     bob.centre_of_mass = Some([0.0, -LENGTH, 0.0]);
-    bob.limits = Some(JointLimits { lower, upper });
+    bob.limits = limits(lower, upper);
     bob
 }
 
@@ -49,16 +46,16 @@ fn a_pendulum_bounces_off_its_stop() {
             let h = 2e-4;
             let options = StepOptions {
                 restitution: 0.5,
-                ..options(h, variant)
+                ..stepping(variant, h)
             };
             let mut run = simulation(model(vec![pendulum(lower, upper)]), options);
             start(&mut run, &[from], &[0.0]);
             let mut bounce = None;
             let mut highest = 0.0_f64;
             for _ in 0..10_000 {
-                let before = run.state().v[0];
+                let before = run.v()[0];
                 run.step(1).unwrap();
-                let (q, v) = (run.state().configuration.joints[0], run.state().v[0]);
+                let (q, v) = (run.q().joints[0], run.v()[0]);
                 let beyond = (lower - q).max(q - upper);
                 assert!(beyond <= h * before.abs(), "{variant:?} {beyond}");
                 if bounce.is_none() && v * before < 0.0 {
@@ -86,10 +83,10 @@ fn a_pendulum_bounces_off_its_stop() {
 #[test]
 fn a_pendulum_rests_on_its_stop() {
     for variant in VARIANTS {
-        let mut run = simulation(model(vec![pendulum(0.3, 1.5)]), options(5e-3, variant));
+        let mut run = simulation(model(vec![pendulum(0.3, 1.5)]), stepping(variant, 5e-3));
         start(&mut run, &[0.8], &[0.0]);
         run.step(400).unwrap();
-        let (q, v) = (run.state().configuration.joints[0], run.state().v[0]);
+        let (q, v) = (run.q().joints[0], run.v()[0]);
         assert!((q - 0.3).abs() < 1e-7 && v.abs() < 1e-9, "{q} {v}");
         let torque = reaction(&run, 0, Side::Lower);
         let expected = G * LENGTH * 0.3_f64.sin();
@@ -109,7 +106,7 @@ fn a_stop_that_is_foreseen_is_never_passed() {
     for variant in VARIANTS {
         let options = StepOptions {
             forecast: 1.0,
-            ..options(5e-3, variant)
+            ..stepping(variant, 5e-3)
         };
         let depth = 1e-8; // of a machine of a metre
         let mut run = simulation(model(vec![pendulum(-0.2, 0.9)]), options);
@@ -117,7 +114,7 @@ fn a_stop_that_is_foreseen_is_never_passed() {
         let mut reached = [false; 2];
         for _ in 0..400 {
             run.step(1).unwrap();
-            let q = run.state().configuration.joints[0];
+            let q = run.q().joints[0];
             assert!((-0.2 - depth..=0.9 + depth).contains(&q), "{variant:?} {q}");
             let sides = [Side::Lower, Side::Upper];
             for (reached, side) in reached.iter_mut().zip(sides) {
@@ -135,18 +132,15 @@ fn a_slide_rests_on_its_stop() {
         for (up, side) in [(1.0, Side::Lower), (-1.0, Side::Upper)] {
             let mut slide = solid("slide", None, JointKind::Prismatic);
             slide.axis = Some([0.0, up, 0.0]);
-            slide.limits = Some(JointLimits {
-                lower: -0.3,
-                upper: 0.3,
-            });
+            slide.limits = limits(-0.3, 0.3);
             let mut load = solid("load", Some("slide"), JointKind::Revolute);
             load.centre_of_mass = Some([0.0, -0.4, 0.0]);
             load.mass = 3.0;
-            let mut run = simulation(model(vec![slide, load]), options(2e-3, variant));
+            let mut run = simulation(model(vec![slide, load]), stepping(variant, 2e-3));
             run.step(500).unwrap();
             let force = reaction(&run, 0, side);
             assert!((force - 4.0 * G).abs() < 1e-6, "{variant:?} {force}");
-            let q = run.state().configuration.joints[0];
+            let q = run.q().joints[0];
             assert!((q + 0.3 * up).abs() < 1e-7, "{q}");
         }
     }
@@ -164,7 +158,7 @@ fn stops_give_no_energy() {
             lower.position = Some([0.0, -LENGTH, 0.0]);
             let options = StepOptions {
                 restitution,
-                ..options(2e-3, variant)
+                ..stepping(variant, 2e-3)
             };
             let mut run = simulation(model(vec![upper, lower]), options);
             start(&mut run, &[0.2, 0.0], &[-2.0, 3.0]);
@@ -197,7 +191,7 @@ fn a_stop_keeps_the_momenta() {
     let options = StepOptions {
         gravity: Vector3::zeros(),
         restitution: 1.0,
-        ..options(1e-3, Variant::Newton)
+        ..stepping(Variant::Newton, 1e-3)
     };
     let mut run = simulation(model(vec![body, arm]), options);
     start(&mut run, &[0.0], &[0.1, 0.2, -0.1, 0.3, 0.2, -0.4, 3.0]);
@@ -237,32 +231,22 @@ fn a_stop_carries_what_the_ground_presses() {
     }
     let mut arm = foot("arm", JointKind::Revolute);
     arm.centre_of_mass = Some([-0.5, -0.2, 0.0]);
-    arm.limits = Some(JointLimits {
-        lower: 0.0,
-        upper: 1.0,
-    });
+    arm.limits = limits(0.0, 1.0);
     solids.push(arm);
     let model = Arc::new(model(solids));
     for variant in VARIANTS {
         let options = StepOptions {
             friction_coefficient: 0.0,
-            ..options(5e-3, variant)
+            ..stepping(variant, 5e-3)
         };
-        let ground = Arc::new(Plane::ground());
-        let mut run = RoverSimulation::new(model.clone(), ground, options).unwrap();
-        let mut q = Configuration::zero(&model);
-        q.position.y = 0.3;
-        run.set_state(q, vec![0.0; 7]);
+        let mut run = resting(model.clone(), flat(), options, |q| q.position.y = 0.3);
         run.step(400).unwrap();
         assert_eq!(run.contacts().len(), 4);
         let weight = 13.0 * G;
         assert!((run.body_force() - weight).abs() < 1e-5 * weight);
         let torque = reaction(&run, 0, Side::Lower);
         let expected = 4.0 * G / 0.9 * 0.5;
-        assert!(
-            (torque - expected).abs() < 1e-4 * expected,
-            "{torque} {expected}"
-        );
+        near(torque, expected, 1e-4 * expected);
         // Bitwise identical from a snapshot, whose contacts include the stop.
         let snapshot = run.snapshot();
         run.step(5).unwrap();
@@ -280,13 +264,13 @@ fn a_joint_beyond_its_stop_is_put_back() {
         for gravity in [0.0, -G] {
             let options = StepOptions {
                 gravity: Vector3::new(0.0, gravity, 0.0),
-                ..options(5e-3, variant)
+                ..stepping(variant, 5e-3)
             };
             let mut run = simulation(model(vec![pendulum(-1.0, 0.5)]), options);
             start(&mut run, &[0.6], &[0.0]);
             let before = energy(&run);
             run.step(1).unwrap();
-            let (q, v) = (run.state().configuration.joints[0], run.state().v[0]);
+            let (q, v) = (run.q().joints[0], run.v()[0]);
             assert!(q <= 0.5 + 1e-8, "{variant:?} {q}");
             // No more than gravity adds in one step.
             assert!(v.abs() <= -gravity * 5e-3 / LENGTH, "{v}");

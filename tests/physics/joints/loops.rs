@@ -8,23 +8,8 @@ use rover_core::multibody::{
 };
 use rover_core::simulation::RoverSimulation;
 
-use super::machines::{energy, machine, options, simulation, solid};
-
-const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
-
-/// A loop of two solids, closed at the zero of all joints.
-fn closure(name: &str, kind: LoopKind, solid: &str, other: Option<&str>) -> LoopDescription {
-    LoopDescription {
-        name: name.into(),
-        kind,
-        solid: solid.into(),
-        other: other.map(Into::into),
-        position: None,
-        other_position: None,
-        other_rotation: None,
-        polynomial: None,
-    }
-}
+use super::machines::{energy, joint, machine, simulation, solid};
+use crate::shared::{VARIANTS, apart, closure, largest, limits, near, near_in, stepping};
 
 fn with_loops(solids: Vec<SolidDescription>, loops: Vec<LoopDescription>) -> ModelDescription {
     ModelDescription {
@@ -99,15 +84,11 @@ fn set_crank(run: &mut RoverSimulation, crank: f64) {
     run.set_state(q, v);
 }
 
-fn joint(run: &RoverSimulation, name: &str) -> f64 {
-    run.q().joints[run.model().joint_index(name).unwrap()]
-}
-
 /// Freudenstein's equation along a driven motion of many turns.
 #[test]
 fn the_angles_of_a_four_bar_are_those_of_its_circles() {
     for variant in VARIANTS {
-        let mut run = simulation(four_bar(), options(5e-3, variant));
+        let mut run = simulation(four_bar(), stepping(variant, 5e-3));
         set_crank(&mut run, 0.0);
         run.set_joint_torques(&[8.0, 0.0, 0.0]).unwrap();
         for _ in 0..400 {
@@ -139,7 +120,7 @@ fn the_angles_of_a_four_bar_are_those_of_its_circles() {
 #[test]
 fn a_free_four_bar_keeps_its_energy_and_stays_closed() {
     for variant in VARIANTS {
-        let mut run = simulation(four_bar(), options(5e-3, variant));
+        let mut run = simulation(four_bar(), stepping(variant, 5e-3));
         set_crank(&mut run, 0.4);
         let before = energy(&run);
         let n = if variant == Variant::Newton {
@@ -159,7 +140,7 @@ fn a_free_four_bar_keeps_its_energy_and_stays_closed() {
 fn the_scheme_is_of_second_order_with_loops() {
     for variant in VARIANTS {
         let end = |steps: u32| {
-            let mut run = simulation(four_bar(), options(0.4 / f64::from(steps), variant));
+            let mut run = simulation(four_bar(), stepping(variant, 0.4 / f64::from(steps)));
             set_crank(&mut run, 0.4);
             run.step(steps as usize).unwrap();
             joint(&run, "crank")
@@ -203,23 +184,17 @@ fn a_slider_crank_has_its_accelerations_and_forces() {
             vec![crank.clone(), rod.clone(), slider.clone()],
             vec![pin.clone()],
         );
-        let mut run = simulation(model, options(h, variant));
+        let mut run = simulation(model, stepping(variant, h));
         let mut q = Configuration::zero(run.model());
         q.joints = vec![theta, beta - theta, x - (r + l)];
         run.set_state(q, vec![rate, beta_rate - rate, slope * rate]);
         run.set_joint_torques(&[torque, 0.0, 0.0]).unwrap();
         run.step(1).unwrap();
         let found = (run.v()[0] - rate) / h;
-        assert!(
-            (found - acceleration).abs() < 1e-4 * acceleration.abs(),
-            "{found} {acceleration}"
-        );
+        near(found, acceleration, 1e-4 * acceleration.abs());
         let forces = run.loop_forces();
         for (found, expected) in forces.iter().zip([push, push * beta.tan(), 0.0]) {
-            assert!(
-                (found - expected).abs() < 1e-4 * push.abs(),
-                "{forces:?} {push}"
-            );
+            near(*found, expected, 1e-4 * push.abs());
         }
     }
 }
@@ -240,10 +215,10 @@ fn welded_solids_move_as_one() {
     for variant in VARIANTS {
         let model = built(vec![upper(), lower.clone()], vec![weld.clone()]);
         assert_eq!(redundant_rows(&model, &Configuration::zero(&model)), [5]);
-        let mut welded = simulation(model, options(2e-3, variant));
+        let mut welded = simulation(model, stepping(variant, 2e-3));
         let mut rigid = lower.clone();
         rigid.locked = Some(0.0);
-        let mut one = simulation(built(vec![upper(), rigid], vec![]), options(2e-3, variant));
+        let mut one = simulation(built(vec![upper(), rigid], vec![]), stepping(variant, 2e-3));
         for run in [&mut welded, &mut one] {
             let mut q = Configuration::zero(run.model());
             q.joints[0] = 1.0;
@@ -268,7 +243,7 @@ fn a_polynomial_couples_two_flywheels() {
     let mut gear = closure("gear", LoopKind::Joint, "second", Some("first"));
     gear.polynomial = Some(vec![0.0, 0.5, 0.3, -0.04, 0.002]);
     for variant in VARIANTS {
-        let mut run = simulation(built(wheels(), vec![gear.clone()]), options(1e-3, variant));
+        let mut run = simulation(built(wheels(), vec![gear.clone()]), stepping(variant, 1e-3));
         run.set_joint_torques(&[0.02, 0.0]).unwrap();
         run.step(1500).unwrap();
         let q = joint(&run, "first");
@@ -278,10 +253,7 @@ fn a_polynomial_couples_two_flywheels() {
         assert!((run.v()[1] - slope * run.v()[0]).abs() < 1e-12);
         let inertia = 0.005 * (1.0 + slope * slope);
         let expected = (2.0 * 0.02 * q / inertia).sqrt();
-        assert!(
-            (run.v()[0] - expected).abs() < 1e-4 * expected,
-            "{variant:?}"
-        );
+        near_in(&variant, run.v()[0], expected, 1e-4 * expected);
     }
 }
 
@@ -293,7 +265,7 @@ fn a_joint_that_is_held_bears_its_load() {
     let lock = closure("lock", LoopKind::Joint, "arm", None);
     let mut run = simulation(
         built(vec![arm], vec![lock]),
-        options(5e-3, Variant::Linearised),
+        stepping(Variant::Linearised, 5e-3),
     );
     run.step(100).unwrap();
     assert!(joint(&run, "arm").abs() < 1e-13);
@@ -319,9 +291,9 @@ fn a_body_tied_to_the_world_is_a_pendulum() {
     tie.other_position = Some([0.0; 3]);
     for variant in VARIANTS {
         let model = built(vec![bob(JointKind::Free)], vec![tie.clone()]);
-        let mut tied = simulation(model, options(1e-3, variant));
+        let mut tied = simulation(model, stepping(variant, 1e-3));
         let model = built(vec![bob(JointKind::Spherical)], vec![]);
-        let mut hung = simulation(model, options(1e-3, variant));
+        let mut hung = simulation(model, stepping(variant, 1e-3));
         let begin = energy(&tied);
         tied.step(1500).unwrap();
         hung.step(1500).unwrap();
@@ -344,7 +316,7 @@ fn a_redundant_loop_is_found_and_changes_nothing() {
     let twice = built(solids.clone(), vec![pin, again]);
     assert_eq!(redundant_rows(&twice, &Configuration::zero(&twice)), [1, 3]);
     for variant in VARIANTS {
-        let mut runs = [four_bar(), twice.clone()].map(|m| simulation(m, options(5e-3, variant)));
+        let mut runs = [four_bar(), twice.clone()].map(|m| simulation(m, stepping(variant, 5e-3)));
         for run in &mut runs {
             set_crank(run, 0.4);
             run.step(200).unwrap();
@@ -361,13 +333,10 @@ fn a_linkage_without_freedom_rests() {
     let weld = closure("weld", LoopKind::Weld, "crank", None);
     for variant in VARIANTS {
         let model = built(solids.clone(), vec![pin.clone(), weld.clone()]);
-        let mut run = simulation(model, options(5e-3, variant));
+        let mut run = simulation(model, stepping(variant, 5e-3));
         run.step(400).unwrap();
-        assert!(
-            run.q().joints.iter().all(|q| q.abs() < 1e-12),
-            "{variant:?}"
-        );
-        assert!(run.v().iter().all(|v| v.abs() < 1e-12), "{variant:?}");
+        assert!(largest(&run.q().joints) < 1e-12, "{variant:?}");
+        assert!(largest(run.v()) < 1e-12, "{variant:?}");
     }
 }
 
@@ -378,28 +347,15 @@ fn a_stop_holds_the_whole_linkage() {
     let (mut solids, pin) = four_bar_parts();
     let rocker = four_bar_angles(0.25)[1];
     assert!(rocker < 0.0);
-    solids[2].limits = Some(rover_core::multibody::JointLimits {
-        lower: rocker,
-        upper: 2.0,
-    });
+    solids[2].limits = limits(rocker, 2.0);
     for variant in VARIANTS {
         let model = built(solids.clone(), vec![pin.clone()]);
-        let mut run = simulation(model, options(5e-3, variant));
+        let mut run = simulation(model, stepping(variant, 5e-3));
         run.set_joint_torques(&[20.0, 0.0, 0.0]).unwrap();
         run.step(400).unwrap();
-        assert!(
-            run.v().iter().all(|v| v.abs() < 1e-9),
-            "{variant:?} {:?}",
-            run.v()
-        );
+        assert!(largest(run.v()) < 1e-9, "{variant:?} {:?}", run.v());
         let expected = [0.25, four_bar_angles(0.25)[0], rocker];
-        for (found, expected) in run.q().joints.iter().zip(expected) {
-            assert!(
-                (found - expected).abs() < 1e-6,
-                "{:?} {expected}",
-                run.q().joints
-            );
-        }
+        assert!(apart(&run.q().joints, &expected) < 1e-6);
     }
 }
 

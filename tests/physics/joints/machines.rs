@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use rover_core::geometry::{SphereField, Terrain};
-use rover_core::integrator::{StepOptions, Variant};
+use rover_core::contact::placement::resting_pose;
+use rover_core::geometry::Plane;
+use rover_core::integrator::StepOptions;
 use rover_core::multibody::{
-    Configuration, FORMAT, JointKind, Model, ModelDescription, SolidDescription,
+    Configuration, FORMAT, JointKind, Model, ModelDescription, SolidDescription, coordinates,
 };
 use rover_core::simulation::RoverSimulation;
+
+use crate::shared::{follows, nothing};
 
 /// A solid of 1 kg with a joint; all other fields have their defaults.
 pub fn solid(name: &str, parent: Option<&str>, joint: JointKind) -> SolidDescription {
@@ -45,17 +48,19 @@ pub fn model(solids: Vec<SolidDescription>) -> Model {
     Model::from_description(machine(solids)).unwrap()
 }
 
-/// Ground out of reach.
-fn nothing() -> Arc<dyn Terrain> {
-    Arc::new(SphereField::new(&[[0.0, -1e5, 0.0]], &[1.0], None).unwrap())
-}
-
-pub fn options(time_step: f64, variant: Variant) -> StepOptions {
-    crate::stepping(variant, time_step)
-}
-
 pub fn simulation(model: Model, options: StepOptions) -> RoverSimulation {
     RoverSimulation::new(Arc::new(model), nothing(), options).unwrap()
+}
+
+/// Where a machine rests on level ground.
+pub fn standing(model: &Model) -> Configuration {
+    let q = resting_pose(model, &Plane::ground(), [0.0, 0.0], 0.0).unwrap();
+    coordinates::from_public(model, &q).unwrap()
+}
+
+/// Coordinate of a joint, rad or m.
+pub fn joint(run: &RoverSimulation, name: &str) -> f64 {
+    run.q().joints[run.model().joint_index(name).unwrap()]
 }
 
 /// A generic configuration and velocity: smooth functions of the seed.
@@ -95,11 +100,7 @@ pub fn menagerie(root: JointKind) -> Model {
         solid.centre_of_mass = Some([0.05, -0.1 * x.sin(), 0.08]);
     }
     for (follower, leader, ratio) in [("right", "left", -1.0), ("finger", "arm", 0.4)] {
-        let coupled = rover_core::multibody::CouplingDescription {
-            joint: leader.into(),
-            ratio,
-            offset: 0.2,
-        };
+        let coupled = follows(leader, ratio, 0.2);
         let solid = solids.iter_mut().find(|s| s.name == follower).unwrap();
         solid.coupled = Some(coupled);
     }

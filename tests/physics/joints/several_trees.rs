@@ -3,14 +3,13 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{
     Configuration, JointKind, Model, ModelDescription, SolidDescription, coordinates,
 };
-use rover_core::simulation::RoverSimulation;
 
-use super::machines::{menagerie, model, options, simulation, solid, somewhere};
+use super::machines::{menagerie, model, simulation, solid, somewhere};
+use crate::shared::{VARIANTS, apart, flat, moving, stepping};
 use crate::spheres::sphere_scenes::Random;
 
 /// The solids of a description under other names.
@@ -52,29 +51,23 @@ fn two_trees_move_as_each_alone() {
             }
             q.extend(coordinates::to_public(&model, &start));
             v.extend_from_slice(&rates);
-            let mut run = simulation(model, options(1e-3, Variant::Newton));
+            let mut run = simulation(model, stepping(Variant::Newton, 1e-3));
             run.set_state(start, rates);
             run.step(200).unwrap();
-            ends.extend_from_slice(&run.state().v);
+            ends.extend_from_slice(run.v());
         }
         let start = coordinates::from_public(&both, &q).unwrap();
-        let mut run = simulation(both, options(1e-3, Variant::Newton));
+        let mut run = simulation(both, stepping(Variant::Newton, 1e-3));
         run.set_state(start, v);
         run.step(200).unwrap();
-        for (k, (together, alone)) in run.state().v.iter().zip(&ends).enumerate() {
-            assert!(
-                (together - alone).abs() < 1e-6,
-                "{first:?} {second:?} {k}: {together} {alone}"
-            );
-        }
+        let off = apart(run.v(), &ends);
+        assert!(off < 1e-6, "{first:?} {second:?}: {off}");
     }
 }
 
 /// A stone beside a rover does not affect the rover's fall and drive, and both rest on the ground.
 #[test]
 fn a_stone_lies_beside_a_rover() {
-    use rover_core::geometry::Plane;
-    use std::sync::Arc;
     let mut description = ModelDescription::rover();
     let mut stone = solid("stone", None, JointKind::Free);
     stone.shape = Some(rover_core::multibody::Shape::Box {
@@ -85,25 +78,17 @@ fn a_stone_lies_beside_a_rover() {
     description.solids.push(stone);
     let model = Arc::new(Model::from_description(description).unwrap());
     assert_eq!(model.nv(), 27);
-    let ground = Arc::new(Plane::ground());
-    let mut run = rover_core::simulation::RoverSimulation::new(
-        model.clone(),
-        ground,
-        options(5e-3, Variant::Linearised),
-    )
-    .unwrap();
     let mut q = vec![0.0; 27];
     q[1] = 0.4;
     q[21..24].copy_from_slice(&[0.0, 0.3, 3.0]);
-    run.set_state(coordinates::from_public(&model, &q).unwrap(), vec![0.0; 27]);
+    let start = coordinates::from_public(&model, &q).unwrap();
+    let options = stepping(Variant::Linearised, 5e-3);
+    let mut run = moving(model.clone(), flat(), options, start, vec![0.0; 27]);
     run.set_wheel_torques(&[40.0; 6]).unwrap();
     run.step(600).unwrap();
-    let end = coordinates::to_public(&model, &run.state().configuration);
+    let end = coordinates::to_public(&model, run.q());
     assert!(end[0] > 1.0 && (end[1] - 0.35).abs() < 0.01, "{end:?}");
-    let expected = [0.0, 0.1, 3.0];
-    for (x, y) in end[21..24].iter().zip(expected) {
-        assert!((x - y).abs() < 1e-3, "{end:?}");
-    }
+    assert!(apart(&end[21..24], &[0.0, 0.1, 3.0]) < 1e-3, "{end:?}");
     let on_stone = run
         .contacts()
         .iter()
@@ -116,11 +101,11 @@ fn a_stone_lies_beside_a_rover() {
 fn a_machine_without_any_velocity_is_a_machine() {
     let mut run = simulation(
         model(vec![solid("post", None, JointKind::Fixed)]),
-        options(1e-2, Variant::Linearised),
+        stepping(Variant::Linearised, 1e-2),
     );
     assert_eq!(run.model().nv(), 0);
     run.step(3).unwrap();
-    assert_eq!(run.state().configuration, Configuration::zero(run.model()));
+    assert_eq!(*run.q(), Configuration::zero(run.model()));
 }
 
 /// Boxes with arms between stops, pushed by constant torques, fell in a heap. An audit from outside
@@ -129,10 +114,7 @@ fn a_machine_without_any_velocity_is_a_machine() {
 #[test]
 fn what_the_audit_counts_is_what_an_audit_from_outside_finds() {
     let mut numbers = Random(3);
-    for (scene, variant) in [Variant::Linearised, Variant::Newton]
-        .into_iter()
-        .enumerate()
-    {
+    for (scene, variant) in VARIANTS.into_iter().enumerate() {
         let mut text = String::from("name = \"heap\"\n");
         for k in 0..6 {
             let joint = ["revolute", "prismatic"][(scene + k) % 2];
@@ -148,7 +130,7 @@ fn what_the_audit_counts_is_what_an_audit_from_outside_finds() {
             )
             .unwrap();
         }
-        let model = Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap();
+        let model = crate::shared::model(&text);
         let mut q = coordinates::to_public(&model, &Configuration::zero(&model));
         for (k, own) in q.chunks_exact_mut(7).enumerate() {
             let mut turn = || numbers.between(-0.5, 0.5);
@@ -158,21 +140,17 @@ fn what_the_audit_counts_is_what_an_audit_from_outside_finds() {
         let start = coordinates::from_public(&model, &q).unwrap();
         let torques: Vec<f64> = (0..6).map(|_| numbers.between(-20.0, 20.0)).collect();
         let options = StepOptions {
-            time_step: 0.01,
             friction_coefficient: 0.0,
-            variant,
-            ..StepOptions::default()
+            ..stepping(variant, 0.01)
         };
         let v = vec![0.0; model.nv()];
-        let ground = Arc::new(Plane::ground());
-        let mut heap = RoverSimulation::new(Arc::new(model), ground, options).unwrap();
-        heap.set_state(start, v);
+        let mut heap = moving(model, flat(), options, start, v);
         heap.set_joint_torques(&torques).unwrap();
         let (mut most, mut lifted) = (0, 0.0);
         for step in 0..150 {
-            let (before, places) = (heap.energy(), heap.state().configuration.joints.clone());
+            let (before, places) = (heap.energy(), heap.q().joints.clone());
             let report = heap.step(1).unwrap();
-            let (after, now) = (heap.energy(), &heap.state().configuration.joints);
+            let (after, now) = (heap.energy(), &heap.q().joints);
             let turned = now.iter().zip(&places).map(|(now, then)| now - then);
             let work: f64 = torques
                 .iter()

@@ -3,8 +3,6 @@
 //! Noise stood on W's diagonal there. At a heading of 0.3 rad the wheels got forces of 1e11 N and
 //! were braked to a stop, in steps that had converged.
 
-use std::sync::Arc;
-
 use rover_core::contact::loops::check_closed;
 use rover_core::contact::placement::resting_pose;
 use rover_core::geometry::Plane;
@@ -15,7 +13,7 @@ use rover_core::multibody::{Configuration, LoopDescription, LoopKind, Model, Mod
 use rover_core::multibody::{coordinates, description::WheelDescription};
 use rover_core::simulation::RoverSimulation;
 
-use super::machines::options;
+use crate::shared::{closure, flat, moving, stepping};
 
 /// A cart whose trunk is welded to the world at a heading, lowered by so much, m.
 fn on_stand(change: &dyn Fn(&mut WheelDescription), heading: f64, lower: f64) -> RoverSimulation {
@@ -27,14 +25,10 @@ fn on_stand(change: &dyn Fn(&mut WheelDescription), heading: f64, lower: f64) ->
     let welded = |turn: f64| {
         let mut description = description.clone();
         description.loops.push(LoopDescription {
-            name: "stand".into(),
-            kind: LoopKind::Weld,
-            solid: description.solids[0].name.clone(),
-            other: None,
             position: Some([0.0; 3]),
             other_position: Some([place[0], place[1], place[2]]),
             other_rotation: Some([0.0, turn, 0.0]),
-            polynomial: None,
+            ..closure("stand", LoopKind::Weld, &description.solids[0].name, None)
         });
         let model = Model::from_description(description).unwrap();
         let q = coordinates::from_public(&model, &place).unwrap();
@@ -47,11 +41,7 @@ fn on_stand(change: &dyn Fn(&mut WheelDescription), heading: f64, lower: f64) ->
         .find(is_closed)
         .unwrap();
     let v = vec![0.0; model.nv()];
-    let ground = Arc::new(Plane::ground());
-    let options = options(5e-3, Variant::Linearised);
-    let mut run = RoverSimulation::new(Arc::new(model), ground, options).unwrap();
-    run.set_state(q, v);
-    run
+    moving(model, flat(), stepping(Variant::Linearised, 5e-3), q, v)
 }
 
 fn rigid(wheel: &mut WheelDescription) {

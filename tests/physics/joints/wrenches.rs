@@ -3,15 +3,12 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use rover_core::contact::placement::resting_pose;
-use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{JointKind, Model, coordinates};
-use rover_core::simulation::{CommandError, RoverSimulation};
+use rover_core::multibody::{JointKind, Model};
+use rover_core::simulation::CommandError;
 
-use super::machines::{energy, model, options, simulation, solid};
-
-const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
+use super::machines::{energy, model, simulation, solid, standing};
+use crate::shared::{VARIANTS, flat, moving, near_in, stepping};
 
 /// `v = F t / m − g t`, and about a principal axis `ω = M t / I`; the work is the kinetic energy.
 #[test]
@@ -20,7 +17,7 @@ fn a_free_body_answers_by_mass_and_inertia() {
         let mut body = solid("body", None, JointKind::Free);
         body.mass = 2.0;
         body.inertia = Some([0.1, 0.2, 0.3, 0.0, 0.0, 0.0]);
-        let mut run = simulation(model(vec![body]), options(1e-2, variant));
+        let mut run = simulation(model(vec![body]), stepping(variant, 1e-2));
         run.apply_wrench("body", [3.0, 2.0 * 9.81, 0.0], [0.0, 0.4, 0.0], [0.0; 3])
             .unwrap();
         let report = run.step(100).unwrap();
@@ -50,12 +47,12 @@ fn a_force_on_an_arm_turns_it_as_its_moment_does() {
         model(vec![arm, hand])
     };
     for variant in VARIANTS {
-        let mut pushed = simulation(arm(), options(5e-3, variant));
+        let mut pushed = simulation(arm(), stepping(variant, 5e-3));
         // The point lies 0.2 m along the hand's x, the arm's y.
         pushed
             .apply_wrench("hand", [0.0, 4.0, 1.0], [0.0, 0.0, 0.3], [0.2, 0.0, 0.0])
             .unwrap();
-        let mut held = simulation(arm(), options(5e-3, variant));
+        let mut held = simulation(arm(), stepping(variant, 5e-3));
         held.set_joint_torques(&[4.0 * 0.5 + 0.3]).unwrap();
         for run in [&mut pushed, &mut held] {
             run.step(1).unwrap();
@@ -71,10 +68,7 @@ fn a_force_on_an_arm_turns_it_as_its_moment_does() {
             q = next;
         }
         let gained = energy(&pushed) - before;
-        assert!(
-            (gained - work).abs() < 1e-3 * work.abs().max(1.0),
-            "{gained} {work}"
-        );
+        near_in(&variant, gained, work, 1e-3 * work.abs().max(1.0));
     }
 }
 
@@ -82,14 +76,12 @@ fn a_force_on_an_arm_turns_it_as_its_moment_does() {
 #[test]
 fn a_parked_rover_is_pushed_away_beyond_its_friction() {
     let model = Arc::new(Model::rover());
-    let flat = || Plane::new([0.0, 1.0, 0.0], 0.0).unwrap();
-    let q = resting_pose(&model, &flat(), [0.0, 0.0], 0.0).unwrap();
-    let q = coordinates::from_public(&model, &q).unwrap();
+    let q = standing(&model);
     for (share, moves) in [(0.9, false), (1.1, true)] {
-        let options = options(5e-3, Variant::Linearised);
+        let options = stepping(Variant::Linearised, 5e-3);
         let push = share * options.friction_coefficient * model.mass() * 9.81;
-        let mut run = RoverSimulation::new(model.clone(), Arc::new(flat()), options).unwrap();
-        run.set_state(q.clone(), vec![0.0; model.nv()]);
+        let v = vec![0.0; model.nv()];
+        let mut run = moving(model.clone(), flat(), options, q.clone(), v);
         run.brake();
         run.apply_wrench("trunk", [0.0, 0.0, push], [0.0; 3], [0.0; 3])
             .unwrap();
@@ -112,7 +104,7 @@ fn a_parked_rover_is_pushed_away_beyond_its_friction() {
 fn a_wrench_on_nobody_or_without_numbers_is_refused() {
     let mut run = simulation(
         model(vec![solid("body", None, JointKind::Free)]),
-        options(1e-2, Variant::Linearised),
+        stepping(Variant::Linearised, 1e-2),
     );
     let zero = [0.0; 3];
     assert_eq!(
@@ -143,10 +135,10 @@ fn a_force_at_a_rim_turns_with_its_wheel() {
     let rate = |angle: f64| {
         let options = StepOptions {
             gravity: Vector3::zeros(),
-            ..options(1e-3, Variant::Linearised)
+            ..stepping(Variant::Linearised, 1e-3)
         };
         let mut run = simulation(rover.clone(), options);
-        let mut q = run.state().configuration.clone();
+        let mut q = run.q().clone();
         q.joints[joint] = angle;
         run.set_state(q, vec![0.0; rover.nv()]);
         run.apply_wrench("wheel_FL", [0.0, 1.0, 0.0], [0.0; 3], [0.1, 0.0, 0.0])

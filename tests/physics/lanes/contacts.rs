@@ -24,7 +24,9 @@ use rover_core::multibody::{
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 use rover_core::solver::batch::problem::ContactProblem;
 
-use super::{OverLanes, Random, on_every_register, spread};
+use super::{OverLanes, on_every_register, spread};
+use crate::shared::{Numbers, flat};
+use crate::wheels::wheel_scenes::wide_rover;
 
 const G: f64 = 9.81;
 const THETA: f64 = 0.5;
@@ -338,7 +340,7 @@ fn assert_close(name: &str, a: &[f64], b: &[f64], tolerance: f64) {
 fn rover(
     model: &Model,
     terrain: &Arc<dyn Terrain>,
-    random: &mut Random,
+    random: &mut Numbers,
     depth: f64,
     tilt: f64,
 ) -> Rover {
@@ -389,13 +391,13 @@ fn rocks(seed: u64, abundance: f64) -> Arc<dyn Terrain> {
 /// Grounds of every kind: planes, rocks on a plane, and spheres alone.
 fn grounds() -> Vec<Arc<dyn Terrain>> {
     vec![
-        Arc::new(Plane::ground()),
+        flat(),
         Arc::new(Plane::new([-0.2, 1.0, 0.1], 0.4).unwrap()),
         rocks(1, 0.05),
         rocks(2, 0.2),
         Arc::new(SphereField::rug()),
         Arc::new(SphereField::new(&[], &[], Some(Plane::ground())).unwrap()),
-        super::surfaces::flat(0.3),
+        super::surfaces::level(0.3),
         super::surfaces::hills(0.25, 5),
         super::surfaces::hills_with_rocks(6),
     ]
@@ -438,20 +440,11 @@ fn bits(found: &[Found]) -> Vec<Vec<u64>> {
     found.iter().map(all).collect()
 }
 
-const STEPS: [Step; 3] = [
-    Step {
-        h: 0.005,
-        gamma: 0.5,
-    },
-    Step {
-        h: 0.005,
-        gamma: 1.0,
-    },
-    Step {
-        h: 0.02,
-        gamma: 0.4,
-    },
-];
+const STEPS: [Step; 3] = [step(0.005, 0.5), step(0.005, 1.0), step(0.02, 0.4)];
+
+const fn step(h: f64, gamma: f64) -> Step {
+    Step { h, gamma }
+}
 
 #[test]
 fn contacts_agree_with_those_of_any_machine() {
@@ -461,22 +454,12 @@ fn contacts_agree_with_those_of_any_machine() {
 #[test]
 fn contacts_of_wheels_with_a_width_agree_with_those_of_any_machine() {
     for [width, rounding] in TREADS {
-        contacts_agree(&wide(width, rounding));
+        contacts_agree(&wide_rover(width, rounding));
     }
 }
 
 /// Widths and roundings of a torus, a cylinder and a cylinder with round edges, m.
 const TREADS: [[f64; 2]; 3] = [[0.06, 0.03], [0.1, 0.0], [0.1, 0.03]];
-
-/// The built-in rover on wheels with a width.
-fn wide(width: f64, rounding: f64) -> Model {
-    let mut description = Model::rover().description().clone();
-    for wheel in &mut description.wheels {
-        (wheel.width, wheel.rounding) = (Some(width), Some(rounding));
-        wheel.stiffness = Some(0.0);
-    }
-    Model::from_description(description).unwrap()
-}
 
 /// The built-in rover with a box and a ball below its trunk, which can touch the ground and other
 /// bodies.
@@ -512,7 +495,7 @@ fn contacts_of_boxes_and_balls_agree() {
 
 /// Returns the numbers of contacts by kind.
 fn contacts_agree(model: &Model) -> BTreeMap<&'static str, usize> {
-    let mut random = Random(1);
+    let mut random = Numbers(1);
     let mut kinds = BTreeMap::new();
     for terrain in grounds() {
         for k in 0..40 {
@@ -552,12 +535,12 @@ fn lanes_agree<T: Lane>(token: T::Token) {
     lanes_agree_on::<T>(token, &Model::rover(), &grounds);
     lanes_agree_on::<T>(token, &cluttered(), &grounds);
     for [width, rounding] in TREADS {
-        lanes_agree_on::<T>(token, &wide(width, rounding), &grounds);
+        lanes_agree_on::<T>(token, &wide_rover(width, rounding), &grounds);
     }
 }
 
 fn lanes_agree_on<T: Lane>(token: T::Token, model: &Model, grounds: &[Arc<dyn Terrain>]) {
-    let mut random = Random(2);
+    let mut random = Numbers(2);
     for k in 0..40 {
         let rovers: Vec<Rover> = (0..T::LANES)
             .map(|lane| {
@@ -598,9 +581,8 @@ fn every_lane_has_the_bits_of_a_rover_alone() {
 #[test]
 fn a_trunk_touches_a_rock_no_sooner_than_it_should() {
     let model = Model::rover();
-    let mut random = Random(5);
-    let plane: Arc<dyn Terrain> = Arc::new(Plane::ground());
-    let mut rover = rover(&model, &plane, &mut random, 1e-4, 0.0);
+    let mut random = Numbers(5);
+    let mut rover = rover(&model, &flat(), &mut random, 1e-4, 0.0);
     rover.v.fill(0.0);
     let step = STEPS[2];
     let put = |rover: &mut Rover, y: f64| {
@@ -633,11 +615,11 @@ fn a_trunk_touches_a_rock_no_sooner_than_it_should() {
 #[test]
 fn what_a_search_keeps_does_not_show() {
     let model = Model::rover();
-    let mut random = Random(3);
+    let mut random = Numbers(3);
     for terrain in [
         rocks(3, 0.2),
         Arc::new(SphereField::rug()) as Arc<dyn Terrain>,
-        super::surfaces::flat(0.1),
+        super::surfaces::level(0.1),
         super::surfaces::hills(0.2, 3),
         super::surfaces::hills_with_rocks(4),
     ] {

@@ -4,19 +4,19 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use rover_core::geometry::{Plane, SphereField, Terrain};
-use rover_core::integrator::{StepError, StepOptions, StepReport, moreau_jean::MoreauJean};
-use rover_core::multibody::description::{JointKind, LoopDescription, LoopKind};
+use rover_core::integrator::{StepError, StepOptions, StepReport};
+use rover_core::multibody::description::{JointKind, LoopKind};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
 use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
 use rover_core::simulation::lane_batch::{BatchRover, LaneBatch};
 use rover_core::solver::Method;
 
-use super::Random;
 use super::machines::{equipped, on_a_stand};
 use crate::rover_kinds::{dry, mecanum, tracked, with_a_bar};
+use crate::shared::{Numbers, bits, closure, flat, moving, step_beside_the_general_one};
 
-pub fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
+pub fn rocks(numbers: &mut Numbers) -> Arc<dyn Terrain> {
     let mut centres = Vec::new();
     let mut radii = Vec::new();
     for _ in 0..60 {
@@ -32,7 +32,7 @@ pub fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
 }
 
 /// A rover on its ground: a plane, rocks, a flat map, hills, or hills with rocks.
-fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation {
+fn rover(i: usize, model: &Arc<Model>, numbers: &mut Numbers) -> RoverSimulation {
     with_options(StepOptions::default(), i, model, numbers)
 }
 
@@ -40,29 +40,27 @@ fn with_options(
     options: StepOptions,
     i: usize,
     model: &Arc<Model>,
-    numbers: &mut Random,
+    numbers: &mut Numbers,
 ) -> RoverSimulation {
     let terrain: Arc<dyn Terrain> = match i % 7 {
         6 => super::surfaces::hills(0.02, i as u64),
-        1 => super::surfaces::flat(0.25),
+        1 => super::surfaces::level(0.25),
         3 => super::surfaces::hills(0.15, i as u64),
         4 => super::surfaces::hills_with_rocks(i as u64),
         2 | 5 => rocks(numbers),
-        _ => Arc::new(Plane::ground()),
+        _ => flat(),
     };
     let options = StepOptions {
         friction_coefficient: 0.6 + 0.2 * numbers.next(),
         ..options
     };
-    let mut rover = RoverSimulation::new(Arc::clone(model), terrain, options).unwrap();
     let mut start = Configuration::zero(model);
     start.position.y = 0.45 + 0.1 * numbers.next();
     let v = (0..model.nv()).map(|_| 0.3 * numbers.next()).collect();
-    rover.set_state(start, v);
-    rover
+    moving(Arc::clone(model), terrain, options, start, v)
 }
 
-pub fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
+pub fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Numbers) {
     let model = Arc::clone(rover.model());
     let wheels = model.wheels().iter();
     let torques: Vec<f64> = wheels.map(|_| torque * numbers.next()).collect();
@@ -72,17 +70,12 @@ pub fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
 }
 
 pub fn assert_alike(a: &RoverSimulation, b: &RoverSimulation) {
-    let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(a.v()), bits(b.v()));
-    assert_eq!(bits(&a.q().joints), bits(&b.q().joints));
-    assert_eq!(
-        bits(a.q().position.as_slice()),
-        bits(b.q().position.as_slice())
-    );
-    assert_eq!(
-        bits(a.q().attitude.coords.as_slice()),
-        bits(b.q().attitude.coords.as_slice())
-    );
+    let (p, q) = (a.q(), b.q());
+    assert_eq!(bits(&p.joints), bits(&q.joints));
+    assert_eq!(bits(p.position.as_slice()), bits(q.position.as_slice()));
+    let turns = [p, q].map(|q| bits(q.attitude.coords.as_slice()));
+    assert_eq!(turns[0], turns[1]);
     assert_eq!(a.contacts(), b.contacts());
     assert_eq!(a.last_call(), b.last_call());
     assert_eq!(a.motor_torques(), b.motor_torques());
@@ -131,29 +124,31 @@ fn models() -> Vec<Arc<Model>> {
 /// loop, and a mast that is tied to the trunk, once more than needed.
 fn linked() -> ModelDescription {
     let mut own = equipped();
-    let closure = |name: &str, kind, solid: &str, other: &str| LoopDescription {
-        name: name.into(),
-        kind,
-        solid: solid.into(),
-        other: Some(other.into()),
-        position: None,
-        other_position: None,
-        other_rotation: None,
-        polynomial: (kind == LoopKind::Joint).then(|| vec![0.0, -0.8, 0.2]),
-    };
+    let mut bogies = closure("bogies", LoopKind::Joint, "left_bogie", Some("right_bogie"));
+    bogies.polynomial = Some(vec![0.0, -0.8, 0.2]);
     own.loops = vec![
-        closure("bogies", LoopKind::Joint, "left_bogie", "right_bogie"),
-        closure("mast", LoopKind::Weld, "mast", "trunk"),
-        closure("bob", LoopKind::Connect, "bob", "trunk"),
+        bogies,
+        closure("mast", LoopKind::Weld, "mast", Some("trunk")),
+        closure("bob", LoopKind::Connect, "bob", Some("trunk")),
     ];
     own
 }
 
 /// Drives rovers of a model in a batch and alone, with 8 commands.
 fn drive(instructions: Instructions, model: &Arc<Model>, n: usize, torque: f64, seed: u64) {
-    let mut numbers = Random(seed);
+    let mut numbers = Numbers(seed);
     let rovers = (0..n).map(|i| rover(i, model, &mut numbers)).collect();
     drive_all(instructions, rovers, (8, torque), &mut numbers);
+}
+
+/// Takes ten steps of a batch: the error of each rover.
+pub fn advance(batch: &mut LaneBatch, rovers: &mut [RoverSimulation]) -> Vec<Option<StepError>> {
+    let mut errors: Vec<Option<StepError>> = vec![None; rovers.len()];
+    let mut entries: Vec<BatchRover<'_>> = (rovers.iter_mut().zip(&mut errors))
+        .map(|(rover, error)| BatchRover { rover, error })
+        .collect();
+    batch.advance(&mut entries, 10, &mut || true);
+    errors
 }
 
 /// Drives rovers of one model in a batch and alone, with so many commands of at most that torque.
@@ -161,25 +156,19 @@ pub fn drive_all(
     instructions: Instructions,
     mut together: Vec<RoverSimulation>,
     (n_commands, torque): (usize, f64),
-    numbers: &mut Random,
+    numbers: &mut Numbers,
 ) {
-    let n = together.len();
     let mut alone = together.clone();
     let mut batch = LaneBatch::new(instructions);
     for _ in 0..n_commands {
         for (a, b) in together.iter_mut().zip(&mut alone) {
-            let mut same = Random(numbers.0);
+            let mut same = Numbers(numbers.0);
             command(a, torque, numbers);
             command(b, torque, &mut same);
         }
-        let mut errors: Vec<Option<StepError>> = vec![None; n];
-        let mut entries: Vec<BatchRover<'_>> = (together.iter_mut().zip(&mut errors))
-            .map(|(rover, error)| BatchRover { rover, error })
-            .collect();
-        batch.advance(&mut entries, 10, &mut || true);
-        for (k, (a, b)) in together.iter().zip(&mut alone).enumerate() {
-            let error = b.step(10).err();
-            assert_eq!(error.is_some(), errors[k].is_some());
+        let errors = advance(&mut batch, &mut together);
+        for ((a, b), error) in together.iter().zip(&mut alone).zip(errors) {
+            assert_eq!(b.step(10).is_err(), error.is_some());
             assert_alike(a, b);
         }
     }
@@ -197,7 +186,7 @@ fn explained(report: &StepReport) -> f64 {
 #[test]
 fn the_entries_of_a_report_add_up_to_the_change_of_the_energy() {
     for (model, seed) in models().iter().zip(0..) {
-        let mut numbers = Random(seed);
+        let mut numbers = Numbers(seed);
         let mut rovers: Vec<_> = (0..7).map(|i| rover(i, model, &mut numbers)).collect();
         let mut batch = LaneBatch::new(Instructions::of_this_machine());
         let mut before: Vec<Option<f64>> = vec![None; rovers.len()];
@@ -206,11 +195,7 @@ fn the_entries_of_a_report_add_up_to_the_change_of_the_energy() {
             for own in &mut rovers {
                 command(own, 60.0, &mut numbers);
             }
-            let mut errors: Vec<Option<StepError>> = vec![None; rovers.len()];
-            let mut entries: Vec<BatchRover<'_>> = (rovers.iter_mut().zip(&mut errors))
-                .map(|(rover, error)| BatchRover { rover, error })
-                .collect();
-            batch.advance(&mut entries, 10, &mut || true);
+            let errors = advance(&mut batch, &mut rovers);
             for ((own, before), error) in rovers.iter().zip(&mut before).zip(&errors) {
                 let (energy, report) = (own.energy(), own.last_report());
                 let size = energy.kinetic + energy.potential.abs() + report.energy_supplied.abs();
@@ -238,7 +223,7 @@ fn a_rover_restored_on_a_height_map_goes_on_to_the_bit() {
     for (k, own) in models().iter().enumerate().step_by(2) {
         for ground in [3, 4, 6] {
             for method in [Method::Auto, Method::Newton] {
-                let mut numbers = Random((10 * k + ground) as u64);
+                let mut numbers = Numbers((10 * k + ground) as u64);
                 let mut options = StepOptions::default();
                 options.solver.method = method;
                 let mut own = with_options(options, ground, own, &mut numbers);
@@ -263,7 +248,7 @@ fn a_rover_restored_on_a_height_map_goes_on_to_the_bit() {
 
 /// Rovers on cylinders among rocks, whose wheels lift and meet two things at once, so that the
 /// places of their contacts come and go.
-fn on_cylinders(n: usize, width: f64, numbers: &mut Random) -> Vec<RoverSimulation> {
+fn on_cylinders(n: usize, width: f64, numbers: &mut Numbers) -> Vec<RoverSimulation> {
     let mut wide = ModelDescription::rover();
     for wheel in &mut wide.wheels {
         (wheel.width, wheel.contact_radius) = (Some(width), Some(0.2));
@@ -275,7 +260,7 @@ fn on_cylinders(n: usize, width: f64, numbers: &mut Random) -> Vec<RoverSimulati
 /// A thread steps rovers of two machines in turn, with the same lanes of its solver.
 #[test]
 fn rovers_of_one_machine_do_not_feel_those_of_another() {
-    let mut numbers = Random(3);
+    let mut numbers = Numbers(3);
     let mut teams = [0.15, 0.10].map(|width| on_cylinders(16, width, &mut numbers));
     let mut batch = LaneBatch::new(Instructions::of_this_machine());
     for _ in 0..6 {
@@ -284,11 +269,7 @@ fn rovers_of_one_machine_do_not_feel_those_of_another() {
                 command(own, 60.0, &mut numbers);
             }
             let mut alone = team.clone();
-            let mut errors: Vec<Option<StepError>> = vec![None; team.len()];
-            let mut entries: Vec<BatchRover<'_>> = (team.iter_mut().zip(&mut errors))
-                .map(|(rover, error)| BatchRover { rover, error })
-                .collect();
-            batch.advance(&mut entries, 10, &mut || true);
+            advance(&mut batch, team);
             for (own, alone) in team.iter().zip(&mut alone) {
                 alone.step(10).unwrap();
                 assert_alike(own, alone);
@@ -337,7 +318,7 @@ fn bounce_turn_and_are_pushed(n_commands: usize) {
     ];
     let on_stands = on_stands.map(|own| Arc::new(Model::from_description(own).unwrap()));
     for (model, seed) in models().iter().chain(&on_stands).zip(300..) {
-        let mut numbers = Random(seed);
+        let mut numbers = Numbers(seed);
         let options = StepOptions {
             restitution: 0.5,
             warm_start: seed % 3 > 0,
@@ -387,7 +368,7 @@ fn give_the_same_bits(n_commands: usize) {
     let models = models();
     for instructions in Instructions::all_of_this_machine() {
         for (model, seed) in models.iter().zip(0..) {
-            let mut numbers = Random(seed);
+            let mut numbers = Numbers(seed);
             let rovers = (0..8).map(|i| rover(i, model, &mut numbers)).collect();
             drive_all(instructions, rovers, (n_commands, 60.0), &mut numbers);
         }
@@ -405,7 +386,7 @@ fn the_quick_step_obeys_the_law_of_the_general_one() {
 }
 
 fn obeys_the_law_of_the_general_step(model: &Arc<Model>) {
-    let mut numbers = Random(11);
+    let mut numbers = Numbers(11);
     let (mut worst, mut unsolved) = (Vec::new(), 0);
     for i in 0..6 {
         let mut own = rover(i, model, &mut numbers);
@@ -413,11 +394,9 @@ fn obeys_the_law_of_the_general_step(model: &Arc<Model>) {
         for _ in 0..10 {
             command(&mut own, 30.0, &mut numbers);
             for _ in 0..10 {
-                let mut general = own.clone();
-                general.step_with(&MoreauJean, 1).unwrap();
-                unsolved += usize::from(!own.step(1).unwrap().is_converged());
-                let difference = own.v().iter().zip(general.v()).map(|(a, b)| (a - b).abs());
-                worst.push(difference.fold(0.0, f64::max));
+                let (report, difference) = step_beside_the_general_one(&mut own);
+                unsolved += usize::from(!report.is_converged());
+                worst.push(difference);
             }
         }
     }

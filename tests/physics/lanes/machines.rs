@@ -4,18 +4,18 @@ use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::contact::Part;
-use rover_core::geometry::{Plane, Terrain};
+use rover_core::geometry::Terrain;
 use rover_core::integrator::moreau_jean::MoreauJean;
-use rover_core::integrator::{Phase, Probe, StepOptions};
+use rover_core::integrator::{Phase, Probe, StepOptions, StepReport, Variant};
 use rover_core::law::materials::{MaterialPair, Materials};
-use rover_core::multibody::description::{
-    CouplingDescription, JointKind, JointLimits, SolidDescription, Spring,
-};
+use rover_core::multibody::description::{JointKind, SolidDescription};
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription, Motor};
-use rover_core::simulation::RoverSimulation;
 use rover_core::solver::Method;
 
-use super::Random;
+use crate::shared::{
+    Numbers, apart, flat, follows, limits, moving, quantile, resting, spring,
+    step_beside_the_general_one, stepping,
+};
 
 /// The built-in rover with springs, dampers, rotors, stops and motors, a mast that slides, a ball
 /// joint, and joints that follow another one beside and below it.
@@ -34,16 +34,10 @@ pub fn equipped() -> ModelDescription {
     };
     for body in &mut rover.solids {
         if body.name == "front_axle" {
-            body.spring = Some(Spring {
-                stiffness: 900.0,
-                rest: 0.02,
-            });
+            body.spring = spring(900.0, 0.02);
             body.damping = Some(40.0);
             body.armature = Some(3.0);
-            body.limits = Some(JointLimits {
-                lower: -0.06,
-                upper: 0.06,
-            });
+            body.limits = limits(-0.06, 0.06);
         } else if body.name.ends_with("bogie") {
             body.damping = Some(5.0);
         } else if body.name.starts_with("wheel") {
@@ -57,25 +51,12 @@ pub fn equipped() -> ModelDescription {
             regenerating: wheel.name.starts_with('F'),
         });
     }
-    let follow = |joint: &str, ratio| {
-        Some(CouplingDescription {
-            joint: joint.into(),
-            ratio,
-            offset: 0.1,
-        })
-    };
     rover.solids.extend([
         SolidDescription {
             axis: Some([0.1, 1.0, 0.0]),
-            spring: Some(Spring {
-                stiffness: 6e3,
-                rest: 0.0,
-            }),
+            spring: spring(6e3, 0.0),
             damping: Some(60.0),
-            limits: Some(JointLimits {
-                lower: -0.035,
-                upper: 0.02,
-            }),
+            limits: limits(-0.035, 0.02),
             ..solid("mast", "trunk", JointKind::Prismatic, [0.3, 0.3, 0.0])
         },
         SolidDescription {
@@ -84,12 +65,12 @@ pub fn equipped() -> ModelDescription {
         },
         SolidDescription {
             axis: Some([0.0, 0.0, 1.0]),
-            coupled: follow("mast", 4.0),
+            coupled: Some(follows("mast", 4.0, 0.1)),
             ..solid("flag", "mast", JointKind::Revolute, [0.0, 0.1, 0.0])
         },
         SolidDescription {
             axis: Some([1.0, 0.0, 0.2]),
-            coupled: follow("front_axle", -0.7),
+            coupled: Some(follows("front_axle", -0.7, 0.1)),
             ..solid("balance", "trunk", JointKind::Revolute, [-0.4, 0.2, 0.0])
         },
     ]);
@@ -122,6 +103,14 @@ struct Met {
     differences: Vec<f64>,
 }
 
+/// Height of the lowest point of the wheels at the zero of all coordinates, m.
+fn lowest_of_wheels(model: &Model) -> f64 {
+    let kinematics = Kinematics::of(model, &Configuration::zero(model));
+    let wheels = model.wheels().iter();
+    let lowest = wheels.map(|wheel| kinematics.point(wheel.body, &wheel.centre).y - wheel.radius);
+    lowest.fold(f64::INFINITY, f64::min)
+}
+
 /// Drives a machine that is let go `height` above the plane, m, and pushed about by forces of up to
 /// `push` times its weight. It begins to turn, and its wheels to spin, with up to `spin` rad/s
 /// about every axis. Commands are of ten steps.
@@ -131,19 +120,12 @@ fn drive(
     [height, push, spin]: [f64; 3],
     n_commands: usize,
 ) -> Met {
-    let mut numbers = Random(5);
+    let mut numbers = Numbers(5);
     let mass: f64 = model.bodies().iter().map(|body| body.mass).sum();
     let weight = mass * options.gravity.norm();
-    let ground = Arc::new(Plane::ground());
-    let mut rover = RoverSimulation::new(Arc::clone(model), ground, options).unwrap();
     let mut start = Configuration::zero(model);
-    let wheels = model.wheels().iter();
-    let lowest = wheels.map(|wheel| {
-        let kinematics = rover.kinematics();
-        kinematics.point(wheel.body, &wheel.centre).y - wheel.radius
-    });
     if model.is_free() {
-        start.position.y = height - lowest.fold(f64::INFINITY, f64::min);
+        start.position.y = height - lowest_of_wheels(model);
     }
     let mut v = vec![0.0; model.nv()];
     let wheels = model.wheels().iter().filter_map(|wheel| wheel.joint);
@@ -152,7 +134,7 @@ fn drive(
     for k in turns.chain(wheels) {
         v[k] = spin * numbers.next();
     }
-    rover.set_state(start, v);
+    let mut rover = moving(Arc::clone(model), flat(), options, start, v);
     let mut met = Met::default();
     for _ in 0..n_commands {
         let wheels = model.wheels().iter();
@@ -194,8 +176,7 @@ fn drive(
                 assert!(stop.impulse[0] >= 0.0 && stop.impulse[1..] == [0.0; 2]);
                 assert_eq!(stop.velocity[1..], [0.0; 2]);
             }
-            let pairs = rover.v().iter().zip(general.v());
-            let difference = pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            let difference = apart(rover.v(), general.v());
             met.differences.push(difference);
             let (own, other) = (report, general.last_report());
             if difference < 1e-9 {
@@ -203,22 +184,22 @@ fn drive(
                 assert_eq!(rover.contacts().len(), general.contacts().len());
             }
             if difference < 1e-11 && !is_general {
-                let energies = [
-                    (own.energy_supplied, other.energy_supplied),
-                    (own.energy_dissipated, other.energy_dissipated),
-                    (own.energy_removed, other.energy_removed),
-                    (own.energy_lifted, other.energy_lifted),
-                    (own.energy_released, other.energy_released),
-                ];
-                for (own, other) in energies {
-                    assert!((own - other).abs() < 1e-6, "{own} {other}");
-                }
+                let energies = |report: &StepReport| {
+                    [
+                        report.energy_supplied,
+                        report.energy_dissipated,
+                        report.energy_removed,
+                        report.energy_lifted,
+                        report.energy_released,
+                        report.residual,
+                    ]
+                };
+                let (own_parts, others) = (energies(&own), energies(other));
+                assert!(apart(&own_parts, &others) < 1e-6, "{own:?} {other:?}");
                 met.corrected += usize::from(own.residual > 1e-6);
-                assert!((own.residual - other.residual).abs() < 1e-6);
             }
         }
     }
-    met.differences.sort_by(f64::total_cmp);
     met
 }
 
@@ -233,27 +214,25 @@ fn every_joint_and_force_obeys_the_law_of_the_general_step() {
         let name = description.name.clone();
         let model = Arc::new(Model::from_description(description).unwrap());
         for h in [0.005, 0.02] {
-            let options = StepOptions {
-                time_step: h,
-                ..StepOptions::default()
-            };
+            let options = stepping(Variant::default(), h);
             let met = drive(&model, options, [0.03, 0.0, 0.0], 60);
-            let Met {
-                steps,
-                general,
-                retaken,
-                stops,
-                ..
-            } = met;
+            let general = met.general * 6;
             assert!(
-                general * 6 < steps,
-                "{name}: {general} of {steps} are general"
+                general < met.steps,
+                "{name}: {} of {}",
+                met.general,
+                met.steps
             );
             // A few friction problems have several answers.
-            let typical = met.differences[steps * 95 / 100];
+            let typical = quantile(met.differences, 95);
             assert!(typical < 1e-9, "{name} {h}: {typical:e}");
             if name == "rover" {
-                assert!(retaken > 5 && stops > 100, "{retaken} {stops}");
+                assert!(
+                    met.retaken > 5 && met.stops > 100,
+                    "{} {}",
+                    met.retaken,
+                    met.stops
+                );
             }
         }
     }
@@ -327,7 +306,7 @@ fn rebounds_and_the_rest_obey(names: &[&str], n_commands: usize) {
             let is_hard = start[2] > 0.0 || options.solver.method != Method::Auto;
             let most = if is_hard { steps / 2 } else { steps / 6 };
             assert!(general < most, "{name} {options:?}: {general}");
-            let typical = met.differences[steps * 9 / 10];
+            let typical = quantile(met.differences, 90);
             assert!(typical < 1e-9, "{name} {options:?}: {typical:e}");
         }
     }
@@ -343,10 +322,7 @@ pub fn on_a_stand(
     let root = &mut own.solids[0];
     (root.joint, root.axis, root.position) = (Some(kind), axis, Some([0.0; 3]));
     let model = Model::from_description(own.clone()).unwrap();
-    let kinematics = Kinematics::of(&model, &Configuration::zero(&model));
-    let wheels = model.wheels().iter();
-    let lowest = wheels.map(|wheel| kinematics.point(wheel.body, &wheel.centre).y - wheel.radius);
-    let lowest = lowest.fold(f64::INFINITY, f64::min);
+    let lowest = lowest_of_wheels(&model);
     own.solids[0].position = Some([0.0, 1e-3 - lowest, 0.0]);
     own
 }
@@ -370,14 +346,13 @@ fn machines_on_stands_obey_the_law_of_the_general_step() {
             general * 6 < steps && met.stops > 100,
             "{kind:?}: {general}"
         );
-        let typical = met.differences[steps * 9 / 10];
+        let typical = quantile(met.differences, 90);
         // On a slide wheels push against each other sideways, by what W's rounding says.
-        let most = if kind == JointKind::Prismatic {
-            1e-6
-        } else {
-            1e-9
-        };
-        assert!(typical < most, "{kind:?}: {typical:e}");
+        let is_slide = kind == JointKind::Prismatic;
+        assert!(
+            typical < if is_slide { 1e-6 } else { 1e-9 },
+            "{kind:?}: {typical:e}"
+        );
     }
 }
 
@@ -393,11 +368,11 @@ fn bodies_on_the_ground_obey_the_law_of_the_general_step() {
         restitution: 0.0,
     }]);
     let grounds: [Arc<dyn Terrain>; 3] = [
-        Arc::new(Plane::ground()),
+        flat(),
         super::surfaces::hills(0.25, 3),
         super::surfaces::hills_with_rocks(4),
     ];
-    let mut numbers = Random(9);
+    let mut numbers = Numbers(9);
     let (mut steps, mut fallbacks, mut boxes, mut pairs) = (0, 0, 0, 0);
     let mut differences = Vec::new();
     for (k, ground) in grounds.iter().cycle().take(9).enumerate() {
@@ -415,24 +390,18 @@ fn bodies_on_the_ground_obey_the_law_of_the_general_step() {
             },
             ..StepOptions::default()
         };
-        let mut rover =
-            RoverSimulation::new(Arc::clone(&model), Arc::clone(ground), options).unwrap();
         let mut start = Configuration::zero(&model);
         start.position.y = 0.6;
         let turn = [3.1, 1.5, 2.8][k / 3];
         start.attitude = UnitQuaternion::from_scaled_axis(Vector3::x() * turn);
-        rover.set_state(
-            start,
-            (0..model.nv()).map(|_| 0.5 * numbers.next()).collect(),
-        );
+        let v = (0..model.nv()).map(|_| 0.5 * numbers.next()).collect();
+        let mut rover = moving(model, Arc::clone(ground), options, start, v);
         for step in 0..200 {
             if step % 20 == 0 {
                 let torques: Vec<f64> = (0..6).map(|_| 60.0 * numbers.next()).collect();
                 rover.set_commands(&torques, &[0.0; 6]).unwrap();
             }
-            let mut general = rover.clone();
-            general.step_with(&MoreauJean, 1).unwrap();
-            let report = rover.step(1).unwrap();
+            let (report, difference) = step_beside_the_general_one(&mut rover);
             steps += 1;
             fallbacks += report.fallbacks;
             let kinds = rover.contacts().iter().map(|a| a.contact);
@@ -441,18 +410,16 @@ fn bodies_on_the_ground_obey_the_law_of_the_general_step() {
                 .filter(|c| matches!(c.part, Part::Box(_)))
                 .count();
             pairs += kinds.filter(|c| c.other.is_some()).count();
-            let both = rover.v().iter().zip(general.v());
-            differences.push(both.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())));
+            differences.push(difference);
         }
     }
-    differences.sort_by(f64::total_cmp);
     assert!(fallbacks * 10 < steps, "{fallbacks} of {steps}");
     assert!(
         boxes > 1000 && pairs > 100,
         "{boxes} contacts of boxes, {pairs} of pairs"
     );
     // A few friction problems have several answers.
-    let typical = differences[steps * 90 / 100];
+    let typical = quantile(differences, 90);
     assert!(typical < 1e-9, "{typical:e}");
 }
 
@@ -465,17 +432,11 @@ fn a_machine_may_have_any_number_of_stops() {
     description.solids.extend((0..40).map(|i| SolidDescription {
         name: format!("arm {i}"),
         mass: 0.1,
-        limits: Some(JointLimits {
-            lower: -1.0,
-            upper: 1.0,
-        }),
+        limits: limits(-1.0, 1.0),
         ..template.clone()
     }));
     let model = Arc::new(Model::from_description(description).unwrap());
     for (n_bent, has_fallbacks) in [(5, false), (40, true)] {
-        let plane = Arc::new(Plane::ground());
-        let options = StepOptions::default();
-        let mut rover = RoverSimulation::new(Arc::clone(&model), plane, options).unwrap();
         let mut start = Configuration::zero(&model);
         start.position.y = 5.0;
         let mut v = vec![0.0; model.nv()];
@@ -484,7 +445,7 @@ fn a_machine_may_have_any_number_of_stops() {
             start.joints[joint] = 0.999;
             v[model.joint_velocity(joint)] = 1.0;
         }
-        rover.set_state(start, v);
+        let mut rover = moving(Arc::clone(&model), flat(), StepOptions::default(), start, v);
         let report = rover.step(1).unwrap();
         assert_eq!(rover.contacts().len(), n_bent);
         assert!(report.is_converged());
@@ -497,8 +458,7 @@ fn a_machine_may_have_any_number_of_stops() {
 /// at the same load.
 #[test]
 fn impulses_are_remembered_by_contact() {
-    let (model, plane) = (Arc::new(Model::rover()), Arc::new(Plane::ground()));
-    let mut rover = RoverSimulation::new(model, plane, StepOptions::default()).unwrap();
+    let mut rover = resting(Model::rover(), flat(), StepOptions::default(), |_| ());
     rover.set_wheel_torques(&[5.0; 6]).unwrap();
     rover.step(200).unwrap();
     let known = rover.snapshot();

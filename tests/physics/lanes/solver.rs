@@ -1,19 +1,16 @@
 //! The solver over lanes: its answers obey the law, and no lane's bits depend on its neighbours.
 
-use std::sync::Arc;
-
 use proptest::prelude::*;
-use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, UnilateralContact};
-use rover_core::multibody::{Configuration, Model};
+use rover_core::multibody::Model;
 use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
 use rover_core::scalar::{Lane, Single};
-use rover_core::simulation::RoverSimulation;
 use rover_core::solver::SolverOptions;
 use rover_core::solver::batch::problem::{ContactProblem, MAX_DENSE, block};
 use rover_core::solver::batch::queue::{MAX_ITERATIONS, Queue};
 
 use super::{OverLanes, on_every_register};
+use crate::shared::{flat, resting};
 
 /// `W` as a whole, row-major.
 fn operator(problem: &ContactProblem) -> Vec<f64> {
@@ -185,13 +182,9 @@ fn drive(largest: f64, steps: usize) -> Vec<ContactProblem> {
 /// The same of a model whose trunk starts at a height of `height`, m.
 fn drive_of(model: Model, height: f64, largest: f64, steps: usize) -> Vec<ContactProblem> {
     let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
-    let model = Arc::new(model);
-    let mut start = Configuration::zero(&model);
-    start.position.y = height;
-    let ground = Arc::new(Plane::ground());
-    let mut simulation = RoverSimulation::new(model.clone(), ground, StepOptions::default())
-        .expect("the default options are sound");
-    simulation.set_state(start, vec![0.0; model.nv()]);
+    let mut simulation = resting(model, flat(), StepOptions::default(), |q| {
+        q.position.y = height;
+    });
     simulation.step(100).expect("steps at rest");
     let mut problems = Vec::new();
     for step in 0..steps {

@@ -22,7 +22,7 @@ fn map(spacing: f64, height: impl Fn(f64, f64) -> f64) -> Arc<HeightField> {
     Arc::new(HeightField::new(heights, [n, n], [spacing; 2], [low; 2]).unwrap())
 }
 
-pub fn flat(spacing: f64) -> Arc<dyn Terrain> {
+pub fn level(spacing: f64) -> Arc<dyn Terrain> {
     map(spacing, |_, _| 0.0)
 }
 

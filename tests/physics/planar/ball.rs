@@ -3,11 +3,14 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::SVector;
-use rover_core::integrator::{StepOptions, Variant};
+use rover_core::integrator::Variant;
 use rover_core::planar::{Line, PlanarBall, Polyline, Sine, Spline};
 use rover_core::simulation::PlanarSimulation;
 
-use super::scenes::{G, VARIANTS, ball_on, count, level, options, speed};
+use super::scenes::{
+    G, VARIANTS, at_rest, count, incline, level, options, options_of, placed, speed,
+};
+use crate::shared::{near, near_in};
 
 fn disc() -> PlanarBall {
     // A homogeneous disc: J = m r²/2.
@@ -21,10 +24,8 @@ fn a_bouncing_ball_rests_at_the_zeno_time() {
     let zeno = (2.0 * height / G).sqrt() * (1.0 + e) / (1.0 - e);
     let mut errors = Vec::new();
     for h in [1e-3, 1e-4] {
-        let mut simulation = ball_on(level(), disc(), options(G, 0.5, e, h));
-        simulation
-            .set_state(&[0.0, 0.3 + height, 0.0], &[0.0; 3])
-            .unwrap();
+        let q = [0.0, 0.3 + height, 0.0];
+        let mut simulation = at_rest(level(), disc(), options(G, 0.5, e, h), q);
         let mut last_move = 0.0;
         while simulation.time() < 3.0 {
             simulation.step(1).unwrap();
@@ -46,23 +47,15 @@ fn bounces_without_loss_keep_the_energy_to_rounding() {
     // θ = ½, e = 1: in the step of an impact the position stays and the velocity is reflected.
     for variant in VARIANTS {
         for slope in [0.0, -0.3] {
-            let options = StepOptions {
-                variant,
-                ..options(G, 0.0, 1.0, 1e-3)
-            };
-            let mut simulation = ball_on(Line::new(slope, 0.0).unwrap(), disc(), options);
-            simulation
-                .set_state(&[0.0, 1.5, 0.0], &[0.4, 0.0, 1.0])
-                .unwrap();
+            let options = options_of(variant, G, 0.0, 1.0, 1e-3);
+            let q = [0.0, 1.5, 0.0];
+            let v = [0.4, 0.0, 1.0];
+            let mut simulation = placed(Line::new(slope, 0.0).unwrap(), disc(), options, q, v);
             let before = simulation.energy().total();
             simulation.step(20_000).unwrap();
             let after = simulation.energy();
             let scale = after.kinetic + before.abs();
-            assert!(
-                (after.total() - before).abs() < 1e-11 * scale,
-                "{variant:?} {slope}: {}",
-                after.total() - before
-            );
+            near_in(&(variant, slope), after.total(), before, 1e-11 * scale);
         }
     }
 }
@@ -78,22 +71,14 @@ fn a_ball_rolls_down_a_line_at_the_closed_form() {
             (0.9 * limit, G * (alpha.sin() - 0.9 * limit * alpha.cos())),
         ] {
             for variant in VARIANTS {
-                let options = StepOptions {
-                    variant,
-                    ..options(G, mu, 0.0, 5e-3)
-                };
-                let mut simulation = ball_on(Line::new(-alpha.tan(), 0.0).unwrap(), ball, options);
-                simulation
-                    .set_state(&[0.0, 0.3 / alpha.cos(), 0.0], &[0.0; 3])
-                    .unwrap();
+                let options = options_of(variant, G, mu, 0.0, 5e-3);
+                let q = [0.0, 0.3 / alpha.cos(), 0.0];
+                let mut simulation = at_rest(incline(-alpha), ball, options, q);
                 let report = simulation.step(400).unwrap();
                 assert!(report.is_converged());
                 let speed = simulation.v()[0].hypot(simulation.v()[1]);
                 let expected = 2.0 * acceleration;
-                assert!(
-                    (speed - expected).abs() < 1e-10 * expected,
-                    "{alpha} {mu}: {speed} {expected}"
-                );
+                near_in(&(alpha, mu), speed, expected, 1e-10 * expected);
                 // The position is that of constant acceleration to
                 // rounding: ½ a t² = a h Σ (k − ½) h.
                 let way = simulation.q()[0].hypot(simulation.q()[1] - 0.3 / alpha.cos());
@@ -113,10 +98,9 @@ fn a_sliding_ball_rolls_when_and_as_fast_as_the_closed_form_says() {
         let rolling = v0 / (1.0 + ratio);
         let time = v0 / (mu * G * (1.0 + 1.0 / ratio));
         for h in [5e-3, 1e-3] {
-            let mut simulation = ball_on(level(), ball, options(G, mu, 0.0, h));
-            simulation
-                .set_state(&[0.0, 0.3, 0.0], &[v0, 0.0, 0.0])
-                .unwrap();
+            let q = [0.0, 0.3, 0.0];
+            let v = [v0, 0.0, 0.0];
+            let mut simulation = placed(level(), ball, options(G, mu, 0.0, h), q, v);
             let mut began = None;
             while simulation.time() < 2.0 {
                 simulation.step(1).unwrap();
@@ -127,11 +111,7 @@ fn a_sliding_ball_rolls_when_and_as_fast_as_the_closed_form_says() {
             }
             let began = began.unwrap();
             assert!(began >= time - 1e-9 && began <= time + h, "{began} {time}");
-            assert!(
-                (simulation.v()[0] - rolling).abs() < 1e-12,
-                "{}",
-                simulation.v()[0]
-            );
+            near(simulation.v()[0], rolling, 1e-12);
         }
     }
 }
@@ -141,10 +121,8 @@ fn a_ball_in_a_valley_narrower_than_itself_rests_on_two_points() {
     // y = sin x has radius of curvature 1 at its bottom, the ball 1.5.
     let ball = PlanarBall::new(3.0, 1.5, 3.375).unwrap();
     let sine = Sine::new(1.0, TAU, 0.0, 0.0).unwrap();
-    let mut simulation = ball_on(sine, ball, options(9.8, 0.6, 0.0, 5e-3));
-    simulation
-        .set_state(&[-0.5 * PI + 0.1, 1.4, 0.0], &[0.0; 3])
-        .unwrap();
+    let q = [-0.5 * PI + 0.1, 1.4, 0.0];
+    let mut simulation = at_rest(sine, ball, options(9.8, 0.6, 0.0, 5e-3), q);
     simulation.step(4000).unwrap();
     assert!(speed(simulation.v()) < 1e-9, "{:?}", simulation.v());
     assert!(simulation.gaps()[0].abs() < 1e-6, "{:?}", simulation.gaps());
@@ -165,17 +143,13 @@ fn a_ball_in_a_valley_narrower_than_itself_rests_on_two_points() {
 /// Deviation (m) of a ball that rolls in a wide valley from a run with very small steps.
 fn rolling_in_a_valley(variant: Variant, h: f64) -> [f64; 3] {
     let sine = Sine::new(0.5, 6.0, 0.3, 0.0).unwrap();
-    let options = StepOptions {
-        variant,
-        ..options(G, 0.9, 0.0, h)
-    };
-    let mut simulation = ball_on(sine, disc(), options);
+    let options = options_of(variant, G, 0.9, 0.0, h);
     // On the curve, at rest: the centre r away along the normal.
     let (x, k) = (0.0_f64, TAU / 6.0);
     let slope = 0.5 * k * (k * x + 0.3).cos();
     let n = nalgebra::Vector2::new(-slope, 1.0).normalize();
     let q = [x + 0.3 * n.x, 0.5 * (k * x + 0.3).sin() + 0.3 * n.y, 0.0];
-    simulation.set_state(&q, &[0.0; 3]).unwrap();
+    let mut simulation = at_rest(sine, disc(), options, q);
     assert!(simulation.step(count(2.0, h)).unwrap().is_converged());
     [
         simulation.q()[0],
@@ -187,7 +161,7 @@ fn rolling_in_a_valley(variant: Variant, h: f64) -> [f64; 3] {
 #[test]
 fn rolling_along_a_curve_is_of_second_order() {
     let exact = rolling_in_a_valley(Variant::Newton, 1e-5);
-    for variant in [Variant::Linearised, Variant::Newton] {
+    for variant in VARIANTS {
         let error = |h: f64| {
             let end = rolling_in_a_valley(variant, h);
             (end[0] - exact[0]).hypot(end[1] - exact[1])
@@ -246,14 +220,10 @@ fn a_fast_ball_in_a_hollow_is_of_second_order_whatever_gravity_is() {
         let exact = gliding(x, speed, g);
         for variant in VARIANTS {
             let errors = |n: u32| {
-                let options = StepOptions {
-                    variant,
-                    ..options(g, 0.0, 0.0, GLIDE / f64::from(n))
-                };
+                let options = options_of(variant, g, 0.0, 0.0, GLIDE / f64::from(n));
                 let ground = Sine::new(0.3, 6.0, 0.0, 0.0).unwrap();
-                let mut ball = ball_on(ground, disc(), options);
                 let v = [speed * along[0], speed * along[1], 0.0];
-                ball.set_state(&[centre[0], centre[1], 0.0], &v).unwrap();
+                let mut ball = placed(ground, disc(), options, [centre[0], centre[1], 0.0], v);
                 let before = ball.energy();
                 let report = ball.step(n as usize).unwrap();
                 let change = ball.energy().total() - before.total();
@@ -282,18 +252,15 @@ fn a_spline_through_a_line_is_the_line() {
     let y: Vec<f64> = x.iter().map(|x| -alpha.tan() * x).collect();
     let start = [0.0, 0.3 / alpha.cos() + 0.2, 0.0];
     let run = |mut simulation: PlanarSimulation| {
-        simulation.set_state(&start, &[0.0; 3]).unwrap();
         simulation.step(1000).unwrap();
         SVector::<f64, 3>::from_column_slice(simulation.q())
     };
     let o = options(G, 0.4, 0.3, 2e-3);
-    let line = run(ball_on(
-        Line::new(-alpha.tan(), 0.0).unwrap(),
-        disc(),
-        o.clone(),
-    ));
-    let spline = run(ball_on(Spline::new(&x, &y).unwrap(), disc(), o.clone()));
-    let polyline = run(ball_on(Polyline::new(&x, &y).unwrap(), disc(), o));
+    let line = run(at_rest(incline(-alpha), disc(), o.clone(), start));
+    let spline = Spline::new(&x, &y).unwrap();
+    let spline = run(at_rest(spline, disc(), o.clone(), start));
+    let polyline = Polyline::new(&x, &y).unwrap();
+    let polyline = run(at_rest(polyline, disc(), o, start));
     assert!((line - spline).norm() < 1e-8, "{line} {spline}");
     assert!((line - polyline).norm() < 1e-8, "{line} {polyline}");
 }
@@ -322,14 +289,10 @@ fn a_ball_stays_before_a_step_or_rolls_over_it() {
     }
     for (share, gets_over) in [(0.96, false), (1.04, true)] {
         let v = share * low;
-        let mut simulation = ball_on(
-            Polyline::step(0.0, step).unwrap(),
-            ball,
-            options(G, 0.8, 0.0, 2e-4),
-        );
-        simulation
-            .set_state(&[-1.0, r, 0.0], &[v, 0.0, -v / r])
-            .unwrap();
+        let q = [-1.0, r, 0.0];
+        let v = [v, 0.0, -v / r];
+        let options = options(G, 0.8, 0.0, 2e-4);
+        let mut simulation = placed(Polyline::step(0.0, step).unwrap(), ball, options, q, v);
         simulation.step(15_000).unwrap();
         assert_eq!(
             simulation.q()[0] > 0.0,

@@ -10,6 +10,9 @@ use rover_core::simulation::{DiskSimulation, grain_options};
 use rover_core::solver::Method;
 use rover_core::system::grains::{GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall};
 
+use crate::grain_scenes::{awake, between, rough, solve_to};
+use crate::shared::near;
+
 fn box_of(width: f64) -> Vec<Wall<2>> {
     vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(width)]
 }
@@ -31,15 +34,10 @@ fn simulation(
 ) -> DiskSimulation {
     let (disks, q) = packing.build().expect("a packing");
     let mut options = grain_options(&disks);
-    let mut scene = GrainScene {
-        grains: disks,
-        walls: box_of(packing.sides[0]),
-        ground: None,
-        machine: None,
-        friction: GrainFriction::default(),
-    };
+    let walls = box_of(packing.sides[0]);
+    let mut scene = between(walls, disks, GrainFriction::default());
     change(&mut options, &mut scene);
-    DiskSimulation::new(Arc::new(scene), options, None, q).expect("a bed")
+    awake(scene, options, &q)
 }
 
 /// Velocities drawn from a recurrence, in [−speed, speed].
@@ -105,15 +103,9 @@ fn energy_never_grows(n_steps: usize, expected: &[RangeInclusive<usize>; 4]) {
                 options.solver.method = Method::GaussSeidel;
                 options.solver.max_sweeps = 7;
             }
-            3 => {
-                options.solver.tolerance = 1e-2;
-                options.solver.velocity_tolerance = 1e-1;
-                options.solver.max_sweeps = 2;
-            }
+            3 => solve_to(options, 1e-2, 1e-1, 2),
             _ => {
-                options.solver.tolerance = 1e-9;
-                options.solver.velocity_tolerance = 1e-8;
-                options.solver.max_sweeps = 20_000;
+                solve_to(options, 1e-9, 1e-8, 20_000);
                 options.stabilisation = Stabilisation::None;
             }
         });
@@ -124,11 +116,8 @@ fn energy_never_grows(n_steps: usize, expected: &[RangeInclusive<usize>; 4]) {
         for step in 0..n_steps {
             converged += usize::from(sim.step(1).expect("finite").is_converged());
             let now = sim.energy().total();
-            assert!(
-                now <= energy + 1e-13 * scale,
-                "case {case}, step {step}: {}",
-                now - energy
-            );
+            let gain = now - energy;
+            assert!(gain <= 1e-13 * scale, "case {case}, step {step}: {gain}");
             energy = now;
         }
         assert!(energy < 0.95 * scale);
@@ -162,12 +151,7 @@ fn energy_never_grows_with_restitution_without_friction() {
             scene
                 .walls
                 .push(Wall::new(Vector2::new(0.0, 0.6), -Vector2::y()).expect("a wall"));
-            scene.friction = GrainFriction {
-                grains: 0.0,
-                walls: 0.0,
-                wheels: 0.0,
-                ..GrainFriction::default()
-            };
+            scene.friction = rough(0.0);
         });
         shake(&mut sim, 1.0);
         let mut energy = sim.energy().kinetic;
@@ -175,11 +159,8 @@ fn energy_never_grows_with_restitution_without_friction() {
         for step in 0..300 {
             sim.step(1).expect("finite");
             let now = sim.energy().kinetic;
-            assert!(
-                now <= energy + 1e-7 * scale,
-                "e {e}, step {step}: {}",
-                now - energy
-            );
+            let gain = now - energy;
+            assert!(gain <= 1e-7 * scale, "e {e}, step {step}: {gain}");
             energy = now;
         }
         assert!(energy < 0.99 * scale, "they did meet");
@@ -190,15 +171,10 @@ fn energy_never_grows_with_restitution_without_friction() {
 fn a_disk_falls_and_rests_within_a_rounding_of_the_floor() {
     let disks = Grains::new(vec![0.02], vec![0.5]).expect("a disk");
     let options = grain_options(&disks);
-    let scene = GrainScene {
-        grains: disks,
-        walls: vec![],
-        ground: Some(Arc::new(Line::new(0.0, 0.1).expect("a line"))),
-        machine: None,
-        friction: GrainFriction::default(),
-    };
+    let mut scene = between(vec![], disks, GrainFriction::default());
+    scene.ground = Some(Arc::new(Line::new(0.0, 0.1).expect("a line")));
     let q = vec![0.0, 0.5, 0.0];
-    let mut sim = DiskSimulation::new(Arc::new(scene), options, None, q).expect("a bed");
+    let mut sim = awake(scene, options, &q);
     // 0.38 m of free fall take √(2 · 0.38/9.81) = 0.2783 s; an implicit step is late by h/2.
     sim.step(276).expect("finite");
     assert!(sim.v()[1] < -2.7, "still falls");
@@ -228,21 +204,25 @@ fn sweeps_and_the_dense_newton_give_the_same_velocities() {
     for method in [Method::Auto, Method::ProximalPoint] {
         let mut sim = simulation(&packing, |options, _| {
             options.solver.method = method;
-            options.solver.tolerance = 1e-10;
-            options.solver.velocity_tolerance = 1e-9;
-            options.solver.max_sweeps = 100_000;
+            solve_to(options, 1e-10, 1e-9, 100_000);
         });
         shake(&mut sim, 0.3);
         let report = sim.step(3).expect("finite");
         assert!(report.is_converged(), "{method:?} {report:?}");
         speeds.push(sim.v().to_vec());
     }
-    let worst = speeds[0]
-        .chunks(3)
-        .zip(speeds[1].chunks(3))
-        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+    let worst = distances(&speeds[0], &speeds[1])
+        .into_iter()
         .fold(0.0, f64::max);
     assert!(worst < 1e-6, "{worst} m/s");
+}
+
+/// Differences of the places or speeds of disks.
+fn distances(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let pairs = a.chunks(3).zip(b.chunks(3));
+    pairs
+        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+        .collect()
 }
 
 /// A bed, and one disk that falls on its left end: with or without sleep.
@@ -274,13 +254,10 @@ fn dropped(sleep: Option<SleepOptions>) -> (DiskSimulation, usize) {
 
 #[test]
 fn sleep_leaves_the_motion_as_it_is_and_wakes_what_is_struck() {
-    let (awake, none) = dropped(None);
+    let (roused, none) = dropped(None);
     let (slept, most) = dropped(Some(SleepOptions::default()));
     assert!(none == 0 && most > 120, "{most} of 241 slept");
-    let pairs = awake.q().chunks(3).zip(slept.q().chunks(3));
-    let apart: Vec<f64> = pairs
-        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-        .collect();
+    let apart = distances(roused.q(), slept.q());
     let worst = apart.iter().copied().fold(0.0, f64::max);
     let mean = apart.iter().sum::<f64>() / apart.len() as f64;
     // After an impact that moves disks by several radii the mean difference is a hundredth of a
@@ -289,18 +266,18 @@ fn sleep_leaves_the_motion_as_it_is_and_wakes_what_is_struck() {
     assert!(mean < 0.00015 && worst < 0.005, "{mean} m, {worst} m");
 }
 
+/// The same bed at rest, perhaps with sleep.
+fn asleep(bed: &DiskSimulation, sleep: Option<SleepOptions>) -> DiskSimulation {
+    let (scene, options) = (bed.description().clone(), bed.options().clone());
+    DiskSimulation::new(scene, options, sleep, bed.q().clone()).expect("a bed")
+}
+
 #[test]
 fn sleeping_costs_less() {
     let packing = packing(240, 60, 6);
     let mut sim = simulation(&packing, |_, _| {});
     sim.step(1200).expect("finite");
-    let mut sleeping = DiskSimulation::new(
-        sim.description().clone(),
-        sim.options().clone(),
-        Some(SleepOptions::default()),
-        sim.q().clone(),
-    )
-    .expect("a bed");
+    let mut sleeping = asleep(&sim, Some(SleepOptions::default()));
     sleeping.step(400).expect("finite");
     // A rolling disk keeps rolling: there is no rolling friction.
     let slept = sleeping.asleep().iter().filter(|a| **a).count();
@@ -314,10 +291,8 @@ fn sleeping_costs_less() {
     sleeping.wake();
     assert!(sleeping.asleep().iter().all(|a| !a));
     sleeping.step(5).expect("finite");
-    let moved = before.chunks(3).zip(sleeping.q().chunks(3));
-    let most = moved
-        .filter(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) > 2e-5)
-        .count();
+    let moved = distances(&before, sleeping.q());
+    let most = moved.iter().filter(|way| **way > 2e-5).count();
     assert!(
         most < 5,
         "they wake with the load that they had, {most} moved"
@@ -330,13 +305,7 @@ fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
         let packing = packing(120, 30, 8);
         let mut bed = simulation(&packing, |_, _| {});
         bed.step(900).expect("finite");
-        let mut sim = DiskSimulation::new(
-            bed.description().clone(),
-            bed.options().clone(),
-            sleep,
-            bed.q().clone(),
-        )
-        .expect("a bed");
+        let mut sim = asleep(&bed, sleep);
         sim.step(300).expect("finite");
         let snapshot = sim.snapshot();
         // The highest disk bears no load, so those below only lose its weight.
@@ -379,14 +348,9 @@ fn rover() -> TwoWheelRover {
 fn the_rover_drives_over_the_original_bed() {
     let (disks, q) = Packing::default().build().expect("a packing");
     let options = grain_options(&disks);
-    let scene = GrainScene {
-        grains: disks,
-        walls: box_of(Packing::default().sides[0]),
-        ground: None,
-        machine: None,
-        friction: GrainFriction::default(),
-    };
-    let mut bed = DiskSimulation::new(Arc::new(scene), options.clone(), None, q).expect("a bed");
+    let walls = box_of(Packing::default().sides[0]);
+    let scene = between(walls, disks, GrainFriction::default());
+    let mut bed = awake(scene, options.clone(), &q);
     bed.step(300).expect("finite");
     let mut q = bed.q().clone();
     q.extend([0.7, 0.31, 0.0, 0.0, 0.0]);
@@ -394,7 +358,7 @@ fn the_rover_drives_over_the_original_bed() {
         machine: Some(Arc::new(rover().into())),
         ..(**bed.description()).clone()
     };
-    let mut sim = DiskSimulation::new(Arc::new(scene), options, None, q).expect("a bed");
+    let mut sim = awake(scene, options, &q);
     sim.step(300).expect("finite");
     // The bed still yields now and then, hence the mean over 0.2 s.
     let mut weight = 0.0;
@@ -402,10 +366,7 @@ fn the_rover_drives_over_the_original_bed() {
         sim.step(1).expect("finite");
         weight += sim.impulse_on_wheels()[1] / 0.2;
     }
-    assert!(
-        (weight - 250.0 * 9.81).abs() < 0.1 * 250.0 * 9.81,
-        "{weight} N"
-    );
+    near(weight, 250.0 * 9.81, 0.1 * 250.0 * 9.81);
     sim.set_inputs(&[50.0, 50.0]).expect("torques");
     let n = 3 * sim.description().grains.len();
     let from = sim.q()[n];

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{JointLimits, Kinematics, Model, ModelDescription, Motor, coordinates};
-use rover_core::planar::{ContactRule, Line, MirroredRover, PlanarError, Sine};
-use rover_core::simulation::{PlanarSimulation, RoverSimulation};
+use rover_core::multibody::{Kinematics, Model, ModelDescription, Motor, coordinates};
+use rover_core::planar::{Line, MirroredRover, PlanarError, Sine};
 
-use super::scenes::{G, VARIANTS, force, mass_matrix, options};
+use super::scenes::{G, VARIANTS, at_rest, force, level, mass_matrix, options, options_of, placed};
+use crate::shared::{limits, moving};
 
 fn planar() -> MirroredRover {
     MirroredRover::new(&Model::rover()).unwrap()
@@ -89,38 +89,29 @@ fn largest_distance(
     options: &StepOptions,
 ) -> f64 {
     let P = injection(&planar);
-    let model = Arc::new(planar.model().clone());
+    let model = planar.model().clone();
     let normal = Vector3::new(-slope, 1.0, 0.0).normalize();
     let mut q = SVector::<f64, 7>::zeros();
     q[1] = 0.4 * (1.0 + slope * slope).sqrt();
     q[2] = slope.atan();
-    let start = &P * q;
-    let mut full = RoverSimulation::new(
-        model,
-        Arc::new(Plane::new(normal.into(), 0.0).unwrap()),
-        options.clone(),
-    )
-    .unwrap();
-    let configuration = coordinates::from_public(full.model(), start.as_slice()).unwrap();
-    let zero = vec![0.0; start.len()];
-    full.set_state(configuration, zero);
-    let line = Arc::new(Line::new(slope, 0.0).unwrap());
-    let mut reduced =
-        PlanarSimulation::new(planar, line, ContactRule::Nearest, options.clone()).unwrap();
-    reduced.set_state(q.as_slice(), &[0.0; 7]).unwrap();
+    let start = coordinates::from_public(&model, (&P * q).as_slice()).unwrap();
+    let v = vec![0.0; model.nv()];
+    let plane = Arc::new(Plane::new(normal.into(), 0.0).unwrap());
+    let mut full = moving(model, plane, options.clone(), start, v);
+    let line = Line::new(slope, 0.0).unwrap();
+    let start: [f64; 7] = q.into();
+    let mut reduced = at_rest(line, planar, options.clone(), start);
     let (mut largest, mut way) = (0.0_f64, 0.0_f64);
     for _ in 0..200 {
-        let torque = torques(full.state().time);
+        let torque = torques(full.time());
         full.set_wheel_torques(&[torque; 6]).unwrap();
         reduced.set_inputs(&[torque; 3]).unwrap();
         assert!(full.step(10).unwrap().is_converged());
         assert!(reduced.step(10).unwrap().is_converged());
-        let full_q = coordinates::to_public(full.model(), &full.state().configuration);
+        let full_q = coordinates::to_public(full.model(), full.q());
         way = way.max(reduced.q()[0].abs());
-        largest = largest.max(
-            (DVector::from_vec(full_q) - &P * SVector::<f64, 7>::from_column_slice(reduced.q()))
-                .amax(),
-        );
+        let image = &P * SVector::<f64, 7>::from_column_slice(reduced.q());
+        largest = largest.max((DVector::from_vec(full_q) - image).amax());
     }
     assert!(way > 2.0, "it drives: {way}");
     largest
@@ -136,10 +127,7 @@ fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
             Variant::Newton => 5e-4,
         };
         for slope in [0.0, 0.05, -0.2] {
-            let options = StepOptions {
-                variant,
-                ..options(G, 0.7, 0.0, 0.005)
-            };
+            let options = options_of(variant, G, 0.7, 0.0, 0.005);
             for planar in with_and_without_motors() {
                 let distance = largest_distance(planar, slope, |_| 15.0, &options);
                 assert!(distance < bound, "{variant:?}, slope {slope}: {distance:e}");
@@ -170,12 +158,8 @@ fn a_stiff_rover_has_one_coordinate_less() {
     let stiff = Model::rover().with_locked_joints(&locked).unwrap();
     let rover = MirroredRover::new(&stiff).unwrap();
     assert_eq!(rover.tree().nv(), 6);
-    let line = Arc::new(Line::new(0.0, 0.0).unwrap());
-    let options = options(G, 0.7, 0.0, 0.005);
-    let mut rover = PlanarSimulation::new(rover, line, ContactRule::Nearest, options).unwrap();
-    rover
-        .set_state(&[0.0, 0.4, 0.0, 0.0, 0.0, 0.0], &[0.0; 6])
-        .unwrap();
+    let q = [0.0, 0.4, 0.0, 0.0, 0.0, 0.0];
+    let mut rover = at_rest(level(), rover, options(G, 0.7, 0.0, 0.005), q);
     rover.set_inputs(&[15.0; 3]).unwrap();
     assert!(rover.step(400).unwrap().is_converged());
     assert!(rover.q()[0] > 0.2, "it drives: {:?}", rover.q());
@@ -193,10 +177,8 @@ fn a_pair_of_unlike_motors_is_refused_by_name() {
 
 #[test]
 fn the_torques_are_those_that_the_motors_can_give() {
-    let ground = Arc::new(Line::new(0.0, 0.0).unwrap());
-    let rule = ContactRule::Nearest;
-    let mut rover =
-        PlanarSimulation::new(planar(), ground, rule, options(G, 0.7, 0.0, 0.005)).unwrap();
+    let options = options(G, 0.7, 0.0, 0.005);
+    let mut rover = at_rest(level(), planar(), options, [0.0; 7]);
     rover.set_inputs(&[1e3, -1e3, 10.0]).unwrap();
     // They once stood there as given, while a different torque acted.
     assert_eq!(*rover.command(), [150.0, -150.0, 10.0]);
@@ -207,16 +189,11 @@ fn the_torques_are_those_that_the_motors_can_give() {
 #[test]
 fn where_restitution_has_no_answer_the_impact_is_inelastic() {
     for variant in VARIANTS {
-        let options = StepOptions {
-            variant,
-            ..options(G, 1.9, 0.5, 0.005)
-        };
-        let wave = Arc::new(Sine::new(0.43, 0.366, 0.0, 0.0).unwrap());
-        let rule = ContactRule::Nearest;
-        let mut rover = PlanarSimulation::new(planar(), wave, rule, options).unwrap();
+        let options = options_of(variant, G, 1.9, 0.5, 0.005);
+        let wave = Sine::new(0.43, 0.366, 0.0, 0.0).unwrap();
         let q = [0.119, 0.49, -0.29, 0.0, -0.25, 0.0, 0.0];
         let v = [0.5, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        rover.set_state(&q, &v).unwrap();
+        let mut rover = placed(wave, planar(), options, q, v);
         let mut retaken = 0;
         for k in 0..300 {
             let report = rover.step(1).unwrap();
@@ -238,26 +215,18 @@ fn a_rover_without_a_mirror_image_is_refused_by_name() {
     let model = Model::from_description(description).unwrap();
     let refused = MirroredRover::new(&model).unwrap_err();
     assert_eq!(refused.field(), "model");
-    let PlanarError::NotMirrored { body } = refused else {
-        panic!("{refused}");
-    };
-    assert_eq!(body, "left_bogie");
+    let body = "left_bogie".to_owned();
+    let not_mirrored = PlanarError::NotMirrored { body };
+    assert_eq!(refused, not_mirrored);
 
     let mut stopped = ModelDescription::rover();
     for solid in &mut stopped.solids {
         if solid.name.ends_with("bogie") {
-            solid.limits = Some(JointLimits {
-                lower: -0.5,
-                upper: 0.5,
-            });
+            solid.limits = limits(-0.5, 0.5);
         }
     }
     let stopped = Model::from_description(stopped).unwrap();
-    let body = "left_bogie".to_owned();
-    assert_eq!(
-        MirroredRover::new(&stopped).unwrap_err(),
-        PlanarError::NotMirrored { body }
-    );
+    assert_eq!(MirroredRover::new(&stopped).unwrap_err(), not_mirrored);
 
     let bent = Model::rover()
         .with_locked_joints(&[("steering_ML".to_owned(), 0.1)])

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
-use rover_core::planar::{ContactRule, Line, PlanarBall, PlanarGround, PlanarTree};
+use rover_core::planar::{ContactRule, Line, PlanarGround, PlanarTree};
 use rover_core::simulation::PlanarSimulation;
 
-pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
+pub use crate::shared::VARIANTS;
+
 pub const G: f64 = 9.81;
 
 /// Options with gravity straight down.
@@ -21,6 +22,14 @@ pub fn options(g: f64, friction: f64, restitution: f64, time_step: f64) -> StepO
     }
 }
 
+/// Options of a variant with gravity straight down.
+pub fn options_of(variant: Variant, g: f64, friction: f64, e: f64, time_step: f64) -> StepOptions {
+    StepOptions {
+        variant,
+        ..options(g, friction, e, time_step)
+    }
+}
+
 /// The reference runs' own settings: no projection.
 pub fn unprojected(options: &StepOptions) -> StepOptions {
     StepOptions {
@@ -29,13 +38,34 @@ pub fn unprojected(options: &StepOptions) -> StepOptions {
     }
 }
 
-/// A ball on a ground with true contact.
-pub fn ball_on(
+/// A machine on a ground with true contact, in a state.
+pub fn placed<const N: usize>(
     ground: impl PlanarGround + 'static,
-    ball: PlanarBall,
+    machine: impl Into<PlanarTree>,
     options: StepOptions,
+    q: [f64; N],
+    v: [f64; N],
 ) -> PlanarSimulation {
-    PlanarSimulation::new(ball, Arc::new(ground), ContactRule::Nearest, options).unwrap()
+    let rule = ContactRule::Nearest;
+    let ground = Arc::new(ground);
+    let mut simulation = PlanarSimulation::new(machine, ground, rule, options).unwrap();
+    simulation.set_state(&q, &v).unwrap();
+    simulation
+}
+
+/// A machine at rest on a ground with true contact.
+pub fn at_rest<const N: usize>(
+    ground: impl PlanarGround + 'static,
+    machine: impl Into<PlanarTree>,
+    options: StepOptions,
+    q: [f64; N],
+) -> PlanarSimulation {
+    placed(ground, machine, options, q, [0.0; N])
+}
+
+/// A line through the origin that rises by an angle, rad.
+pub fn incline(angle: f64) -> Line {
+    Line::new(angle.tan(), 0.0).unwrap()
 }
 
 /// Level ground at height 0.

@@ -8,17 +8,13 @@ use rover_core::planar::{ContactRule, Line, PlanarBall, PlanarGround, Sine};
 use rover_core::simulation::PlanarSimulation;
 
 use super::scenes::{count, options, unprojected};
+use crate::rover::scenes::{golden, numbers};
+use crate::shared::near;
 
 /// Rows of a reference: t, x, y, θ, vx, vy, ω.
 fn rows(name: &str) -> Vec<Vec<f64>> {
-    let path = format!("{}/../../tests/golden/{name}", env!("CARGO_MANIFEST_DIR"));
-    let data: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let row = |row: &serde_json::Value| -> Vec<f64> {
-        let numbers = row.as_array().unwrap();
-        numbers.iter().map(|x| x.as_f64().unwrap()).collect()
-    };
-    data["rows"].as_array().unwrap().iter().map(row).collect()
+    let rows = &golden(name)["rows"];
+    rows.as_array().unwrap().iter().map(numbers).collect()
 }
 
 fn report_ball(
@@ -36,6 +32,12 @@ fn report_ball(
         PlanarSimulation::new(ball, Arc::new(ground), ContactRule::CentreHeight, options).unwrap();
     simulation.set_state(&[5.0, 10.0, 0.0], &[0.0; 3]).unwrap();
     simulation
+}
+
+/// The ball on the incline of the report.
+fn on_the_incline() -> PlanarSimulation {
+    let line = Line::new(-0.5, 0.5).unwrap();
+    report_ball(line, 0.6, 0.0005, Variant::Linearised)
 }
 
 /// Largest distance (m) of the centre from a reference's up to a time.
@@ -56,21 +58,14 @@ fn distance(simulation: &mut PlanarSimulation, reference: &[Vec<f64>], until: f6
 #[test]
 fn the_ball_on_the_incline_is_siconos() {
     let reference = rows("siconos_ball_incline.json");
-    let mut simulation = report_ball(
-        Line::new(-0.5, 0.5).unwrap(),
-        0.6,
-        0.0005,
-        Variant::Linearised,
-    );
+    let mut simulation = on_the_incline();
     let error = distance(&mut simulation, &reference, 12.0);
     assert!(error < 0.1, "{error} m of 207 m");
     let end = reference.last().unwrap();
     let speed = simulation.v()[0].hypot(simulation.v()[1]);
     assert!((speed - end[4].hypot(end[5])).abs() < 0.01, "{speed} m/s");
-    assert!(
-        (speed - 32.87).abs() < 0.01,
-        "the figure's own: {speed} m/s"
-    );
+    // As in the figure.
+    near(speed, 32.87, 0.01);
     // The reference's angle turns to the right, ours to the left.
     let turning = -simulation.v()[2];
     assert!((turning - end[6]).abs() < 0.01, "{turning} rad/s");
@@ -78,12 +73,7 @@ fn the_ball_on_the_incline_is_siconos() {
 
 #[test]
 fn impacts_on_the_incline_come_when_they_did() {
-    let mut simulation = report_ball(
-        Line::new(-0.5, 0.5).unwrap(),
-        0.6,
-        0.0005,
-        Variant::Linearised,
-    );
+    let mut simulation = on_the_incline();
     let mut impacts = Vec::new();
     let mut strongest = 0.0_f64;
     while simulation.time() < 7.4 {

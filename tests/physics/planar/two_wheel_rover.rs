@@ -10,7 +10,11 @@ use rover_core::planar::{
 };
 use rover_core::simulation::PlanarSimulation;
 
-use super::scenes::{G, VARIANTS, count, force, level, mass_matrix, options, speed};
+use super::scenes::{
+    G, VARIANTS, at_rest, count, force, incline, level, mass_matrix, options, options_of, placed,
+    speed,
+};
+use crate::shared::near;
 
 type Q = SVector<f64, 5>;
 
@@ -45,14 +49,6 @@ fn lopsided() -> TwoWheelRover {
         axle: Vector2::new(0.35, -0.2),
     };
     TwoWheelRover::new(80.0, 6.0, a, b).unwrap()
-}
-
-fn on(
-    ground: impl PlanarGround + 'static,
-    rover: TwoWheelRover,
-    options: StepOptions,
-) -> PlanarSimulation {
-    PlanarSimulation::new(rover, Arc::new(ground), ContactRule::Nearest, options).unwrap()
 }
 
 /// Standing on a slope (rise positive forward) with both wheels of `r` touching.
@@ -134,9 +130,8 @@ fn the_normal_row_is_the_gaps_gradient_and_the_tangential_one_the_rims_velocity(
             ..options(0.0, 0.5, 0.0, 1e-9)
         };
         let gaps = |q: &Q| {
-            let mut simulation = on(sine, rover, o.clone());
-            simulation.set_state(q.as_slice(), &[0.0; 5]).unwrap();
-            simulation.gaps()
+            let q: [f64; 5] = (*q).into();
+            at_rest(sine, rover, o.clone(), q).gaps()
         };
         let step = 1e-6;
         let (before, after) = (gaps(&(q - v * step)), gaps(&(q + v * step)));
@@ -145,30 +140,24 @@ fn the_normal_row_is_the_gaps_gradient_and_the_tangential_one_the_rims_velocity(
             let disc = tree.disc(i, &poses);
             let mut facing = Vec::new();
             sine.facing(&disc.centre, 5.0, &mut facing);
-            let near = facing
+            let foot = facing
                 .iter()
                 .min_by(|a, b| a.distance.total_cmp(&b.distance))
                 .unwrap();
             let (point, t) = (
-                disc.centre - near.n * disc.radius,
-                Vector2::new(near.n.y, -near.n.x),
+                disc.centre - foot.n * disc.radius,
+                Vector2::new(foot.n.y, -foot.n.x),
             );
             let mut rows = Vec::new();
-            tree.push_rows(i, &poses, &point, &[near.n, t], &mut rows);
+            tree.push_rows(i, &poses, &point, &[foot.n, t], &mut rows);
             let [normal, tangential] = [0, 5].map(|k| Q::from_column_slice(&rows[k..k + 5]));
             let rate = (after[i] - before[i]) / (2.0 * step);
-            assert!(
-                (normal.dot(&v) - rate).abs() < 1e-6,
-                "{} {rate}",
-                normal.dot(&v)
-            );
+            near(normal.dot(&v), rate, 1e-6);
             // The rim's material point: the centre's velocity and the wheel's own turn.
             let place = |s: f64| centre(&tree, i, &(q + v * s));
             let velocity = (place(step) - place(-step)) / (2.0 * step);
-            assert!(
-                (tree.point_velocity(i, &poses, &disc.centre, v.as_slice()) - velocity).norm()
-                    < 1e-6
-            );
+            let found = tree.point_velocity(i, &poses, &disc.centre, v.as_slice());
+            assert!((found - velocity).norm() < 1e-6);
             let rim = velocity.dot(&t) + disc.radius * v[3 + i];
             assert!((tangential.dot(&v) - rim).abs() < 1e-6);
         }
@@ -190,10 +179,8 @@ fn loads_on_the_flat_are_those_of_statics() {
         axle: Vector2::new(x, -0.1),
     };
     let rover = TwoWheelRover::new(130.0, 7.0, wheel(-0.5), wheel(0.3)).unwrap();
-    let mut simulation = on(level(), rover, options(G, 0.7, 0.0, 5e-3));
-    simulation
-        .set_state(&[0.0, 0.3, 0.0, 0.0, 0.0], &[0.0; 5])
-        .unwrap();
+    let q = [0.0, 0.3, 0.0, 0.0, 0.0];
+    let mut simulation = at_rest(level(), rover, options(G, 0.7, 0.0, 5e-3), q);
     simulation.step(100).unwrap();
     assert!(speed(simulation.v()) < 1e-12);
     let loads = loads(&simulation);
@@ -217,14 +204,8 @@ fn on_a_slope_torques_hold_it_and_the_loads_are_those_of_moments() {
     let (angle, drop) = (0.3_f64, 0.15);
     let rover = rover(0.4, drop);
     let tau = holding(&rover, angle);
-    let mut simulation = on(
-        Line::new(angle.tan(), 0.0).unwrap(),
-        rover,
-        options(G, 0.7, 0.0, 5e-3),
-    );
-    simulation
-        .set_state(&on_slope(&rover, angle), &[0.0; 5])
-        .unwrap();
+    let q = on_slope(&rover, angle);
+    let mut simulation = at_rest(incline(angle), rover, options(G, 0.7, 0.0, 5e-3), q);
     simulation.set_inputs(&[tau, tau]).unwrap();
     simulation.step(400).unwrap();
     assert!(speed(simulation.v()) < 1e-9, "{:?}", simulation.v());
@@ -235,11 +216,8 @@ fn on_a_slope_torques_hold_it_and_the_loads_are_those_of_moments() {
     let (m, l) = (rover.total_mass(), 0.4);
     let shift = m * G * angle.sin() * z / (2.0 * l);
     let half = 0.5 * m * G * angle.cos();
-    assert!(
-        (loads[0] - half - shift).abs() < 1e-8 * half,
-        "{loads:?} {half} {shift}"
-    );
-    assert!((loads[1] - half + shift).abs() < 1e-8 * half, "{loads:?}");
+    near(loads[0], half + shift, 1e-8 * half);
+    near(loads[1], half - shift, 1e-8 * half);
 }
 
 #[test]
@@ -252,14 +230,8 @@ fn it_tips_over_where_the_mass_centre_passes_the_lower_contact() {
     for (share, tips) in [(0.998, false), (1.002, true)] {
         let angle = share * limit;
         let tau = holding(&rover, angle);
-        let mut simulation = on(
-            Line::new(angle.tan(), 0.0).unwrap(),
-            rover,
-            options(G, 5.0, 0.0, 2e-3),
-        );
-        simulation
-            .set_state(&on_slope(&rover, angle), &[0.0; 5])
-            .unwrap();
+        let q = on_slope(&rover, angle);
+        let mut simulation = at_rest(incline(angle), rover, options(G, 5.0, 0.0, 2e-3), q);
         simulation.set_inputs(&[2.0 * tau, 0.0]).unwrap();
         simulation.step(1500).unwrap();
         let lifted = simulation.gaps()[1];
@@ -281,14 +253,8 @@ fn the_steepest_slope_it_climbs_is_the_friction_angle() {
             let tau = holding(&rover, angle) * (0.7 + 0.02 * f64::from(k));
             let shift = angle.tan() * 0.2 / 0.4;
             let torques = [tau * (1.0 + shift), tau * (1.0 - shift)];
-            let mut simulation = on(
-                Line::new(angle.tan(), 0.0).unwrap(),
-                rover,
-                options(G, mu, 0.0, 5e-3),
-            );
-            simulation
-                .set_state(&on_slope(&rover, angle), &[0.0; 5])
-                .unwrap();
+            let q = on_slope(&rover, angle);
+            let mut simulation = at_rest(incline(angle), rover, options(G, mu, 0.0, 5e-3), q);
             simulation.set_inputs(&torques).unwrap();
             simulation.step(200).unwrap();
             best = best.max(simulation.v()[0]);
@@ -302,34 +268,17 @@ fn driving_on_the_flat_accelerates_at_the_closed_form() {
     // (m + 2 J/r²) a = 2 τ/r while the wheels roll.
     let rover = report_rover();
     for variant in VARIANTS {
-        let mut simulation = on(
-            level(),
-            rover,
-            StepOptions {
-                variant,
-                ..options(G, 0.9, 0.0, 5e-3)
-            },
-        );
-        simulation
-            .set_state(&[0.0, 0.2, 0.0, 0.0, 0.0], &[0.0; 5])
-            .unwrap();
+        let q = [0.0, 0.2, 0.0, 0.0, 0.0];
+        let mut simulation = at_rest(level(), rover, options_of(variant, G, 0.9, 0.0, 5e-3), q);
         simulation.set_inputs(&[50.0, 50.0]).unwrap();
         assert!(simulation.step(400).unwrap().is_converged());
         let a = 2.0 * 50.0 / 0.2 / (rover.total_mass() + 2.0 * 1.2 / 0.04);
-        assert!(
-            (simulation.v()[0] - 2.0 * a).abs() < 1e-10,
-            "{} {}",
-            simulation.v()[0],
-            2.0 * a
-        );
+        near(simulation.v()[0], 2.0 * a, 1e-10);
         // Load transfer: the torques' reaction on the body, and the body's
         // inertia at the height of the axles: none beyond it.
         let loads = loads(&simulation);
         let shift = 2.0 * 50.0 / 0.8;
-        assert!(
-            (loads[0] - loads[1] - 2.0 * shift).abs() < 1e-6,
-            "{loads:?}"
-        );
+        near(loads[0] - loads[1], 2.0 * shift, 1e-6);
     }
 }
 
@@ -339,35 +288,20 @@ fn free_flight_is_a_parabola_and_keeps_its_energy() {
     // With equal wheels beside the mass centre M is constant and a step exact.
     let start = ([0.1, 2.0, 0.3, 0.0, 1.0], [1.0, 4.0, 2.0, -3.0, 0.5]);
     for variant in VARIANTS {
-        let mut simulation = on(
-            far,
-            report_rover(),
-            StepOptions {
-                variant,
-                ..options(G, 0.5, 0.0, 5e-3)
-            },
-        );
-        simulation.set_state(&start.0, &start.1).unwrap();
+        let options = options_of(variant, G, 0.5, 0.0, 5e-3);
+        let mut simulation = placed(far, report_rover(), options, start.0, start.1);
         let before = simulation.energy().total();
         simulation.step(400).unwrap();
         let after = simulation.energy().total();
         assert!((after - before).abs() < 1e-9 * before, "{}", after - before);
         let y = 2.0 + 4.0 * 2.0 - 0.5 * G * 4.0;
-        assert!(
-            (simulation.q()[1] - y).abs() < 1e-9,
-            "{}",
-            simulation.q()[1] - y
-        );
+        near(simulation.q()[1], y, 1e-9);
     }
     // Lopsided, its mass centre flies a parabola, and the audit keeps the energy.
     for variant in VARIANTS {
         for h in [8e-3, 1e-3] {
-            let options = StepOptions {
-                variant,
-                ..options(G, 0.5, 0.0, h)
-            };
-            let mut simulation = on(far, lopsided(), options);
-            simulation.set_state(&start.0, &start.1).unwrap();
+            let options = options_of(variant, G, 0.5, 0.0, h);
+            let mut simulation = placed(far, lopsided(), options, start.0, start.1);
             let before = simulation.energy().total();
             simulation.step(count(2.0, h)).unwrap();
             let drift = (simulation.energy().total() - before).abs() / before;
@@ -384,13 +318,8 @@ fn it_drives_over_waves_and_up_a_step() {
         (Arc::new(waves) as Arc<dyn PlanarGround>, 45.0, 3.0),
         (Arc::new(step), 90.0, 3.0),
     ] {
-        let mut simulation = PlanarSimulation::new(
-            report_rover(),
-            ground,
-            ContactRule::Nearest,
-            options(G, 0.9, 0.0, 2e-3),
-        )
-        .unwrap();
+        let (rule, options) = (ContactRule::Nearest, options(G, 0.9, 0.0, 2e-3));
+        let mut simulation = PlanarSimulation::new(report_rover(), ground, rule, options).unwrap();
         simulation
             .set_state(&[0.0, 0.35, 0.0, 0.0, 0.0], &[0.0; 5])
             .unwrap();

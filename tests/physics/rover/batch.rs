@@ -11,6 +11,8 @@ use rover_core::simulation::{
     Batch, BatchError, CommandError, ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation,
 };
 
+use crate::shared::{bits, flat, moving, resting};
+
 const SCAN: [[f64; 2]; 3] = [[1.0, -0.5], [0.0, 0.0], [-0.3, 0.8]];
 const TARGET: [f64; 2] = [3.0, -4.0];
 
@@ -25,17 +27,13 @@ fn rover(model: &Arc<Model>, i: usize) -> RoverSimulation {
     let terrain: Arc<dyn Terrain> = if i % 2 == 1 {
         Arc::new(SphereField::rocks(&field).unwrap())
     } else {
-        Arc::new(Plane::ground())
+        flat()
     };
     let options = StepOptions {
         friction_coefficient: 0.5 + 0.05 * i as f64,
         ..StepOptions::default()
     };
-    let mut simulation = RoverSimulation::new(model.clone(), terrain, options).unwrap();
-    let mut start = Configuration::zero(model);
-    start.position.y = 0.8;
-    simulation.set_state(start, vec![0.0; model.nv()]);
-    simulation
+    resting(model.clone(), terrain, options, |q| q.position.y = 0.8)
 }
 
 fn rovers(n: usize) -> Vec<RoverSimulation> {
@@ -68,10 +66,6 @@ fn drive(batch: &mut Batch, periods: std::ops::Range<usize>, active: Option<&[bo
         batch.step(&tau, &delta, 5, active, &mut rows).unwrap();
     }
     rows
-}
-
-fn bits(values: &[f64]) -> Vec<u64> {
-    values.iter().map(|x| x.to_bits()).collect()
 }
 
 #[test]
@@ -113,7 +107,7 @@ fn a_rover_that_fails_fails_alone() {
         let mut mad = rovers(n).remove(1);
         let mut v = vec![0.0; mad.model().nv()];
         v[3] = 1e30;
-        let start = mad.state().configuration.clone();
+        let start = mad.q().clone();
         mad.set_state(start, v);
         broken.replace(1, mad, TARGET).unwrap();
         let width = sound.layout().size();
@@ -137,20 +131,20 @@ fn rovers_that_are_not_active_keep_still() {
     let mut batch = batch(3, 2);
     drive(&mut batch, 0..2, None);
     let before = batch.rovers()[1].snapshot();
-    let moving = batch.rovers()[2].state().time;
+    let moving = batch.rovers()[2].time();
     drive(&mut batch, 2..4, Some(&[true, false, true]));
     assert_eq!(batch.rovers()[1].snapshot(), before);
-    assert!(batch.rovers()[2].state().time > moving);
+    assert!(batch.rovers()[2].time() > moving);
 }
 
 #[test]
 fn a_bad_command_moves_nobody() {
     let mut batch = batch(2, 2);
-    let before: Vec<_> = batch
-        .rovers()
-        .iter()
-        .map(RoverSimulation::snapshot)
-        .collect();
+    let states = |batch: &Batch| -> Vec<_> {
+        let rovers = batch.rovers().iter();
+        rovers.map(RoverSimulation::snapshot).collect()
+    };
+    let before = states(&batch);
     let mut tau = vec![0.0; 12];
     tau[9] = f64::NAN;
     let mut rows = vec![0.0; 2 * batch.layout().size()];
@@ -162,12 +156,7 @@ fn a_bad_command_moves_nobody() {
     };
     assert_eq!(index, 1);
     assert!(matches!(error, CommandError::NotFinite { index: 3, .. }));
-    let after: Vec<_> = batch
-        .rovers()
-        .iter()
-        .map(RoverSimulation::snapshot)
-        .collect();
-    assert_eq!(before, after);
+    assert_eq!(before, states(&batch));
 }
 
 #[test]
@@ -270,16 +259,12 @@ fn a_reading_says_what_the_simulation_says() {
 #[test]
 fn the_work_of_the_motors_is_the_energy_gained() {
     // Free flight without gravity: only the motors do work.
-    let model = Arc::new(Model::rover());
     let options = StepOptions {
-        gravity: nalgebra::Vector3::zeros(),
+        gravity: Vector3::zeros(),
         time_step: 1e-4,
         ..StepOptions::default()
     };
-    let mut sim = RoverSimulation::new(model.clone(), Arc::new(Plane::ground()), options).unwrap();
-    let mut start = Configuration::zero(&model);
-    start.position.y = 100.0;
-    sim.set_state(start, vec![0.0; model.nv()]);
+    let mut sim = resting(Model::rover(), flat(), options, |q| q.position.y = 100.0);
     sim.set_wheel_torques(&[20.0; 6]).unwrap();
     let before = sim.energy().kinetic;
     sim.step(500).unwrap();
@@ -353,14 +338,11 @@ fn a_rover_whose_step_panics_is_reported_and_the_others_of_its_batch_go_on() {
     let model = Arc::new(Model::rover());
     let ground: Arc<dyn Terrain> = Arc::new(Mined::new());
     let made = |i: usize| {
-        let options = StepOptions::default();
-        let mut own = RoverSimulation::new(model.clone(), ground.clone(), options).unwrap();
-        let mut start = Configuration::zero(&model);
-        (start.position.x, start.position.y) = (-0.9 - 0.3 * i as f64, 0.3);
+        let mut q = Configuration::zero(&model);
+        (q.position.x, q.position.y) = (-0.9 - 0.3 * i as f64, 0.3);
         let mut v = vec![0.0; model.nv()];
         v[0] = 3.0;
-        own.set_state(start, v);
-        own
+        moving(model.clone(), ground.clone(), StepOptions::default(), q, v)
     };
     let n = 9;
     let mut alone: Vec<_> = (0..n).map(made).collect();

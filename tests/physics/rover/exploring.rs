@@ -1,13 +1,11 @@
 //! Rovers whose policy explores: every step is solved, and a probe sees all parts of it.
 
-use std::sync::Arc;
-
 use rover_core::integrator::{Phase, Probe, StepOptions};
 use rover_core::multibody::Model;
-use rover_core::simulation::RoverSimulation;
 
 use crate::exploring_scenes::STEPS_A_COMMAND;
 use crate::exploring_scenes::{Drive, Ground, TORQUES, drives};
+use crate::shared::moving;
 
 const PHASES: [Phase; 9] = [
     Phase::Kinematics,
@@ -87,10 +85,9 @@ fn on_yielding_cylinders() -> Drive {
         (wheel.width, wheel.rounding) = (Some(0.15), Some(0.0));
         (wheel.stiffness, wheel.damping) = (Some(5.3e7), Some(1.9e5));
     }
-    let model = Arc::new(Model::from_description(description).unwrap());
-    let mut new =
-        RoverSimulation::new(model, old.terrain().clone(), old.options().clone()).unwrap();
-    new.set_state(old.q().clone(), old.v().to_vec());
+    let model = Model::from_description(description).unwrap();
+    let (ground, options) = (old.terrain().clone(), old.options().clone());
+    let mut new = moving(model, ground, options, old.q().clone(), old.v().to_vec());
     new.step(100).unwrap();
     drive.simulation = new;
     drive

@@ -7,14 +7,13 @@ use rover_core::multibody::{Model, coordinates};
 use rover_core::simulation::RoverSimulation;
 
 use super::scenes::{VARIANTS, count, order, simulation};
+use crate::shared::{joints, stepping};
 
 /// The rover tumbling high above the ground with all joints turning.
 fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> RoverSimulation {
     let options = StepOptions {
-        variant,
-        time_step,
         gravity,
-        ..StepOptions::default()
+        ..stepping(variant, time_step)
     };
     let mut q = [0.0; 21];
     q[1] = 1000.0;
@@ -24,7 +23,7 @@ fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> RoverSim
         *rate = 1.5 * (k as f64).sin();
     }
     let mut simulation = simulation(Model::rover(), Plane::ground(), options, &q, &v);
-    let joints = crate::joints(&simulation);
+    let joints = joints(&simulation);
     simulation.release(&joints).unwrap();
     simulation
 }
@@ -89,7 +88,7 @@ fn no_spin_and_no_step_add_energy() {
         ] {
             for variant in VARIANTS {
                 let mut simulation = tumbling(variant, time_step, Vector3::zeros());
-                let mut v = simulation.state().v.clone();
+                let mut v = simulation.v().to_vec();
                 for (k, v) in v.iter_mut().enumerate().skip(3) {
                     let body = &simulation.model().bodies()[simulation.model().body_of_velocity(k)];
                     let rate = match (k < 6, body.is_spinner) {
@@ -99,7 +98,7 @@ fn no_spin_and_no_step_add_energy() {
                     };
                     *v = rate * (1.3 * k as f64).sin();
                 }
-                let start = simulation.state().configuration.clone();
+                let start = simulation.q().clone();
                 simulation.set_state(start, v);
                 for step in 0..100 {
                     let before = simulation.energy();
@@ -128,7 +127,7 @@ fn trajectories_converge_with_second_order() {
         let end = |h: f64| {
             let mut simulation = tumbling(variant, h, Vector3::new(0.0, -9.81, 0.0));
             simulation.step(count(1.0, h)).unwrap();
-            coordinates::to_public(simulation.model(), &simulation.state().configuration)
+            coordinates::to_public(simulation.model(), simulation.q())
         };
         let reference = end(1.0 / 12800.0);
         let steps = [1.0 / 50.0, 1.0 / 100.0, 1.0 / 200.0, 1.0 / 400.0];

@@ -19,7 +19,7 @@ fn run(mut simulation: RoverSimulation, reference: &str) -> (f64, f64) {
             .fold(deepest, |m, c| m.min(c.gap));
     }
     let q = numbers(golden(reference)["q"].as_array().unwrap().last().unwrap());
-    let x = simulation.state().configuration.position;
+    let x = simulation.q().position;
     (
         (x - nalgebra::Vector3::new(q[0], q[1], q[2])).norm(),
         deepest,
@@ -28,10 +28,8 @@ fn run(mut simulation: RoverSimulation, reference: &str) -> (f64, f64) {
 
 #[test]
 fn the_references_own_scheme_ends_within_two_millimetres_at_a_fifth_of_a_millisecond() {
-    let (error, _) = run(
-        report_scene(Variant::Newton, 0.0002, Stabilisation::None),
-        "siconos_plane_h200us.json",
-    );
+    let scene = report_scene(Variant::Newton, 0.0002, Stabilisation::None);
+    let (error, _) = run(scene, "siconos_plane_h200us.json");
     assert!(error < 0.002, "{error} m");
 }
 
@@ -39,10 +37,8 @@ fn the_references_own_scheme_ends_within_two_millimetres_at_a_fifth_of_a_millise
 fn every_variant_ends_within_a_centimetre_at_five_milliseconds() {
     for variant in VARIANTS {
         for stabilisation in [Stabilisation::Projection, Stabilisation::None] {
-            let (error, _) = run(
-                report_scene(variant, 0.005, stabilisation),
-                "siconos_plane_h5ms.json",
-            );
+            let scene = report_scene(variant, 0.005, stabilisation);
+            let (error, _) = run(scene, "siconos_plane_h5ms.json");
             assert!(error < 0.01, "{variant:?}, {stabilisation:?}: {error} m");
         }
     }
@@ -51,10 +47,8 @@ fn every_variant_ends_within_a_centimetre_at_five_milliseconds() {
 #[test]
 fn gaps_stay_above_minus_one_millimetre_at_one_millisecond() {
     for variant in VARIANTS {
-        let (_, deepest) = run(
-            report_scene(variant, 0.001, Stabilisation::Projection),
-            "siconos_plane_h200us.json",
-        );
+        let scene = report_scene(variant, 0.001, Stabilisation::Projection);
+        let (_, deepest) = run(scene, "siconos_plane_h200us.json");
         assert!(deepest > -0.001, "{variant:?}: {deepest} m");
     }
 }
@@ -67,11 +61,8 @@ fn error_falls_with_the_step_down_to_the_branching_of_the_impacts() {
     // and without, end 3.09 mm from the 0.2 ms reference and within 0.03 mm of each other. Errors
     // against that reference therefore do not fall below these 3 mm.
     let at = |h| {
-        run(
-            report_scene(Variant::Linearised, h, Stabilisation::Projection),
-            "siconos_plane_h200us.json",
-        )
-        .0
+        let scene = report_scene(Variant::Linearised, h, Stabilisation::Projection);
+        run(scene, "siconos_plane_h200us.json").0
     };
     let (coarse, middle, fine) = (at(0.05), at(0.01), at(0.0005));
     assert!(

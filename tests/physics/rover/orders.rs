@@ -1,10 +1,10 @@
 //! Orders of convergence with contacts: halve the step, fit the slope.
 
-use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::Model;
 
-use super::scenes::{VARIANTS, count, order, simulation};
+use super::scenes::{VARIANTS, count, order};
+use crate::shared::{flat, resting};
 
 /// L1 error of the height over half a second of a drop, one to three
 /// bounces included (e = 0.5, no friction).
@@ -18,15 +18,15 @@ fn bouncing_error(variant: Variant, h: f64, clearance: f64) -> f64 {
         friction_coefficient: 0.0,
         ..StepOptions::default()
     };
-    let mut q = [0.0; 21];
-    q[1] = 0.35 + clearance;
-    let mut simulation = simulation(Model::rover(), Plane::ground(), options, &q, &[0.0; 21]);
+    let mut simulation = resting(Model::rover(), flat(), options, |q| {
+        q.position.y = 0.35 + clearance;
+    });
     let mut sum = 0.0;
     let n = count(0.5, h);
     for _ in 0..n {
         simulation.step(1).unwrap();
-        let height = simulation.state().configuration.position.y - 0.35;
-        sum += h * (height - bouncing_ball(clearance, 0.5, simulation.state().time)).abs();
+        let height = simulation.q().position.y - 0.35;
+        sum += h * (height - bouncing_ball(clearance, 0.5, simulation.time())).abs();
     }
     sum
 }
@@ -76,9 +76,7 @@ fn elastic_bounces_keep_their_energy_at_any_step() {
             friction_coefficient: 0.0,
             ..StepOptions::default()
         };
-        let mut q = [0.0; 21];
-        q[1] = 0.85;
-        let mut simulation = simulation(Model::rover(), Plane::ground(), options, &q, &[0.0; 21]);
+        let mut simulation = resting(Model::rover(), flat(), options, |q| q.position.y = 0.85);
         let before = simulation.energy().total();
         let mut largest = 0.0_f64;
         for _ in 0..count(5.0, h) {

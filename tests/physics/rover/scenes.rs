@@ -157,13 +157,13 @@ pub fn check_drive(variant: Variant, h: f64) -> (Vector3<f64>, f64, StepReport) 
     };
     let mut simulation = simulation(check_machine(), Plane::ground(), options, &q, &[0.0; 21]);
     let mut report = simulation.step(count(2.0, h)).unwrap();
-    let start = simulation.state().configuration.position;
+    let start = simulation.q().position;
     simulation
         .set_steering(&[-0.1, -0.1, 0.0, 0.0, 0.0, 0.0])
         .unwrap();
     simulation.set_wheel_torques(&[20.0; 6]).unwrap();
     report.merge(&simulation.step(count(10.0, h)).unwrap());
-    let end = &simulation.state().configuration;
+    let end = simulation.q();
     let heading = coordinates::to_public(simulation.model(), end)[4];
     (end.position - start, heading, report)
 }

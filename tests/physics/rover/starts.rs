@@ -4,23 +4,19 @@ use std::sync::Arc;
 
 use rover_core::contact::detection::wheel_contacts;
 use rover_core::contact::placement::{PlacementError, resting_on};
-use rover_core::geometry::{HeightField, Terrain};
-use rover_core::integrator::StepOptions;
+use rover_core::geometry::Terrain;
 use rover_core::multibody::{Kinematics, Model, coordinates};
-use rover_core::simulation::RoverSimulation;
+
+use crate::shared::{in_public, largest};
+use crate::surfaces::surface_scenes::map;
 
 #[test]
 fn a_rover_on_hills_stands_on_all_six_wheels_and_stays() {
-    let n = 81;
-    #[allow(clippy::cast_possible_truncation)] // a map is single
-    let heights: Vec<f32> = (0..n * n)
-        .map(|k| {
-            let (x, z) = ((k % n) as f64 * 0.1, (k / n) as f64 * 0.1);
-            (0.12 * (1.7 * x).sin() * (1.3 * z).cos() + 0.1 * x) as f32
-        })
-        .collect();
-    let field: Arc<dyn Terrain> =
-        Arc::new(HeightField::new(heights, [n, n], [0.1; 2], [-4.0; 2]).unwrap());
+    let hills = |x: f64, z: f64| {
+        let (x, z) = (x + 4.0, z + 4.0);
+        0.12 * (1.7 * x).sin() * (1.3 * z).cos() + 0.1 * x
+    };
+    let field: Arc<dyn Terrain> = Arc::new(map(80, 0.1, hills));
     let model = Arc::new(Model::rover());
     for (position, heading) in [([0.0, 0.0], 0.0), ([1.2, -0.7], 1.0), ([-1.0, 1.5], -2.5)] {
         let q = resting_on(&model, &*field, position, heading).unwrap();
@@ -31,12 +27,9 @@ fn a_rover_on_hills_stands_on_all_six_wheels_and_stays() {
         for contact in &gaps {
             assert!((-1e-8..1e-6).contains(&contact.gap), "{}", contact.gap);
         }
-        let options = StepOptions::default();
-        let mut rover =
-            RoverSimulation::new(Arc::clone(&model), Arc::clone(&field), options).unwrap();
-        rover.set_state(configuration.clone(), vec![0.0; model.nv()]);
+        let mut rover = in_public(Arc::clone(&model), Arc::clone(&field), &q);
         rover.step(1).unwrap();
-        let speed = rover.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let speed = largest(rover.v());
         assert!(speed < 0.2, "{speed}");
     }
     let off = resting_on(&model, &*field, [3.9, 0.0], 0.0).unwrap_err();

@@ -17,12 +17,9 @@ fn pair(joints: &[(&str, f64)]) -> (Model, Model, Vec<usize>) {
     let full = Model::rover();
     let named: Vec<(String, f64)> = joints.iter().map(|(n, a)| ((*n).to_owned(), *a)).collect();
     let welded = full.with_locked_joints(&named).unwrap();
-    let is_locked = |k: usize| {
-        k >= 6
-            && joints
-                .iter()
-                .any(|(n, _)| full.bodies()[full.body_of_velocity(k)].name == *n)
-    };
+    let is_named = |body: &str| joints.iter().any(|(name, _)| *name == body);
+    let name_of = |k: usize| full.bodies()[full.body_of_velocity(k)].name.as_str();
+    let is_locked = |k: usize| k >= 6 && is_named(name_of(k));
     let kept = (0..full.nv()).filter(|&k| !is_locked(k)).collect();
     (full, welded, kept)
 }
@@ -40,8 +37,7 @@ fn mass_matrix_is_the_block_of_the_full_one() {
         Model::rover().bodies()[1..]
             .iter()
             .map(|b| (b.name.as_str(), 0.25))
-            .collect::<Vec<_>>()
-            .clone(),
+            .collect(),
     ] {
         let (full, welded, kept) = pair(&joints);
         assert_eq!(welded.nv() + joints.len(), full.nv());
@@ -89,7 +85,7 @@ fn a_straight_drive_needs_no_steering_joints() {
         }
         simulation.set_wheel_torques(&[15.0; 6]).unwrap();
         assert!(simulation.step(800).unwrap().is_converged());
-        simulation.state().configuration.position
+        simulation.q().position
     });
     assert!(ends[0].x > 3.0, "{ends:?}");
     assert!((ends[0] - ends[1]).norm() < 1e-7, "{ends:?}");

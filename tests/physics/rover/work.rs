@@ -4,6 +4,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::simulation::RoverSimulation;
 
 use super::scenes::{VARIANTS, at_rest, on_slope};
+use crate::shared::stepping;
 
 fn driving(options: StepOptions) -> RoverSimulation {
     let mut simulation = at_rest(options);
@@ -17,7 +18,7 @@ fn driving(options: StepOptions) -> RoverSimulation {
 #[test]
 fn a_step_allocates_nothing() {
     for variant in VARIANTS {
-        let mut simulation = driving(crate::stepping(variant, 0.005));
+        let mut simulation = driving(stepping(variant, 0.005));
         simulation.step(50).unwrap();
         let counted = allocation_counter::measure(|| {
             simulation.step(200).unwrap();
@@ -67,7 +68,7 @@ fn wheels_that_fight_each_other_in_a_turn_take_few_iterations() {
         let mut simulation = turning(curvature, StepOptions::default());
         let mut iterations = 0;
         for step in 0..600 {
-            let v = &simulation.state().v;
+            let v = simulation.v();
             let speed = v[0].hypot(v[1]).hypot(v[2]);
             let drive = 30.0 + 15.0 * (1.0 - speed) + if step / 10 % 2 == 0 { 3.0 } else { -3.0 };
             simulation.set_wheel_torques(&[drive; 6]).unwrap();
@@ -96,6 +97,6 @@ fn every_tolerance_comes_to_an_end() {
         simulation.set_wheel_torques(&[45.0; 6]).unwrap();
         let report = simulation.step(100).unwrap();
         assert!(report.iterations < 100 * 600, "{tolerance}: {report:?}");
-        assert!(simulation.state().configuration.is_finite());
+        assert!(simulation.q().is_finite());
     }
 }

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use rover_core::geometry::{Plane, SoftGround, SphereField, Terrain, Union};
-use rover_core::integrator::StepOptions;
 use rover_core::simulation::RoverSimulation;
 
 use super::sand_scenes::{dry_sand, placed, wide};
+use crate::shared::moving;
 
 fn driven(h: f64) -> RoverSimulation {
     let model = wide("open-rover", 0.08, 1.0);
@@ -88,12 +88,8 @@ fn wheels_touch_rocks_that_lie_on_sand() {
     let rock = SphereField::new(&[[c.x + 0.16, 0.0, c.z]], &[0.05], None).unwrap();
     let union: Arc<dyn Terrain> =
         Arc::new(Union::new(vec![Arc::new(sand) as Arc<dyn Terrain>, Arc::new(rock)]).unwrap());
-    let options = StepOptions {
-        time_step: 0.005,
-        ..StepOptions::default()
-    };
-    let mut sim = RoverSimulation::new(model.clone(), union, options).unwrap();
-    sim.set_state(start, vec![0.0; model.nv()]);
+    let (options, v) = (field.options().clone(), vec![0.0; model.nv()]);
+    let mut sim = moving(model, union, options, start, v);
     sim.set_wheel_torques(&[1.5; 6]).unwrap();
     let mut touched = false;
     for _ in 0..400 {

@@ -12,6 +12,7 @@ use rover_core::sand::{
 use rover_core::scalar::Instructions;
 
 use super::sand_scenes::{bekker_sand, dry_sand};
+use crate::shared::near;
 
 const WHEEL: SandWheel = SandWheel {
     radius: 0.1,
@@ -19,6 +20,14 @@ const WHEEL: SandWheel = SandWheel {
     rounding: 0.005,
     grouser_height: 0.0,
     grousers: 0,
+};
+
+const LEVEL: Bed<'static> = Bed {
+    place: Vector3::new(0.0, 0.0, 0.0),
+    normal: Vector3::new(0.0, 1.0, 0.0),
+    relief: None,
+    highest: 0.0,
+    gravity: 9.81,
 };
 
 /// 24 points along every arc, and these numbers across the drum and along the radius of a wall.
@@ -88,13 +97,6 @@ fn a_wheel_pressed_down_bears_as_a_plate_does() {
 fn the_force_is_continuous_along_random_paths() {
     for soil in [dry_sand(), bekker_sand()] {
         let rules = rules_within(&WHEEL, &soil, 0.02);
-        let bed = Bed {
-            place: Vector3::zeros(),
-            normal: Vector3::y(),
-            relief: None,
-            highest: 0.0,
-            gravity: 9.81,
-        };
         let mut seed = 1_u64;
         let mut random = || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -112,15 +114,8 @@ fn the_force_is_continuous_along_random_paths() {
                     shift: [x[3], x[4], x[5]],
                     turn: [3.0 * x[6], 3.0 * x[7], 10.0 * x[8]],
                 };
-                react(
-                    (&WHEEL, &rules),
-                    &soil,
-                    &bed,
-                    &pose,
-                    &memory,
-                    Derivatives::Wrench,
-                )
-                .wrench
+                let parts = (&WHEEL, &rules);
+                react(parts, &soil, &LEVEL, &pose, &memory, Derivatives::Wrench).wrench
             };
             let size = (0..=20).map(|k| force(f64::from(k) / 20.0).norm());
             let size = size.fold(1.0, f64::max);
@@ -155,14 +150,6 @@ fn askew() -> (SandWheel, WheelPose, Memory) {
     };
     (wheel, pose, memory)
 }
-
-const LEVEL: Bed<'static> = Bed {
-    place: Vector3::new(0.0, 0.0, 0.0),
-    normal: Vector3::new(0.0, 1.0, 0.0),
-    relief: None,
-    highest: 0.0,
-    gravity: 9.81,
-};
 
 /// Size of a cell of ruts, m.
 const CELL: f64 = 0.01;
@@ -331,30 +318,20 @@ fn forces_follow_the_scaling_laws_of_grains() {
         let rate = 1.0 / (1.0 - slip);
         let one = small.steady(&drive(rate, angle, 20.0)).unwrap();
         let two = large.steady(&drive(0.5 * rate, angle, 160.0)).unwrap();
-        let moon = OperatingPoint {
-            gravity: 9.81 / 6.0,
-            ..drive(rate, angle, 20.0 / 6.0)
-        };
+        let mut moon = drive(rate, angle, 20.0 / 6.0);
+        moon.gravity /= 6.0;
         let moon = small.steady(&moon).unwrap();
-        let fast = OperatingPoint {
-            speed: 0.3,
-            ..drive(3.0 * rate, angle, 20.0)
-        };
+        let mut fast = drive(3.0 * rate, angle, 20.0);
+        fast.speed *= 3.0;
         let fast = small.steady(&fast).unwrap();
         for (found, length, force) in [(two, 2.0, 8.0), (moon, 1.0, 1.0 / 6.0), (fast, 1.0, 1.0)] {
-            let near = |a: f64, b: f64| (a - b).abs() < 1e-4 * b.abs().max(1e-3);
-            assert!(
-                near(found.sinkage, length * one.sinkage),
-                "{found:?} {one:?}"
-            );
-            assert!(
-                near(found.drawbar, force * one.drawbar),
-                "{found:?} {one:?}"
-            );
-            assert!(
-                near(found.torque, force * length * one.torque),
-                "{found:?} {one:?}"
-            );
+            for (found, expected) in [
+                (found.sinkage, length * one.sinkage),
+                (found.drawbar, force * one.drawbar),
+                (found.torque, force * length * one.torque),
+            ] {
+                near(found, expected, 1e-4 * expected.abs().max(1e-3));
+            }
         }
     }
 }
@@ -371,14 +348,8 @@ fn a_run_ends_in_steady_motion() {
         for _ in 0..2000 {
             last = bed.advance(&mut state, &drive, 20.0 / 9.81, 0.005);
         }
-        assert!(
-            (last.sinkage - steady.sinkage).abs() < 1e-5,
-            "{last:?} {steady:?}"
-        );
-        assert!(
-            (last.drawbar - steady.drawbar).abs() < 1e-2,
-            "{last:?} {steady:?}"
-        );
+        near(last.sinkage, steady.sinkage, 1e-5);
+        near(last.drawbar, steady.drawbar, 1e-2);
     }
 }
 

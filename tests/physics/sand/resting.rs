@@ -2,9 +2,26 @@
 
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::sand::{Bekker, Soil, StressLaw};
+use rover_core::simulation::RoverSimulation;
 
 use super::published_law::SIMULANT;
 use super::sand_scenes::{bekker_sand, dry_sand, placed, total_force, wide};
+
+/// Moves a rover up, m.
+fn lift(sim: &mut RoverSimulation, way: f64) {
+    let (mut q, v) = (sim.q().clone(), sim.v().to_vec());
+    q.position.y += way;
+    sim.set_state(q, v);
+}
+
+/// Mean of the forces of the sand on the wheels over so many steps, N.
+fn mean_force(sim: &mut RoverSimulation, steps: usize) -> Vector3<f64> {
+    let forces = (0..steps).map(|_| {
+        sim.step(1).unwrap();
+        total_force(sim)
+    });
+    forces.sum::<Vector3<f64>>() / steps as f64
+}
 
 /// After it has settled, a rover that is left alone stays where it is, on level sand and on ten
 /// degrees, light or heavy, at every step; the sand bears its weight.
@@ -49,18 +66,12 @@ fn a_heavy_rover_comes_to_rest_in_bekkers_soil_after_a_fall() {
     let weight = 9.81 * model.mass();
     for (h, angle) in [(0.005, 0.0), (0.02, 0.0), (0.005, 10.0_f64.to_radians())] {
         let mut sim = placed(&model, bekker_sand(), angle, h);
-        let (mut q, v) = (sim.q().clone(), sim.v().to_vec());
-        q.position.y += 0.5;
-        sim.set_state(q, v);
+        lift(&mut sim, 0.5);
         sim.brake();
         let settle = (1.5 / h) as usize;
         assert!(sim.step(settle).unwrap().is_converged());
         let before = sim.q().position;
-        let mut mean = Vector3::zeros();
-        for _ in 0..settle {
-            sim.step(1).unwrap();
-            mean += total_force(&sim) / settle as f64;
-        }
+        let mean = mean_force(&mut sim, settle);
         let creep = (sim.q().position - before).norm() / 1.5;
         assert!(creep < 1e-3, "{h} {angle}: {creep} m/s");
         let error = (mean - Vector3::new(0.0, weight, 0.0)).norm();
@@ -76,17 +87,11 @@ fn a_rover_that_is_placed_deep_in_bekkers_soil_rests() {
     let weight = 9.81 * model.mass();
     for h in [0.005, 0.02] {
         let mut sim = placed(&model, bekker_sand(), 10.0_f64.to_radians(), h);
-        let (mut q, v) = (sim.q().clone(), sim.v().to_vec());
-        q.position.y -= 0.2;
-        sim.set_state(q, v);
+        lift(&mut sim, -0.2);
         sim.brake();
         let steps = (0.5 / h) as usize;
         assert!(sim.step(steps).unwrap().is_converged());
-        let mut mean = Vector3::zeros();
-        for _ in 0..steps {
-            sim.step(1).unwrap();
-            mean += total_force(&sim) / steps as f64;
-        }
+        let mean = mean_force(&mut sim, steps);
         let error = (mean - Vector3::new(0.0, weight, 0.0)).norm();
         assert!(error < 0.02 * weight, "{h}: {mean}, {weight}");
     }

@@ -5,7 +5,7 @@ use rover_core::multibody::{
 };
 use rover_core::nalgebra::{Rotation3, Vector3};
 
-use super::machines::body;
+use crate::shared::body;
 
 const TWO: &str = "shapes = [
     { kind = 'box', size = [0.5, 0.2, 0.3], position = [0.1, 0.0, 0.0], rotation = [0.3, 0.1, -0.2], collides = true },

@@ -3,7 +3,7 @@
 use rover_core::multibody::{MassProperties, Shape, SolidDescription};
 use rover_core::nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::machines::{body, described};
+use crate::shared::{body, described};
 
 fn properties(mass: f64, rest: &str) -> MassProperties {
     described(mass, rest).solids[0].mass_properties().unwrap()

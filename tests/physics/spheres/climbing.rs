@@ -10,10 +10,10 @@
 use nalgebra::Vector3;
 use rover_core::geometry::{Plane, SphereField};
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Model, ModelDescription};
-use rover_core::simulation::RoverSimulation;
+use rover_core::multibody::Model;
 
-use crate::rover::scenes::simulation;
+use super::sphere_scenes::placed;
+use crate::shared::{model, near_in};
 
 const R: f64 = 0.1;
 const EDGE: f64 = 1e-4;
@@ -45,7 +45,7 @@ radius = 0.1
 torque_limit = 1e3
 drive_sign = -1.0
 "#;
-    Model::from_description(ModelDescription::from_toml(text).unwrap()).unwrap()
+    model(text)
 }
 
 /// Whether the wheel, at rest against an edge of `height`, is on top of it in the end.
@@ -62,19 +62,8 @@ fn climbs(height: f64, mu: f64) -> bool {
     // centre at R − height above the top, at the distance R + EDGE from the sphere's centre
     let up = R - height + EDGE;
     let back = ((R + EDGE).powi(2) - up * up).sqrt();
-    let model = driven_wheel();
-    let mut wheel: RoverSimulation = simulation(
-        model,
-        Plane::ground(),
-        options.clone(),
-        &[0.0; 7],
-        &[0.0; 7],
-    );
-    let mut start = wheel.state().configuration.clone();
-    start.position = Vector3::new(-back, R - height, 0.0);
-    wheel =
-        RoverSimulation::new(wheel.model().clone(), std::sync::Arc::new(field), options).unwrap();
-    wheel.set_state(start, vec![0.0; 7]);
+    let start = Vector3::new(-back, R - height, 0.0);
+    let mut wheel = placed(driven_wheel(), field, options, start);
     // A little more torque than holds the wheel on the edge
     let sine = back / (R + EDGE);
     wheel
@@ -82,7 +71,7 @@ fn climbs(height: f64, mu: f64) -> bool {
         .unwrap();
     for _ in 0..4000 {
         assert!(wheel.step(1).unwrap().is_converged());
-        let position = wheel.state().configuration.position;
+        let position = wheel.q().position;
         if position.x > -0.2 * back {
             return position.y > R - 0.1 * height;
         }
@@ -105,9 +94,6 @@ fn a_driven_wheel_climbs_what_the_friction_cone_allows_and_no_more() {
             }
         }
         // The edge's own radius is a thousandth of the wheel's.
-        assert!(
-            (low - limit).abs() < 5e-3 * limit,
-            "μ = {mu}: {low} R for {limit} R"
-        );
+        near_in(&mu, low, limit, 5e-3 * limit);
     }
 }

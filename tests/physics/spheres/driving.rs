@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 use rover_core::geometry::SphereField;
-use rover_core::integrator::StepOptions;
+use rover_core::integrator::Variant;
 use rover_core::multibody::Model;
 
 use super::sphere_scenes::{deepest, placed, rocks};
+use crate::shared::stepping;
 
 #[allow(clippy::print_stderr)] // figures that are reported beside what is asserted
 fn report(line: &str) {
@@ -16,16 +17,13 @@ fn report(line: &str) {
 fn penetration_stays_below_a_millimetre_at_one_millisecond() {
     for seed in [1, 2, 3] {
         let field = SphereField::rocks(&rocks(seed)).unwrap();
-        let options = StepOptions {
-            time_step: 0.001,
-            ..StepOptions::default()
-        };
+        let options = stepping(Variant::default(), 0.001);
         let mut rover = placed(Model::rover(), field, options, Vector3::new(-4.0, 0.6, 0.0));
         rover.step(800).unwrap();
         let (mut worst, mut unsolved, mut fastest, mut iterations) = (0.0_f64, 0, 0.0_f64, 0);
         let steps = 4000;
         for _ in 0..steps {
-            let v = &rover.state().v;
+            let v = rover.v();
             let speed = v[0].hypot(v[1]).hypot(v[2]);
             fastest = fastest.max(speed);
             // A cruise control: as much torque as keeps it below 1 m/s.
@@ -38,7 +36,7 @@ fn penetration_stays_below_a_millimetre_at_one_millisecond() {
         report(&format!(
             "seed {seed}: deepest {worst:.2e} m, {unsolved} of {steps} steps not converged, {:.2} iterations a step, fastest {fastest:.2} m/s, at {}",
             f64::from(u32::try_from(iterations).unwrap()) / f64::from(steps),
-            rover.state().configuration.position.transpose()
+            rover.q().position.transpose()
         ));
         assert!(worst > -1e-3, "seed {seed}: {worst} m");
     }

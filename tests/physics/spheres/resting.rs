@@ -11,6 +11,7 @@ use rover_core::simulation::RoverSimulation;
 
 use super::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, field, lone_wheel, placed};
 use crate::rover::scenes::VARIANTS;
+use crate::shared::{near, stepping};
 
 const R: f64 = WHEEL_RADIUS;
 const G: f64 = 9.81;
@@ -40,7 +41,7 @@ fn normal_forces(simulation: &RoverSimulation) -> Vec<(u32, f64)> {
 #[test]
 fn on_the_crest_of_one_sphere_it_carries_its_weight() {
     for variant in VARIANTS {
-        let options = crate::stepping(variant, 0.005);
+        let options = stepping(variant, 0.005);
         let sphere = field(&[[0.0, 0.0, 0.0, 0.5]]);
         let start = Vector3::new(0.0, 0.5 + R, 0.0);
         let mut wheel = placed(lone_wheel(), sphere, options, start);
@@ -49,7 +50,7 @@ fn on_the_crest_of_one_sphere_it_carries_its_weight() {
         let forces = normal_forces(&wheel);
         assert_eq!(forces.len(), 1);
         assert!((forces[0].1 - WHEEL_MASS * G).abs() < 1e-6);
-        assert!((wheel.state().configuration.position - start).norm() < 1e-9);
+        assert!((wheel.q().position - start).norm() < 1e-9);
     }
 }
 
@@ -75,15 +76,9 @@ fn wedged_between_two_spheres_each_carries_its_share_of_the_triangle_of_forces()
             let forces = normal_forces(&wheel);
             assert_eq!(forces.len(), 2, "one contact a sphere");
             let total = WHEEL_MASS * G / (alpha + beta).sin();
-            assert!(
-                (forces[0].1 - total * beta.sin()).abs() < 1e-6,
-                "{forces:?}"
-            );
-            assert!(
-                (forces[1].1 - total * alpha.sin()).abs() < 1e-6,
-                "{forces:?}"
-            );
-            assert!(wheel.state().configuration.position.norm() < 1e-8);
+            near(forces[0].1, total * beta.sin(), 1e-6);
+            near(forces[1].1, total * alpha.sin(), 1e-6);
+            assert!(wheel.q().position.norm() < 1e-8);
         }
     }
 }
@@ -95,7 +90,7 @@ fn lying_on_three_spheres_each_carries_a_third() {
     // proportion to 1 : 1/√2 : 1/√2 of the distances.
     for variant in VARIANTS {
         for directions in [[0.0, 120.0, 240.0], [0.0, 135.0, 225.0]] {
-            let options = crate::stepping(variant, 0.005);
+            let options = stepping(variant, 0.005);
             let places: Vec<Vector3<f64>> = directions
                 .iter()
                 .map(|d: &f64| {
@@ -103,14 +98,10 @@ fn lying_on_three_spheres_each_carries_a_third() {
                     Vector3::new(a.cos(), 0.0, a.sin()) * (0.6 * R)
                 })
                 .collect();
-            let ground = field(
-                &places
-                    .iter()
-                    .map(|p| [p.x, -0.2, p.z, 0.2])
-                    .collect::<Vec<_>>(),
-            );
+            let spheres: Vec<_> = places.iter().map(|p| [p.x, -0.2, p.z, 0.2]).collect();
+            let ground = field(&spheres);
             let mut wheel = placed(lone_wheel(), ground, options, Vector3::zeros());
-            let mut flat = wheel.state().configuration.clone();
+            let mut flat = wheel.q().clone();
             flat.attitude =
                 UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
             wheel.set_state(flat, vec![0.0; 6]);
@@ -124,7 +115,7 @@ fn lying_on_three_spheres_each_carries_a_third() {
                 sum.norm() < 1e-6 && (total - WHEEL_MASS * G).abs() < 1e-6,
                 "{forces:?}"
             );
-            let last = wheel.state().configuration.position;
+            let last = wheel.q().position;
             assert!(last.norm() < 1e-8, "{variant:?}: {last}");
         }
     }
@@ -155,14 +146,9 @@ fn wedged_between_three_spheres_the_triangle_is_a_pyramid() {
     let forces = normal_forces(&wheel);
     assert_eq!(forces.len(), 3);
     let total = WHEEL_MASS * G / (alpha + beta).sin();
-    assert!(
-        (forces[0].1 - total * beta.sin()).abs() < 1e-6,
-        "{forces:?}"
-    );
+    near(forces[0].1, total * beta.sin(), 1e-6);
     // The in-plane part of each of the pair's normals is cos of its lean, √(1 − (side/r)²).
     let each = total * alpha.sin() / (2.0 * (1.0 - (side / r).powi(2)).sqrt());
-    assert!(
-        (forces[1].1 - each).abs() < 1e-6 && (forces[2].1 - each).abs() < 1e-6,
-        "{forces:?}"
-    );
+    near(forces[1].1, each, 1e-6);
+    near(forces[2].1, each, 1e-6);
 }

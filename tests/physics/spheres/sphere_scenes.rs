@@ -5,8 +5,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use rover_core::geometry::{Rocks, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::multibody::Model;
 use rover_core::simulation::RoverSimulation;
+
+use crate::shared::{model, resting};
 
 /// Mass of the lone wheel, kg.
 pub const WHEEL_MASS: f64 = 30.0;
@@ -32,7 +34,7 @@ torque_limit = 100.0
 drive_sign = -1.0
 "#
     );
-    Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap()
+    model(&text)
 }
 
 /// A field from (x, y, z, radius).
@@ -49,12 +51,9 @@ pub fn placed(
     options: StepOptions,
     position: Vector3<f64>,
 ) -> RoverSimulation {
-    let mut simulation = RoverSimulation::new(Arc::new(model), Arc::new(terrain), options).unwrap();
-    let mut start = Configuration::zero(simulation.model());
-    start.position = position;
-    let v = vec![0.0; simulation.model().nv()];
-    simulation.set_state(start, v);
-    simulation
+    resting(model, Arc::new(terrain), options, |q| {
+        q.position = position;
+    })
 }
 
 /// Rocks of 5 cm to 30 cm on flat ground, dense enough that a wheel always meets some.

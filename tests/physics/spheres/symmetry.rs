@@ -5,10 +5,11 @@ use std::sync::Arc;
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Model};
+use rover_core::multibody::Model;
 use rover_core::simulation::RoverSimulation;
 
 use super::sphere_scenes::Random;
+use crate::shared::resting;
 
 /// Spheres for a drive along x, drawn with the rover's own track: every
 /// sphere in reach of a wheel sooner or later.
@@ -36,15 +37,11 @@ fn driven(stones: &[[f64; 4]], heading: f64, steps: usize) -> RoverSimulation {
         .collect();
     let radii: Vec<f64> = stones.iter().map(|s| s[3]).collect();
     let field = SphereField::new(&centres, &radii, Some(Plane::ground())).unwrap();
-    let model = Arc::new(Model::rover());
-    let mut simulation =
-        RoverSimulation::new(model, Arc::new(field), StepOptions::default()).unwrap();
-    let start = Configuration {
-        position: turn * Vector3::new(0.0, 0.35, 0.0),
-        attitude: turn,
-        ..simulation.state().configuration.clone()
-    };
-    simulation.set_state(start, vec![0.0; 21]);
+    let options = StepOptions::default();
+    let mut simulation = resting(Model::rover(), Arc::new(field), options, |q| {
+        q.position = turn * Vector3::new(0.0, 0.35, 0.0);
+        q.attitude = turn;
+    });
     simulation.set_wheel_torques(&[35.0; 6]).unwrap();
     simulation.step(steps).unwrap();
     simulation
@@ -74,8 +71,8 @@ fn turning_the_scene_turns_the_answer() {
     for heading in [0.7, 3.0] {
         let turned = driven(&stones, heading, 400);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);
-        let expected = turn * straight.state().configuration.position;
-        let miss = (turned.state().configuration.position - expected).norm();
+        let expected = turn * straight.q().position;
+        let miss = (turned.q().position - expected).norm();
         assert!(
             miss < 1e-5 && expected.norm() > 0.5,
             "heading {heading}: {miss} m"

@@ -7,6 +7,7 @@ use rover_core::multibody::Model;
 
 use super::sphere_scenes::{WHEEL_RADIUS, deepest, field, lone_wheel, placed};
 use crate::rover::scenes::VARIANTS;
+use crate::shared::{joints, near, stepping};
 
 const R: f64 = WHEEL_RADIUS;
 
@@ -17,7 +18,7 @@ fn a_wheel_dropped_from_two_metres_at_20_ms_lands_on_every_stone() {
             // from one step's phase to the next, and off centre to either side
             for phase in 0..10 {
                 for aside in [-0.5, 0.0, 0.3] {
-                    let options = crate::stepping(variant, 0.02);
+                    let options = stepping(variant, 0.02);
                     let stone = field(&[[0.0, 0.0, 0.0, radius]]);
                     let top = (R + radius) * (1.0_f64 - aside * aside).sqrt();
                     let start = Vector3::new(
@@ -38,7 +39,7 @@ fn a_wheel_dropped_from_two_metres_at_20_ms_lands_on_every_stone() {
                         );
                         if has_struck {
                             // Stopped on top, or on its way down the side that it struck.
-                            let x = wheel.state().configuration.position;
+                            let x = wheel.q().position;
                             assert!(x.y > -0.5 * top || x.x * aside > 0.0, "{case}: {x}");
                             break;
                         }
@@ -47,7 +48,7 @@ fn a_wheel_dropped_from_two_metres_at_20_ms_lands_on_every_stone() {
                         has_struck,
                         "{variant:?}, radius {radius}, phase {phase}, {aside}"
                     );
-                    let fall = -wheel.state().v[1];
+                    let fall = -wheel.v()[1];
                     let normal = (1.0 - aside * aside).sqrt();
                     assert!(fall < 7.0 * (1.0 - 0.3 * normal), "falls on at {fall}");
                 }
@@ -71,23 +72,19 @@ fn the_rover_dropped_from_two_metres_at_20_ms_comes_to_rest_on_pebbles_and_bould
                     .iter()
                     .map(|s| [s[0] + pitch / 2.0, s[1] - 0.1, s[2] + pitch / 2.0, s[3]]),
             );
-            let options = crate::stepping(variant, 0.02);
-            let mut rover = placed(
-                Model::rover(),
-                field(&below),
-                options,
-                Vector3::new(0.0, 2.4, 0.0),
-            );
+            let options = stepping(variant, 0.02);
+            let start = Vector3::new(0.0, 2.4, 0.0);
+            let mut rover = placed(Model::rover(), field(&below), options, start);
             rover.brake();
             let mut converged = 0;
             for _ in 0..300 {
                 converged += usize::from(rover.step(1).unwrap().is_converged());
             }
-            assert!(rover.state().configuration.is_finite());
+            assert!(rover.q().is_finite());
             println_if_any(300 - converged, &format!("{variant:?}, radius {radius}"));
             // Between pebbles farther apart than a wheel is wide it may stand on its belly; nothing
             // else supports it.
-            let height = rover.state().configuration.position.y;
+            let height = rover.q().position.y;
             assert!(
                 height > -0.2,
                 "{variant:?}, radius {radius}: fell to {height}"
@@ -119,14 +116,10 @@ fn high_centred_on_a_boulder_the_trunk_carries_the_rover() {
     // most: a boulder under it lifts all wheels.
     for variant in VARIANTS {
         let boulder = field(&[[-0.02, 0.0, 0.0, 0.5]]);
-        let options = crate::stepping(variant, 0.005);
-        let mut rover = placed(
-            Model::rover(),
-            boulder,
-            options,
-            Vector3::new(0.0, 0.72, 0.0),
-        );
-        let joints = crate::joints(&rover);
+        let options = stepping(variant, 0.005);
+        let start = Vector3::new(0.0, 0.72, 0.0);
+        let mut rover = placed(Model::rover(), boulder, options, start);
+        let joints = joints(&rover);
         rover.hold(&joints, None, None, None).unwrap();
         rover.step(60).unwrap();
         let on_trunk = rover
@@ -135,13 +128,9 @@ fn high_centred_on_a_boulder_the_trunk_carries_the_rover() {
             .filter(|a| a.contact.part == Part::Box(0));
         assert_eq!(on_trunk.count(), 1);
         let weight = rover.model().mass() * 9.81;
-        assert!(
-            (rover.body_force() / weight - 1.0).abs() < 0.1,
-            "{}",
-            rover.body_force()
-        );
+        near(rover.body_force() / weight, 1.0, 0.1);
         rover.step(1000).unwrap();
-        assert!(rover.state().configuration.is_finite());
+        assert!(rover.q().is_finite());
     }
 }
 
@@ -154,10 +143,10 @@ fn a_stone_against_the_face_pushes_the_wheel_aside() {
     };
     let start = Vector3::new(0.02, 0.0, 0.06);
     let mut wheel = placed(lone_wheel(), stone, options, start);
-    let mut turned = wheel.state().configuration.clone();
+    let mut turned = wheel.q().clone();
     turned.attitude = UnitQuaternion::identity();
     wheel.set_state(turned, vec![0.0, 0.0, -1.0, 0.0, 0.0, 0.0]);
     wheel.step(10).unwrap();
-    let x = wheel.state().configuration.position;
+    let x = wheel.q().position;
     assert!(x.z > 0.045, "{x}");
 }

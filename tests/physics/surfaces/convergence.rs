@@ -1,10 +1,9 @@
 //! A smooth surface is met to second order of the spacing.
 
 use rover_core::contact::detection::disc_gap;
-use rover_core::geometry::Disc;
 use rover_core::nalgebra::Vector3;
 
-use super::surface_scenes::map;
+use super::surface_scenes::{disc, map};
 use crate::rover::scenes::order;
 
 #[test]
@@ -17,15 +16,9 @@ fn gaps_over_a_sine_converge_with_the_square_of_the_spacing() {
             let s = f64::from(k) / 60.0;
             let (heading, lean) = (3.0 * s, 0.2 * (9.0 * s).sin());
             let axle = Vector3::new(heading.sin(), lean, heading.cos()).normalize();
-            let spoke = axle.cross(&Vector3::y()).normalize();
             let (x, z) = (-1.4 + 2.8 * s, 1.2 * (5.0 * s).sin());
             let centre = Vector3::new(x, sine(x, z) + 0.25, z);
-            let disc = Disc {
-                centre,
-                axle,
-                spoke,
-                radius: 0.2,
-            };
+            let disc = disc(centre, axle, 0.2);
             disc_gap(&disc, &Vector3::zeros(), &field)
         });
         places.collect::<Vec<_>>()

@@ -24,9 +24,7 @@ pub fn bumpy(seed: u64, spacing: f64, height: f64) -> HeightField {
 
 #[test]
 fn the_rover_drops_onto_a_rough_map_and_comes_to_rest_on_it() {
-    let mut q = [0.0; 21];
-    q[1] = 1.0;
-    let mut rover = rover_on(Arc::new(bumpy(7, 0.1, 0.06)), &q);
+    let mut rover = rover_on(Arc::new(bumpy(7, 0.1, 0.06)), 1.0);
     for _ in 0..4 {
         rover.step(100).unwrap();
     }
@@ -41,11 +39,11 @@ fn leaving_the_map_is_an_error_that_names_the_place_and_keeps_the_state() {
     for field in fields {
         let start = Vector3::new(0.0, WHEEL_RADIUS, 0.0);
         let mut wheel = placed(lone_wheel(), field, StepOptions::default(), start);
-        let configuration = wheel.state().configuration.clone();
+        let configuration = wheel.q().clone();
         let spin = -2.0 / WHEEL_RADIUS;
         wheel.set_state(configuration, vec![2.0, 0.0, 0.0, 0.0, 0.0, spin]);
         let error = wheel.step(1000).unwrap_err();
-        let x = wheel.state().configuration.position.x;
+        let x = wheel.q().position.x;
         assert!((0.85..1.0).contains(&x), "{x}");
         let StepError::NoGround { x, .. } = error else {
             panic!("{error}")

@@ -7,12 +7,12 @@ use rover_core::contact::{Activation, Contact, Part};
 use rover_core::geometry::query::convex;
 use rover_core::geometry::{HeightField, PlacedShape, SupportMap, Terrain, TriangleMesh, Union};
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription, coordinates};
+use rover_core::multibody::{Configuration, Kinematics, Model, coordinates};
 use rover_core::nalgebra::{Unit, UnitQuaternion, Vector3};
-use rover_core::simulation::RoverSimulation;
 
 use super::meshes::ball;
 use super::surface_scenes::map;
+use crate::shared::moving;
 use crate::spheres::sphere_scenes::Random;
 
 /// A triangle of a surface as a convex body.
@@ -63,6 +63,14 @@ fn of_map(field: &HeightField) -> Vec<Triangle> {
         .collect()
 }
 
+fn on_map(field: HeightField) -> Ground {
+    Ground {
+        triangles: of_map(&field),
+        radius: -field.origin()[0] - 2.0 * field.spacing()[0],
+        terrain: Arc::new(field),
+    }
+}
+
 fn boulder(centre: Vector3<f64>, cuts: usize) -> Ground {
     let mesh = ball(0.15, cuts, centre);
     Ground {
@@ -75,13 +83,12 @@ fn boulder(centre: Vector3<f64>, cuts: usize) -> Ground {
 /// A flat map with one spike.
 fn spike(random: &mut Random) -> HeightField {
     let (height, spacing) = (random.between(0.1, 0.5), random.between(0.1, 0.15));
-    map(14, spacing, |x, z| {
-        if x.abs() + z.abs() < 0.5 * spacing {
-            height
-        } else {
-            0.0
-        }
-    })
+    one_spike(height, spacing)
+}
+
+fn one_spike(height: f64, spacing: f64) -> HeightField {
+    let is_tip = |x: f64, z: f64| x.abs() + z.abs() < 0.5 * spacing;
+    map(14, spacing, |x, z| if is_tip(x, z) { height } else { 0.0 })
 }
 
 /// Two spikes, rough maps, boulders, and a boulder on a rough map.
@@ -98,11 +105,6 @@ fn grounds(random: &mut Random) -> Vec<Ground> {
     let stone = ball(0.15, 1, Vector3::new(0.05, 0.03, -0.1));
     let mut triangles = of_map(&stony);
     triangles.extend(of_mesh(&stone));
-    let on_map = |field: HeightField| Ground {
-        triangles: of_map(&field),
-        radius: -field.origin()[0] - 2.0 * field.spacing()[0],
-        terrain: Arc::new(field),
-    };
     let mut all: Vec<Ground> = fields.into_iter().map(on_map).collect();
     let radius = -stony.origin()[0] - 2.0 * stony.spacing()[0];
     let parts: Vec<Arc<dyn Terrain>> = vec![Arc::new(stony), Arc::new(stone)];
@@ -118,25 +120,21 @@ fn grounds(random: &mut Random) -> Vec<Ground> {
 
 /// A body that is a part of this shape and nothing else, or a wheel.
 fn body(shape: &str) -> (Model, Part) {
-    let solid = "name = \"one\"\n[[solids]]\nname = \"one\"\njoint = \"free\"\nmass = 3.0\n";
     let (text, part) = if let Some(width) = shape.strip_prefix("wheel") {
         let rest = "shape = { kind = \"sphere\", radius = 0.1 }\n[[wheels]]\nname = \"W\"\n\
-                    solid = \"one\"\naxle = [0.0, 0.0, 1.0]\nradius = 0.15\ntorque_limit = 1.0\n\
+                    solid = \"body\"\naxle = [0.0, 0.0, 1.0]\nradius = 0.15\ntorque_limit = 1.0\n\
                     drive_sign = -1.0\n";
-        (format!("{solid}{rest}{width}"), Part::Wheel(0))
+        (format!("{rest}{width}"), Part::Wheel(0))
     } else {
         let part = match shape {
             shape if shape.contains("box") => Part::Box(0),
             shape if shape.contains("sphere") => Part::Sphere(0),
             _ => Part::Collider(0),
         };
-        (
-            format!("{solid}shapes = [{{ collides = true, {shape} }}]\n"),
-            part,
-        )
+        let text = format!("shapes = [{{ collides = true, {shape} }}]");
+        (text, part)
     };
-    let description = ModelDescription::from_toml(&text).unwrap();
-    (Model::from_description(description).unwrap(), part)
+    (crate::shared::body(3.0, &text), part)
 }
 
 /// Boxes, a thin wheel, wheels with a width (one of them a torus, one a cylinder) and a ball.
@@ -452,13 +450,8 @@ fn an_overlap_is_continuous_along_short_ways_near_the_ground() {
                         let depth = short.depth(&*ground.terrain, STRIDE * f64::from(k));
                         let jump = (depth - before).abs() - 1.5 * STRIDE - shallow;
                         if jump > 0.0 {
-                            jumps.push((
-                                jump,
-                                format!(
-                                    "{round} {number} {k} {before} {depth} {:?}",
-                                    short.shape(0.0)
-                                ),
-                            ));
+                            let scene = format!("{round} {number} {k} {before} {depth}");
+                            jumps.push((jump, format!("{scene} {:?}", short.shape(0.0))));
                         }
                         before = depth;
                     }
@@ -483,32 +476,13 @@ const STRIDE: f64 = 2e-4;
 /// that came through its far side.
 #[test]
 fn a_tip_beyond_the_middle_of_a_part_pushes_it_back() {
-    let field = map(
-        14,
-        0.1,
-        |x, z| if x.abs() + z.abs() < 0.05 { 0.5 } else { 0.0 },
-    );
+    let field = one_spike(0.5, 0.1);
+    let (x, y) = (Vector3::x_axis(), Vector3::y_axis());
     for (shape, half, axis) in [
-        (
-            "wheel\nwidth = 0.1\nrounding = 0.02",
-            0.05,
-            Vector3::x_axis(),
-        ),
-        (
-            "wheel\nwidth = 0.1\nrounding = 0.05",
-            0.05,
-            Vector3::x_axis(),
-        ),
-        (
-            "wheel\nwidth = 0.12\nrounding = 0.0",
-            0.06,
-            Vector3::x_axis(),
-        ),
-        (
-            "kind = \"box\", size = [0.6, 0.06, 0.4]",
-            0.03,
-            Vector3::y_axis(),
-        ),
+        ("wheel\nwidth = 0.1\nrounding = 0.02", 0.05, x),
+        ("wheel\nwidth = 0.1\nrounding = 0.05", 0.05, x),
+        ("wheel\nwidth = 0.12\nrounding = 0.0", 0.06, x),
+        ("kind = \"box\", size = [0.6, 0.06, 0.4]", 0.03, y),
     ] {
         let body = body(shape);
         let mut path = Path::random(&body, &mut Random(1));
@@ -533,12 +507,7 @@ fn a_box_that_rests_on_a_spike_or_a_boulder_is_not_thrown_sideways() {
     let mut tried = 0;
     for case in 0..60 {
         let ground = if case % 2 == 0 {
-            let field = spike(&mut random);
-            Ground {
-                triangles: of_map(&field),
-                radius: -field.origin()[0] - 2.0 * field.spacing()[0],
-                terrain: Arc::new(field),
-            }
+            on_map(spike(&mut random))
         } else {
             boulder(Vector3::new(0.0, 0.1, 0.0), case / 2 % 3)
         };
@@ -554,12 +523,11 @@ fn a_box_that_rests_on_a_spike_or_a_boulder_is_not_thrown_sideways() {
         let lowered = path.at(touch + 1e-4);
         let depth = path.depth(&*ground.terrain, touch + 1e-4);
         assert!(depth < 1.1e-4 + 4e-4, "{case}: {depth}");
-        let options = StepOptions::default();
-        let terrain = ground.terrain.clone();
-        let mut stone = RoverSimulation::new(model.clone(), terrain, options).unwrap();
-        stone.set_state(lowered.clone(), vec![0.0; 6]);
+        let (terrain, options) = (ground.terrain.clone(), StepOptions::default());
+        let v = vec![0.0; 6];
+        let mut stone = moving(model.clone(), terrain, options, lowered.clone(), v);
         stone.step(1).unwrap();
-        let now = &stone.state().configuration;
+        let now = stone.q();
         let moved = (now.position - lowered.position).norm();
         assert!(moved < 3e-3, "{case}: {moved}");
         let turned = now.attitude.angle_to(&lowered.attitude);

@@ -7,8 +7,10 @@ use rover_core::simulation::RoverSimulation;
 
 use super::surface_scenes::{map, rover_on};
 use crate::rover::scenes::on_slope;
+use crate::shared::{apart, flat, in_public};
 use crate::spheres::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, lone_wheel, placed};
 use rover_core::integrator::StepOptions;
+use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::Vector3;
 
 /// Drives on and turns for two seconds.
@@ -20,28 +22,21 @@ fn drive(simulation: &mut RoverSimulation) -> Vec<f64> {
     let mut path = Vec::new();
     for _ in 0..20 {
         assert!(simulation.step(20).unwrap().is_converged());
-        path.extend(simulation.state().configuration.position.iter());
-        path.extend(simulation.state().configuration.attitude.coords.iter());
+        path.extend(simulation.q().position.iter());
+        path.extend(simulation.q().attitude.coords.iter());
     }
     path
 }
 
-fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    differences.fold(0.0, f64::max)
-}
-
 #[test]
 fn a_flat_map_of_any_spacing_moves_the_rover_as_the_plane_does() {
-    let mut q = [0.0; 21];
-    q[1] = 0.36;
-    let expected = drive(&mut rover_on(Arc::new(Plane::ground()), &q));
-    let away = largest_difference(&expected[..1], &expected[expected.len() - 7..][..1]);
+    let expected = drive(&mut rover_on(flat(), 0.36));
+    let away = apart(&expected[..1], &expected[expected.len() - 7..][..1]);
     assert!(away > 0.3, "it drives: {away}");
     for (spacing, cells) in [(0.03, 400), (0.25, 48), (1.0, 12), (5.0, 4)] {
-        let flat: Arc<dyn Terrain> = Arc::new(map(cells, spacing, |_, _| 0.0));
-        let path = drive(&mut rover_on(flat, &q));
-        let error = largest_difference(&path, &expected);
+        let level = Arc::new(map(cells, spacing, |_, _| 0.0));
+        let path = drive(&mut rover_on(level, 0.36));
+        let error = apart(&path, &expected);
         assert!(error < 1e-9, "{spacing}: {error}");
     }
 }
@@ -54,28 +49,23 @@ fn a_tilted_map_moves_the_rover_as_the_tilted_plane_does() {
         let slope = rise / spacing;
         let degrees = slope.atan().to_degrees();
         let mut on_plane = on_slope(degrees, StepOptions::default());
-        let q = rover_core::multibody::coordinates::to_public(
-            on_plane.model(),
-            &on_plane.state().configuration,
-        );
+        let q = coordinates::to_public(on_plane.model(), on_plane.q());
         let expected = drive(&mut on_plane);
         let field = map(cells, spacing, |x, _| (x / spacing).round() * rise);
-        let path = drive(&mut rover_on(Arc::new(field), &q));
-        let error = largest_difference(&path, &expected);
+        let path = drive(&mut in_public(Model::rover(), Arc::new(field), &q));
+        let error = apart(&path, &expected);
         assert!(error < 1e-9, "{spacing}: {error}");
     }
 }
 
 #[test]
 fn a_union_with_a_plane_below_changes_nothing() {
-    let mut q = [0.0; 21];
-    q[1] = 0.36;
-    let flat: Arc<dyn Terrain> = Arc::new(map(48, 0.25, |_, _| 0.0));
+    let level: Arc<dyn Terrain> = Arc::new(map(48, 0.25, |_, _| 0.0));
     let below: Arc<dyn Terrain> = Arc::new(Plane::new([0.0, 1.0, 0.0], 1.0).unwrap());
-    let both = Union::new(vec![Arc::clone(&flat), below]).unwrap();
-    let expected = drive(&mut rover_on(flat, &q));
-    let path = drive(&mut rover_on(Arc::new(both), &q));
-    assert!(largest_difference(&path, &expected) < 1e-9);
+    let both = Union::new(vec![Arc::clone(&level), below]).unwrap();
+    let expected = drive(&mut rover_on(level, 0.36));
+    let path = drive(&mut rover_on(Arc::new(both), 0.36));
+    assert!(apart(&path, &expected) < 1e-9);
 }
 
 #[test]
@@ -85,7 +75,7 @@ fn a_wheel_feels_nothing_of_a_thousand_inner_edges() {
         let field = map(2400, 0.004, |_, _| 0.0);
         let start = Vector3::new(-3.0, WHEEL_RADIUS, 0.0);
         let mut wheel = placed(lone_wheel(), field, StepOptions::default(), start);
-        let mut configuration = wheel.state().configuration.clone();
+        let mut configuration = wheel.q().clone();
         let turn =
             rover_core::nalgebra::UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -heading);
         configuration.attitude = turn;

@@ -3,24 +3,18 @@
 use std::sync::Arc;
 
 use rover_core::contact::detection::disc_gap;
-use rover_core::geometry::{Disc, HeightField, Plane, Terrain, TriangleMesh, Union};
-use rover_core::integrator::StepOptions;
+use rover_core::geometry::{HeightField, Plane, Terrain, TriangleMesh, Union};
+use rover_core::integrator::Variant;
 use rover_core::nalgebra::Vector3;
 
-use super::surface_scenes::map;
+use super::surface_scenes::{disc, map};
+use crate::shared::stepping;
 use crate::spheres::sphere_scenes::{deepest, lone_wheel, placed};
 
 /// An octahedron's faces, cut n times and blown up to a ball.
 pub fn ball(radius: f64, cuts: usize, centre: Vector3<f64>) -> TriangleMesh {
-    let mut vertices: Vec<Vector3<f64>> = [
-        Vector3::x(),
-        Vector3::y(),
-        Vector3::z(),
-        -Vector3::x(),
-        -Vector3::y(),
-        -Vector3::z(),
-    ]
-    .to_vec();
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let mut vertices: Vec<Vector3<f64>> = [axes, axes.map(|axis| -axis)].concat();
     let mut triangles: Vec<[usize; 3]> = vec![
         [0, 1, 2],
         [1, 3, 2],
@@ -60,15 +54,8 @@ fn a_fine_mesh_of_a_ball_is_met_as_the_ball() {
     for k in 0..200 {
         let s = f64::from(k);
         let axle = Vector3::new(s.sin(), 0.4 * (2.0 * s).sin(), s.cos()).normalize();
-        let spoke = axle.cross(&Vector3::y()).normalize();
         let out = Vector3::new((3.0 * s).cos(), (0.7 * s).sin(), (5.0 * s).sin()).normalize();
-        let centre = Vector3::new(0.1, 0.2, -0.1) + out * 0.65;
-        let disc = Disc {
-            centre,
-            axle,
-            spoke,
-            radius: 0.2,
-        };
+        let disc = disc(Vector3::new(0.1, 0.2, -0.1) + out * 0.65, axle, 0.2);
         let stone = rover_core::geometry::SphereField::new(&[[0.1, 0.2, -0.1]], &[0.4], None);
         let expected = disc_gap(&disc, &Vector3::zeros(), &stone.unwrap());
         let gap = disc_gap(&disc, &Vector3::zeros(), &mesh);
@@ -104,14 +91,8 @@ fn a_mesh_of_a_map_is_the_map() {
         let s = f64::from(k);
         let (x, z) = (0.6 * (1.3 * s).sin(), 0.6 * (0.9 * s).cos());
         let axle = Vector3::new(s.sin(), 0.2 * (2.0 * s).sin(), s.cos()).normalize();
-        let spoke = axle.cross(&Vector3::y()).normalize();
         let height = wave(x, z) + 0.15 + 0.05 * s.sin();
-        let disc = Disc {
-            centre: Vector3::new(x, height, z),
-            axle,
-            spoke,
-            radius: 0.15,
-        };
+        let disc = disc(Vector3::new(x, height, z), axle, 0.15);
         let [a, b] = [&field as &dyn Terrain, &mesh].map(|t| disc_gap(&disc, &Vector3::zeros(), t));
         assert!((a - b).abs() < 1e-12, "{k}: {a} {b}");
         let [a, b] = [field.height(x, z).unwrap(), mesh.height(x, z).unwrap()];
@@ -125,18 +106,12 @@ fn a_wheel_lands_on_a_rock_that_lies_on_a_map() {
         let flat: Arc<HeightField> = Arc::new(map(40, 0.2, |_, _| 0.0));
         let rock: Arc<TriangleMesh> = Arc::new(ball(0.15, 2, Vector3::new(0.0, 0.05, 0.0)));
         let both = Union::new(vec![flat, rock]).unwrap();
-        let options = StepOptions {
-            time_step: 0.02,
-            ..StepOptions::default()
-        };
-        let start = Vector3::new(
-            0.01 * f64::from(phase),
-            2.0 + 0.013 * f64::from(phase),
-            0.003,
-        );
+        let options = stepping(Variant::default(), 0.02);
+        let phase = f64::from(phase);
+        let start = Vector3::new(0.01 * phase, 2.0 + 0.013 * phase, 0.003);
         let mut wheel = placed(lone_wheel(), both, options, start);
         wheel.step(33).unwrap();
-        let y = wheel.state().configuration.position.y;
+        let y = wheel.q().position.y;
         assert!(
             y > 0.2 && deepest(&wheel) > -0.02,
             "{phase}: {y} {}",

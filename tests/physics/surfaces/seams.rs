@@ -5,11 +5,12 @@ use std::sync::Arc;
 use rover_core::geometry::{Coverage, HeightField, Plane, Terrain, TriangleMesh, Union};
 use rover_core::integrator::StepOptions;
 use rover_core::law::materials::{MaterialPair, Materials};
-use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::multibody::{Configuration, Model};
 use rover_core::nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
 use super::surface_scenes::{map, rover_on};
+use crate::shared::{body, moving, near_in, resting};
 
 const GRAVITY: f64 = 9.81;
 const FRICTION: f64 = 0.3;
@@ -69,7 +70,7 @@ fn union(parts: Vec<Arc<dyn Terrain>>) -> Arc<dyn Terrain> {
     Arc::new(Union::new(parts).unwrap())
 }
 
-fn two<T: Terrain + 'static>(a: T, b: T) -> Arc<dyn Terrain> {
+fn two(a: impl Terrain + 'static, b: impl Terrain + 'static) -> Arc<dyn Terrain> {
     union(vec![Arc::new(a), Arc::new(b)])
 }
 
@@ -82,11 +83,10 @@ const SHAPES: [&str; 3] = [
 ];
 
 fn slider(shape: &str) -> Model {
-    let text = format!(
-        "name = 'slider'\n[[solids]]\nname = 'body'\nmass = 2.0\n\
-         shapes = [{{ {shape}, collides = true, material = 'steel' }}]\n"
-    );
-    Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap()
+    body(
+        2.0,
+        &format!("shapes = [{{ {shape}, collides = true, material = 'steel' }}]"),
+    )
 }
 
 /// A shape that slides off at 2 m/s from x = −0.5 m on a slope about z, once it has stopped.
@@ -97,8 +97,8 @@ fn slide(
     options: StepOptions,
 ) -> RoverSimulation {
     let model = slider(shape);
-    let mut start = Configuration::zero(&model);
     let attitude = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
+    let mut start = Configuration::zero(&model);
     start.position = attitude * Vector3::new(-0.5, 0.01, 0.0);
     start.attitude = attitude;
     let mut v = vec![0.0; model.nv()];
@@ -109,8 +109,7 @@ fn slide(
         time_step: 0.01,
         ..options
     };
-    let mut sim = RoverSimulation::new(Arc::new(model), ground.clone(), options).unwrap();
-    sim.set_state(start, v);
+    let mut sim = moving(model, ground.clone(), options, start, v);
     assert!(sim.step(80).unwrap().is_converged());
     sim
 }
@@ -118,7 +117,7 @@ fn slide(
 /// Place along the slope, and how far its axes have turned from it.
 fn end(sim: &RoverSimulation, turn: f64) -> [f64; 2] {
     let attitude = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
-    let own = &sim.state().configuration;
+    let own = sim.q();
     let place = attitude.inverse() * own.position;
     [place.x, (attitude.inverse() * own.attitude).angle()]
 }
@@ -128,24 +127,18 @@ fn end(sim: &RoverSimulation, turn: f64) -> [f64; 2] {
 #[test]
 fn what_slides_over_a_joint_stops_where_it_stops_on_one_sheet() {
     let whole: Arc<dyn Terrain> = Arc::new(sheet(-5.0, 5.0, 0.0));
+    let right_sheet = || sheet(0.0, 5.0, 0.0);
+    let left_block = || block([-5.0, 0.0], [-5.0, 5.0]);
+    let right_block = || block([0.0, 5.0], [-5.0, 5.0]);
     for shape in SHAPES {
         let [expected, _] = end(&slide(shape, &whole, 0.0, StepOptions::default()), 0.0);
         let ideal = -0.5 + 4.0 / (2.0 * FRICTION * GRAVITY);
-        assert!(
-            (expected - ideal).abs() < 0.02,
-            "{shape}: {expected} {ideal}"
-        );
+        near_in(&shape, expected, ideal, 0.02);
         let grounds = [
             ("sheets", two(sheet(-5.0, 0.0, 0.0), sheet(0.0, 5.0, 0.0))),
             ("overlap", two(sheet(-5.0, 0.1, 0.0), sheet(-0.2, 5.0, 0.0))),
             ("slit", two(sheet(-5.0, -1e-7, 0.0), sheet(0.0, 5.0, 0.0))),
-            (
-                "blocks",
-                two(
-                    block([-5.0, 0.0], [-5.0, 5.0]),
-                    block([0.0, 5.0], [-5.0, 5.0]),
-                ),
-            ),
+            ("blocks", two(left_block(), right_block())),
             (
                 "bricks",
                 two(
@@ -154,43 +147,16 @@ fn what_slides_over_a_joint_stops_where_it_stops_on_one_sheet() {
                 ),
             ),
             ("maps", two(tile(-5.0, 0.0), tile(0.0, 5.0))),
-            (
-                "map and sheet",
-                union(vec![
-                    Arc::new(tile(-5.0, 0.0)),
-                    Arc::new(sheet(0.0, 5.0, 0.0)),
-                ]),
-            ),
-            (
-                "block and map",
-                union(vec![
-                    Arc::new(block([-5.0, 0.0], [-5.0, 5.0])),
-                    Arc::new(tile(0.0, 5.0)),
-                ]),
-            ),
-            (
-                "sheet and block",
-                union(vec![
-                    Arc::new(sheet(-5.0, 0.0, 0.0)),
-                    Arc::new(block([0.0, 5.0], [-5.0, 5.0])),
-                ]),
-            ),
-            (
-                "plane and sheet",
-                union(vec![
-                    Arc::new(Plane::ground()),
-                    Arc::new(sheet(0.0, 5.0, 0.0)),
-                ]),
-            ),
+            ("map and sheet", two(tile(-5.0, 0.0), right_sheet())),
+            ("block and map", two(left_block(), tile(0.0, 5.0))),
+            ("sheet and block", two(sheet(-5.0, 0.0, 0.0), right_block())),
+            ("plane and sheet", two(Plane::ground(), right_sheet())),
         ];
         // The box meets them all, the others sheets and blocks.
         let n = if shape == SHAPES[0] { 10 } else { 4 };
         for (name, ground) in grounds.into_iter().take(n) {
             let [x, turned] = end(&slide(shape, &ground, 0.0, StepOptions::default()), 0.0);
-            assert!(
-                (x - expected).abs() < 1e-6,
-                "{name}, {shape}: {x}, not {expected}"
-            );
+            near_in(&(name, shape), x, expected, 1e-6);
             assert!(turned < 1e-6, "{name}, {shape}: {turned}");
         }
     }
@@ -202,15 +168,10 @@ fn a_joint_on_a_slope_and_on_a_wall_is_none() {
         let whole: Arc<dyn Terrain> = Arc::new(sheet(-5.0, 5.0, turn));
         let halves = two(sheet(-5.0, 0.0, turn), sheet(0.0, 5.0, turn));
         let [expected, ground] = [&whole, &halves].map(|ground| {
-            end(
-                &slide(SHAPES[0], ground, turn, StepOptions::default()),
-                turn,
-            )
+            let slid = slide(SHAPES[0], ground, turn, StepOptions::default());
+            end(&slid, turn)
         });
-        assert!(
-            (ground[0] - expected[0]).abs() < 1e-6,
-            "{turn}: {ground:?} {expected:?}"
-        );
+        near_in(&turn, ground[0], expected[0], 1e-6);
         assert!(ground[1] < 1e-6, "{turn}: {ground:?}");
     }
 }
@@ -291,13 +252,14 @@ fn a_rover_drives_over_hills_in_tiles_as_over_the_whole_map() {
         two(hills(0..=33), hills(28..=60)),
     ];
     let ends = grounds.map(|ground| {
-        let mut q = vec![0.0; 21];
-        (q[0], q[1]) = (-0.8, 0.5);
-        let mut sim = rover_on(ground, &q);
+        let model = Model::rover();
+        let mut sim = resting(model, ground, StepOptions::default(), |q| {
+            (q.position.x, q.position.y) = (-0.8, 0.5);
+        });
         sim.step(60).unwrap();
         sim.set_wheel_torques(&[60.0; 6]).unwrap();
         sim.step(340).unwrap();
-        sim.state().configuration.position
+        sim.q().position
     });
     assert!(ends[0].x > 0.3, "{}", ends[0]);
     for end in &ends[1..] {
@@ -319,9 +281,7 @@ fn grounds_that_coincide_bear_once() {
     ];
     for (k, parts) in grounds.into_iter().enumerate() {
         let [once, twice] = [parts[..1].to_vec(), parts].map(|parts| {
-            let mut q = vec![0.0; 21];
-            q[1] = 0.36;
-            let mut sim = rover_on(union(parts), &q);
+            let mut sim = rover_on(union(parts), 0.36);
             sim.step(100).unwrap();
             sim.contacts().len()
         });
@@ -356,9 +316,7 @@ fn a_rover_stands_on_a_map_below_a_bridge() {
         .map(|x| [x.x, 3.0, x.z])
         .collect();
     let bridge = TriangleMesh::new(&bridge, &[[0, 2, 1], [0, 3, 2]]).unwrap();
-    let mut q = vec![0.0; 21];
-    q[1] = 0.36;
-    let mut sim = rover_on(union(vec![Arc::new(tile(-5.0, 5.0)), Arc::new(bridge)]), &q);
+    let mut sim = rover_on(two(tile(-5.0, 5.0), bridge), 0.36);
     sim.step(100).unwrap();
     assert!(sim.contacts().len() >= 6);
 }

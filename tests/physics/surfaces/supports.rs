@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use rover_core::geometry::{Terrain, TriangleMesh};
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::multibody::Model;
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
-use rover_core::simulation::RoverSimulation;
 
 use super::surface_scenes::map;
+use crate::shared::{body, largest, prism, resting};
 
 /// Height of all supports, m.
 const TOP: f64 = 0.5;
@@ -123,17 +123,16 @@ const SUPPORTS: [Support; 6] = [
 ];
 
 /// A body of 2 kg of one shape, or one wheel.
-fn body(shape: &str) -> Arc<Model> {
-    let solid = "name = 'machine'\n[[solids]]\nname = 'body'\nmass = 2.0\n";
-    let text = if shape.starts_with("radius") {
-        format!(
-            "{solid}shape = {{ kind = 'cylinder', radius = 0.2, height = 0.1 }}\n[[wheels]]\nname = 'W'\n\
-             solid = 'body'\naxle = [0.0, 1.0, 0.0]\ntorque_limit = 1.0\ndrive_sign = -1.0\n{shape}\n"
-        )
+fn machine(shape: &str) -> Arc<Model> {
+    Arc::new(if shape.starts_with("radius") {
+        let text = format!(
+            "shape = {{ kind = 'cylinder', radius = 0.2, height = 0.1 }}\n[[wheels]]\nname = 'W'\n\
+             solid = 'body'\naxle = [0.0, 1.0, 0.0]\ntorque_limit = 1.0\ndrive_sign = -1.0\n{shape}"
+        );
+        body(2.0, &text)
     } else {
-        format!("{solid}shapes = [{{ {shape}, collides = true }}]\n")
-    };
-    Arc::new(Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap())
+        body(2.0, &format!("shapes = [{{ {shape}, collides = true }}]"))
+    })
 }
 
 const BOX: &str = "kind = 'box', size = [0.4, 0.1, 0.4]";
@@ -143,17 +142,6 @@ const CAPSULE: &str = "kind = 'capsule', radius = 0.05, height = 0.3";
 const BALL: &str = "kind = 'sphere', radius = 0.2";
 const EGG: &str = "kind = 'ellipsoid', radii = [0.2, 0.2, 0.3]";
 
-/// A slab with six sides of 0.2 m and a height of 0.1 m.
-fn slab() -> String {
-    let corners: Vec<String> = (0..6)
-        .flat_map(|k| {
-            let (sin, cos) = (std::f64::consts::FRAC_PI_3 * f64::from(k)).sin_cos();
-            [-0.05, 0.05].map(|y| format!("[{}, {y}, {}]", 0.2 * cos, 0.2 * sin))
-        })
-        .collect();
-    format!("kind = 'hull', points = [{}]", corners.join(", "))
-}
-
 /// Places a body and lets it rest. Says what is wrong, if anything is.
 fn unrest(
     model: &Arc<Model>,
@@ -162,28 +150,20 @@ fn unrest(
     turn: UnitQuaternion<f64>,
     (lifted, may_roll): (f64, bool),
 ) -> Option<String> {
-    let mut start = Configuration::zero(model);
-    start.position = place + Vector3::y() * lifted;
     let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, 0.2, -0.5) * lifted);
-    start.attitude = tilt * turn;
-    let options = StepOptions {
-        gravity: Vector3::new(0.0, -9.81, 0.0),
-        time_step: 0.005,
-        ..StepOptions::default()
-    };
-    let mut simulation = RoverSimulation::new(model.clone(), ground.clone(), options).unwrap();
-    simulation.set_state(start, vec![0.0; model.nv()]);
+    let options = StepOptions::default();
+    let mut simulation = resting(model.clone(), ground.clone(), options, |q| {
+        q.position = place + Vector3::y() * lifted;
+        q.attitude = tilt * turn;
+    });
     simulation.step(400).unwrap();
-    let before = simulation.state().configuration.clone();
-    let mut fastest = 0.0;
+    let before = simulation.q().clone();
+    let mut fastest = 0.0_f64;
     for _ in 0..40 {
         simulation.step(1).unwrap();
-        fastest = simulation
-            .v()
-            .iter()
-            .fold(fastest, |most: f64, v| most.max(v.abs()));
+        fastest = largest(simulation.v()).max(fastest);
     }
-    let after = &simulation.state().configuration;
+    let after = simulation.q();
     let (drift, aside) = (
         (after.position - before.position).norm(),
         after.position - place,
@@ -213,7 +193,7 @@ fn a_flat_shape_rests_half_over_an_edge_and_on_two_walls() {
 /// far sides of two walls was in them by its whole width.
 #[test]
 fn a_drum_rests_where_a_corner_or_the_far_side_of_a_wall_just_touches_it() {
-    let (model, turn) = (body(DRUM), UnitQuaternion::identity());
+    let (model, turn) = (machine(DRUM), UnitQuaternion::identity());
     for (support, x, z) in [
         (Support::Corner, -0.002, -0.001),
         (Support::ShortWalls, 0.0, 0.0),
@@ -239,7 +219,8 @@ fn every_flat_shape_rests_on_an_edge_two_walls_a_slot_a_corner_and_spikes() {
 
 /// On the first so many places of each support; every so many-th case.
 fn flat_shapes_rest(supports: &[Support], n_places: usize, every: usize) {
-    let slab = slab();
+    // A slab with six sides of 0.2 m and a height of 0.1 m.
+    let slab = prism(0.2, 0.05);
     // Turned by rotation vectors; half the height of the body as it lies.
     let bodies: [(&str, [f64; 3], f64); 9] = [
         (BOX, [0.0; 3], 0.05),
@@ -262,7 +243,7 @@ fn flat_shapes_rest(supports: &[Support], n_places: usize, every: usize) {
             if is_round && matches!(support, Support::Corner | Support::Spikes) {
                 continue;
             }
-            let model = body(shape);
+            let model = machine(shape);
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
             for (kind, ground) in ["mesh", "map"].iter().zip(&grounds) {
                 for &[x, z] in support.places().iter().take(n_places) {
@@ -334,7 +315,7 @@ fn what_lies_along_two_edges_rests_in_the_slot_between_them() {
             grounds.push(support.map());
         }
         for (shape, turn, height) in bodies {
-            let model = body(shape);
+            let model = machine(shape);
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
             for (k, ground) in grounds.iter().enumerate() {
                 for lifted in [0.0, 1e-3] {

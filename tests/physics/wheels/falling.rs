@@ -7,6 +7,7 @@ use rover_core::nalgebra::Vector3;
 
 use super::wheel_scenes::lone;
 use crate::rover::scenes::VARIANTS;
+use crate::shared::stepping;
 use crate::spheres::sphere_scenes::{Random, WHEEL_RADIUS, deepest, field, lone_wheel, placed};
 use crate::surfaces::falling::bumpy;
 
@@ -41,7 +42,7 @@ fn a_wheel_at_five_metres_a_second_strikes_every_stone_from_where_it_comes() {
             let aim = Vector3::new(x, y, across).normalize();
             let start = aim * -(R + width + radius + random.between(0.02, 0.1));
             let mut wheel = placed(model.clone(), stone, options, start);
-            let still = wheel.state().configuration.clone();
+            let still = wheel.q().clone();
             let v = aim * 5.0;
             wheel.set_state(still, vec![v.x, v.y, v.z, 0.0, 0.0, 0.0]);
             for _ in 0..20 {
@@ -54,7 +55,7 @@ fn a_wheel_at_five_metres_a_second_strikes_every_stone_from_where_it_comes() {
             assert_eq!(struck.len(), 1, "{width}, case {case}: passed");
             let n = struck[0].contact.frame.n;
             assert!(n.dot(&aim) < -0.05, "case {case}: n {n} for {aim}");
-            let x = wheel.state().configuration.position;
+            let x = wheel.q().position;
             assert!(x.dot(&aim) < 0.02, "case {case}, radius {radius}: at {x}");
         }
     }
@@ -65,7 +66,7 @@ fn a_wheel_dropped_from_two_metres_at_20_ms_lands_on_stones_and_maps() {
     for (width, model) in wheels() {
         for variant in VARIANTS {
             for phase in 0..8_u32 {
-                let options = crate::stepping(variant, 0.02);
+                let options = stepping(variant, 0.02);
                 let start = Vector3::new(
                     0.013 * f64::from(phase),
                     2.0 + 0.012 * f64::from(phase),
@@ -76,7 +77,7 @@ fn a_wheel_dropped_from_two_metres_at_20_ms_lands_on_stones_and_maps() {
                 let mut wheel = placed(model.clone(), bumps, options.clone(), start);
                 wheel.step(50).unwrap();
                 assert!(deepest(&wheel) > -0.3 * R, "{width}: {}", deepest(&wheel));
-                assert!(wheel.state().configuration.position.y > 0.0);
+                assert!(wheel.q().position.y > 0.0);
 
                 let stone = field(&[[0.0, 0.0, 0.0, 0.06]]);
                 let start = Vector3::new(0.0, start.y, start.z.min(width));
@@ -91,7 +92,7 @@ fn a_wheel_dropped_from_two_metres_at_20_ms_lands_on_stones_and_maps() {
                     }
                 }
                 assert!(has_struck, "{width} {variant:?} {phase}");
-                assert!(-wheel.state().v[1] < 5.0, "{}", wheel.state().v[1]);
+                assert!(-wheel.v()[1] < 5.0, "{}", wheel.v()[1]);
             }
         }
     }
@@ -106,12 +107,12 @@ fn a_wheel_at_five_metres_a_second_stays_above_bumps() {
                 let low = bumps.clone();
                 let start = Vector3::new(0.0, 0.3, 0.0);
                 let mut wheel = placed(model.clone(), bumps, StepOptions::default(), start);
-                let still = wheel.state().configuration.clone();
+                let still = wheel.q().clone();
                 let (x, z) = (5.0 * heading.cos(), 5.0 * heading.sin());
                 wheel.set_state(still, vec![x, 0.0, z, 0.0, 0.0, 0.0]);
                 for _ in 0..80 {
                     wheel.step(1).unwrap();
-                    let x = wheel.state().configuration.position;
+                    let x = wheel.q().position;
                     let ground = low.height(x.x, x.z).unwrap();
                     assert!(x.y > ground, "{width}, {spacing}: {x} under {ground}");
                 }

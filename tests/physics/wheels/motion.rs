@@ -5,27 +5,19 @@ use std::sync::Arc;
 use rover_core::contact::Part;
 use rover_core::geometry::{Plane, Terrain};
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Model, coordinates};
+use rover_core::multibody::Model;
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::simulation::RoverSimulation;
 
 use super::wheel_scenes::{lone, wide_rover};
 use crate::rover::scenes::VARIANTS;
+use crate::shared::{flat, in_public, largest, near, near_in, stepping};
 use crate::spheres::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, placed};
 use crate::surfaces::surface_scenes::map;
 
-fn rover(model: Model, terrain: Arc<dyn Terrain>, q: &[f64]) -> RoverSimulation {
-    let mut simulation =
-        RoverSimulation::new(Arc::new(model), terrain, StepOptions::default()).unwrap();
-    let start = coordinates::from_public(simulation.model(), q).unwrap();
-    simulation.set_state(start, vec![0.0; 21]);
-    simulation
-}
-
+/// The rover's place on level ground, in public coordinates.
 fn standing() -> [f64; 21] {
-    let mut q = [0.0; 21];
-    q[1] = 0.35;
-    q
+    std::array::from_fn(|k| if k == 1 { 0.35 } else { 0.0 })
 }
 
 /// Normal forces on the wheels of a rover that has stood for a while on a plane that falls to the
@@ -34,7 +26,7 @@ fn loads(slope: f64) -> Vec<f64> {
     let plane = Plane::new([0.0, slope.cos(), slope.sin()], 0.0).unwrap();
     let mut q = standing();
     q[3] = slope;
-    let mut rover = rover(wide_rover(0.2, 0.02), Arc::new(plane), &q);
+    let mut rover = in_public(wide_rover(0.2, 0.02), Arc::new(plane), &q);
     assert!(rover.step(400).unwrap().is_converged());
     rover.wheel_forces().iter().map(|force| force[0]).collect()
 }
@@ -44,16 +36,10 @@ fn the_loads_of_a_resting_rover_do_not_jump_with_its_lean() {
     let upright = loads(0.0);
     let weight: f64 = upright.iter().sum();
     let expected = Model::rover().mass() * 9.81;
-    assert!(
-        (weight / expected - 1.0).abs() < 1e-2,
-        "{weight} {expected}"
-    );
+    near(weight / expected, 1.0, 1e-2);
     for slope in [-1e-6, 1e-6] {
         for (load, flat) in loads(slope).iter().zip(&upright) {
-            assert!(
-                (load - flat).abs() < 1e-3 * weight,
-                "{slope}: {load} {flat}"
-            );
+            near_in(&slope, *load, *flat, 1e-3 * weight);
         }
     }
 }
@@ -61,23 +47,19 @@ fn the_loads_of_a_resting_rover_do_not_jump_with_its_lean() {
 #[test]
 fn a_cylinder_stands_on_two_points_without_rocking() {
     for variant in VARIANTS {
-        let options = crate::stepping(variant, 0.005);
+        let options = stepping(variant, 0.005);
         let start = Vector3::new(0.0, WHEEL_RADIUS, 0.0);
         let mut wheel = placed(lone(0.08, 0.01), Plane::ground(), options.clone(), start);
         for _ in 0..20 {
             wheel.step(20).unwrap();
-            let speed = wheel.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            let speed = largest(wheel.v());
             assert!(speed < 1e-9, "{variant:?}: {speed}");
         }
         let parts: Vec<Part> = wheel.contacts().iter().map(|c| c.contact.part).collect();
         assert_eq!(parts, [Part::Wheel(0); 2]);
-        let impulses: Vec<f64> = wheel.contacts().iter().map(|c| c.impulse[0]).collect();
         let weight = WHEEL_MASS * 9.81 * options.time_step;
-        for impulse in impulses {
-            assert!(
-                (impulse / (0.5 * weight) - 1.0).abs() < 1e-3,
-                "{impulse} {weight}"
-            );
+        for contact in wheel.contacts() {
+            near(contact.impulse[0] / (0.5 * weight), 1.0, 1e-3);
         }
     }
 }
@@ -85,12 +67,8 @@ fn a_cylinder_stands_on_two_points_without_rocking() {
 #[test]
 fn a_torus_stands_on_one_point() {
     let start = Vector3::new(0.0, WHEEL_RADIUS, 0.0);
-    let mut wheel = placed(
-        lone(0.08, 0.04),
-        Plane::ground(),
-        StepOptions::default(),
-        start,
-    );
+    let wheel = lone(0.08, 0.04);
+    let mut wheel = placed(wheel, Plane::ground(), StepOptions::default(), start);
     wheel.step(10).unwrap();
     assert_eq!(wheel.contacts().len(), 1);
 }
@@ -98,32 +76,28 @@ fn a_torus_stands_on_one_point() {
 #[test]
 fn a_cylinder_that_leans_falls_back_on_its_tread() {
     let start = Vector3::new(0.0, WHEEL_RADIUS + 0.02, 0.0);
-    let mut wheel = placed(
-        lone(0.08, 0.0),
-        Plane::ground(),
-        StepOptions::default(),
-        start,
-    );
-    let mut q = wheel.state().configuration.clone();
+    let wheel = lone(0.08, 0.0);
+    let mut wheel = placed(wheel, Plane::ground(), StepOptions::default(), start);
+    let mut q = wheel.q().clone();
     q.attitude = UnitQuaternion::from_euler_angles(0.3, 0.0, 0.0);
     wheel.set_state(q, vec![0.0; 6]);
     wheel.step(600).unwrap();
-    let axle = wheel.state().configuration.attitude * Vector3::z();
+    let axle = wheel.q().attitude * Vector3::z();
     // Where a step ends within the last of its impacts, it comes to rest.
     assert!(axle.y.abs() < 1e-3, "{axle}");
-    let speed = wheel.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let speed = largest(wheel.v());
     assert!(speed < 1e-9, "{speed}");
-    let y = wheel.state().configuration.position.y;
+    let y = wheel.q().position.y;
     assert!((y - WHEEL_RADIUS).abs() < 1e-4, "{y}");
 }
 
 /// Positions of a rover that drives and turns for a second.
 fn drive(model: Model, terrain: Arc<dyn Terrain>, steering: [f64; 6]) -> Vec<Vector3<f64>> {
-    let mut rover = rover(model, terrain, &standing());
+    let mut rover = in_public(model, terrain, &standing());
     rover.step(100).unwrap();
     rover.set_steering(&steering).unwrap();
     rover.set_wheel_torques(&[20.0; 6]).unwrap();
-    let place = |rover: &RoverSimulation| rover.state().configuration.position;
+    let place = |rover: &RoverSimulation| rover.q().position;
     (0..40)
         .map(|_| {
             assert!(rover.step(10).unwrap().is_converged());
@@ -136,8 +110,7 @@ fn drive(model: Model, terrain: Arc<dyn Terrain>, steering: [f64; 6]) -> Vec<Vec
 fn a_width_that_vanishes_gives_the_motion_of_thin_discs() {
     let steering = [-0.2, -0.2, 0.0, 0.0, 0.1, 0.1];
     let bumpy = |x: f64, z: f64| 0.05 * ((2.0 * x).sin() + (3.0 * z).cos());
-    let grounds: [Arc<dyn Terrain>; 2] =
-        [Arc::new(Plane::ground()), Arc::new(map(100, 0.2, bumpy))];
+    let grounds: [Arc<dyn Terrain>; 2] = [flat(), Arc::new(map(100, 0.2, bumpy))];
     for ground in grounds {
         let thin = drive(Model::rover(), Arc::clone(&ground), steering);
         for (width, rounding) in [(2e-6, 0.0), (2e-6, 1e-6)] {
@@ -151,7 +124,7 @@ fn a_width_that_vanishes_gives_the_motion_of_thin_discs() {
 
 #[test]
 fn a_rover_on_wide_wheels_drives_straight_and_turns() {
-    let ground: Arc<dyn Terrain> = Arc::new(Plane::ground());
+    let ground = flat();
     for rounding in [0.0, 0.04, 0.08] {
         let straight = drive(wide_rover(0.16, rounding), Arc::clone(&ground), [0.0; 6]);
         let end = straight.last().unwrap();

@@ -6,15 +6,12 @@
 //! to its lowest point, which is at rest, and needs no friction. Along its instantaneous motion the
 //! rim approaches the ground with `4 g cos² α`: more than twice gravity below 45 degrees.
 
-use std::sync::Arc;
-
-use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, StepReport};
 use rover_core::multibody::Configuration;
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
-use rover_core::simulation::RoverSimulation;
 
 use crate::rover::scenes::VARIANTS;
+use crate::shared::{flat, moving};
 use crate::spheres::sphere_scenes::{WHEEL_RADIUS, lone_wheel};
 
 const DURATION: f64 = 2.0;
@@ -40,15 +37,14 @@ fn precess(degrees: f64, g: f64, n: u32, change: impl Fn(&mut StepOptions)) -> E
         ..StepOptions::default()
     };
     change(&mut options);
-    let ground = Arc::new(Plane::ground());
-    let mut disc = RoverSimulation::new(Arc::new(lone_wheel()), ground, options).unwrap();
-    let mut start = Configuration::zero(disc.model());
+    let mut start = Configuration::zero(&lone_wheel());
     start.position = Vector3::new(0.0, WHEEL_RADIUS * sin, 0.0);
     // The axle is (0, cos α, sin α).
     let lean = tilt - std::f64::consts::FRAC_PI_2;
     start.attitude = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), lean);
     let turn = Vector3::new(0.0, sin, -cos) * (rate * sin);
-    disc.set_state(start.clone(), vec![0.0, 0.0, 0.0, turn.x, turn.y, turn.z]);
+    let v = vec![0.0, 0.0, 0.0, turn.x, turn.y, turn.z];
+    let mut disc = moving(lone_wheel(), flat(), options, start.clone(), v);
     let before = disc.energy();
     let mut report = disc.step(n as usize).unwrap();
     for energy in [
