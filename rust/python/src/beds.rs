@@ -12,7 +12,8 @@ use rover_core::system::grains::COORDINATES;
 
 use crate::arguments::flags;
 use crate::arrays::{Array, fresh, fresh_rows};
-use crate::bed_arguments::{self, Described, grain_error, setup_error};
+use crate::bed_arguments::{Described, grain_error, setup_error};
+use crate::bed_options;
 use crate::contacts::GrainContacts;
 use crate::errors::{Kind, Result};
 use crate::shared::{Open, Shared};
@@ -185,7 +186,7 @@ impl BedSimulation {
     /// Options of contacts, gravity and solver, as keyword arguments.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        opened!(self, bed => Ok(bed_arguments::settings(py, bed.options(), bed.description())?))
+        opened!(self, bed => bed_options::settings(py, bed.options(), bed.description()))
     }
 
     /// Removes grains. The others keep their order.

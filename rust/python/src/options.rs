@@ -1,5 +1,6 @@
-//! Options of a simulation's steps, declared once: `step_options!` lists them. Arguments are read
-//! and told again, and docstrings, signatures and the types of the stub made, from this list.
+//! Options of simulations, declared once: `step_options!` lists those of machines, and
+//! `disk_options!` and `ball_options!` of [`crate::bed_options`] those of grains. Arguments are read
+//! and told again, and docstrings, signatures and the types of the stub made, from these lists.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -44,11 +45,15 @@ pub const STABILISATIONS: [(&str, Stabilisation); 2] = [
     ("none", Stabilisation::None),
 ];
 /// Stabilisations of grains by name.
-pub const GRAIN_STABILISATIONS: [(&str, Stabilisation); 3] = [
-    ("projection", Stabilisation::Projection),
-    ("push_out", Stabilisation::PushOut),
-    ("none", Stabilisation::None),
+pub const GRAIN_STABILISATIONS: [(&str, GrainStabilisation); 3] = [
+    ("projection", GrainStabilisation(Stabilisation::Projection)),
+    ("push_out", GrainStabilisation(Stabilisation::PushOut)),
+    ("none", GrainStabilisation(Stabilisation::None)),
 ];
+
+/// A stabilisation of grains.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub struct GrainStabilisation(pub Stabilisation);
 
 /// Methods for the contact problem by name.
 pub const METHODS: [(&str, Method); 6] = by_name(Method::ALL);
@@ -74,12 +79,13 @@ const fn by_name<const N: usize>(methods: [Method; N]) -> [(&'static str, Method
 /// Largest number of iterations of the contact solver in a step, unless given.
 const MAX_ITERATIONS: usize = 1000;
 
-/// Every option but gravity, which is each class's own: its meaning, its name, whether `None`
-/// stands for its default, and its place in `StepOptions`. The type of the place tells how it is
-/// read; the core has its default and its range.
+/// Every option but gravity, which is each class's own: its meaning, its name, its marks, and its
+/// place in `StepOptions`. The type of the place tells how it is read; the core has its default and
+/// its range. Of an option with the mark `None`, `None` stands for the default; one with the mark
+/// `untold` is not among the `settings`.
 ///
-/// `rows` makes [`TABLE`] of them. `documented` makes the entries of a docstring, after those that
-/// it is given.
+/// `rows` makes a table of them. `documented` makes the entries of a docstring, after those that it
+/// is given.
 macro_rules! step_options {
     ($then:ident $($before:literal)?) => { $crate::options::$then! {
         $($before;)?
@@ -125,36 +131,43 @@ pub(crate) use step_options;
 macro_rules! documented {
     ($before:literal; $(
         #[doc = $first:literal] $(#[doc = $more:literal])*
-        $name:ident $(| $none:ident)? => $($place:ident).+;
+        $name:ident $(| $mark:ident)* => $($place:ident).+;
     )+) => {
         concat!($before $(, "\n    ", stringify!($name), ":", $first $(, "\n       ", $more)*)+)
     };
 }
 pub(crate) use documented;
 
-/// The rows of [`TABLE`].
+/// The rows of a table.
 macro_rules! rows {
-    ($($(#[doc = $doc:literal])+ $name:ident $(| $none:ident)? => $($place:ident).+;)+) => {
-        &[$(Row {
+    ($($(#[doc = $doc:literal])+ $name:ident $(| $mark:ident)* => $($place:ident).+;)+) => {
+        &[$($crate::options::Row {
             name: stringify!($name),
-            takes_none: !concat!("", $(stringify!($none))?).is_empty(),
-            place: |step| &mut step.$($place).+,
+            marks: &[$(stringify!($mark)),*],
+            place: |options| &mut options.$($place).+,
         }),+]
     };
 }
 pub(crate) use rows;
 
-/// One option.
-struct Row {
-    name: &'static str,
-    takes_none: bool,
-    place: fn(&mut StepOptions) -> &mut dyn Argument,
+/// One option among options `T`.
+pub struct Row<T> {
+    pub name: &'static str,
+    pub marks: &'static [&'static str],
+    pub place: fn(&mut T) -> &mut dyn Argument,
 }
 
-const TABLE: &[Row] = step_options!(rows);
+impl<T> Row<T> {
+    fn has(&self, mark: &str) -> bool {
+        self.marks.contains(&mark)
+    }
+}
+
+/// Options of machines.
+pub const STEP: &[Row<StepOptions>] = step_options!(rows);
 
 /// The value of an option.
-trait Argument {
+pub trait Argument {
     /// Takes what was given for the option of this name.
     fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()>;
     /// The value in Python, which is read again as this one.
@@ -195,22 +208,24 @@ macro_rules! argument {
 }
 
 argument!(f64, "float", number);
+argument!(u64, "int", whole);
 argument!(usize, "int", count);
 argument!(bool, "bool", flag);
 argument!(Variant, VARIANTS);
 argument!(Method, SOLVERS);
 argument!(Stabilisation, STABILISATIONS);
+argument!(GrainStabilisation, GRAIN_STABILISATIONS);
 
-impl Argument for Option<u64> {
+impl<T: Argument + Default> Argument for Option<T> {
     fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()> {
-        *self = Some(whole(given, Kind::Option, name)?);
-        Ok(())
+        self.insert(T::default()).read(given, name)
     }
     fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        (*self).into_py_any(py)
+        self.as_ref()
+            .map_or_else(|| Ok(py.None()), |own| own.tell(py))
     }
     fn python(&self) -> String {
-        "int".to_owned()
+        T::default().python()
     }
 }
 
@@ -228,16 +243,22 @@ impl Argument for Materials {
     }
 }
 
-/// Reads all options that were given by their names.
-pub fn read(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
-    step.solver.max_sweeps = MAX_ITERATIONS;
-    for row in TABLE {
+/// Reads the options of a table that were given by their names.
+pub fn read<T>(table: &[Row<T>], options: &mut T, given: &Named<'_>) -> Result<()> {
+    for row in table {
         if let Some(value) = given.get(row.name)?.given()
-            && !(value.is_none() && row.takes_none)
+            && !(value.is_none() && row.has("None"))
         {
-            (row.place)(&mut step).read(&value, row.name)?;
+            (row.place)(options).read(&value, row.name)?;
         }
     }
+    Ok(())
+}
+
+/// Reads the options of a machine that were given by their names.
+pub fn read_step(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
+    step.solver.max_sweeps = MAX_ITERATIONS;
+    read(STEP, &mut step, given)?;
     step.solver = checked(step.solver)?;
     Ok(step)
 }
@@ -245,16 +266,16 @@ pub fn read(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
 /// The keyword arguments that make a simulation with these options.
 ///
 /// `gravity`: as the class gives it, a pair or a triple.
-pub fn settings<'py>(
+pub fn settings<'py, T>(
     gravity: &Bound<'py, PyAny>,
-    step: &StepOptions,
+    table: &[Row<T>],
+    mut options: T,
 ) -> Result<Bound<'py, PyDict>> {
     let py = gravity.py();
     let settings = PyDict::new(py);
     settings.set_item("gravity", gravity)?;
-    let mut step = step.clone();
-    for row in TABLE {
-        let value = (row.place)(&mut step).tell(py)?;
+    for row in table.iter().filter(|row| !row.has("untold")) {
+        let value = (row.place)(&mut options).tell(py)?;
         if !value.is_none(py) {
             settings.set_item(row.name, value)?;
         }
@@ -293,17 +314,25 @@ pub fn literal<T>(choices: &[(&str, T)]) -> String {
     format!("Literal[{}]", words.join(", "))
 }
 
-/// Name, default and type of each option in Python.
-pub fn described(py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>, String)>> {
-    let mut step = StepOptions::default();
-    step.solver.max_sweeps = MAX_ITERATIONS;
-    let described = TABLE.iter().map(|row| {
-        let value = (row.place)(&mut step);
-        Ok(if row.takes_none {
+/// An option in Python: name, default and type.
+pub type Described = (&'static str, Py<PyAny>, String);
+
+/// The options of a table in Python, with these defaults.
+pub fn described<T>(py: Python<'_>, table: &[Row<T>], mut usual: T) -> PyResult<Vec<Described>> {
+    let described = table.iter().map(|row| {
+        let value = (row.place)(&mut usual);
+        Ok(if row.has("None") {
             (row.name, py.None(), value.python() + " | None")
         } else {
             (row.name, value.tell(py)?, value.python())
         })
     });
     described.collect()
+}
+
+/// The options of machines in Python.
+pub fn described_steps(py: Python<'_>) -> PyResult<Vec<Described>> {
+    let mut step = StepOptions::default();
+    step.solver.max_sweeps = MAX_ITERATIONS;
+    described(py, STEP, step)
 }

@@ -65,7 +65,7 @@ fn step_options(given: &Named<'_>) -> Result<(StepOptions, ContactRule)> {
         choice(field, &text(value, kind, field)?, &RULES)
     };
     let rule = given.read("contact", rule)?.unwrap_or(ContactRule::Nearest);
-    Ok((options::read(step, given)?, rule))
+    Ok((options::read_step(step, given)?, rule))
 }
 
 impl PlanarSimulation {
@@ -144,7 +144,7 @@ impl PlanarSimulation {
         let inner = self.open()?;
         let step = inner.options();
         let gravity = (step.gravity.x, step.gravity.y).into_pyobject(py)?;
-        let settings = options::settings(&gravity, step)?;
+        let settings = options::settings(&gravity, options::STEP, step.clone())?;
         settings.set_item("contact", name_of(inner.scene().rule, &RULES))?;
         Ok(settings)
     }

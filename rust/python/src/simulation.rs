@@ -141,7 +141,7 @@ impl Simulation {
             },
             ..StepOptions::default()
         };
-        let options = options::read(usual, &given)?;
+        let options = options::read_step(usual, &given)?;
         given.finish()?;
         let inner = CoreSimulation::new(model, terrain.terrain(), options)?;
         Ok(Self::of(inner, terrain))
@@ -220,7 +220,7 @@ impl Simulation {
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let gravity = &self.options.gravity;
         let gravity = (gravity.x, gravity.y, gravity.z).into_pyobject(py)?;
-        options::settings(&gravity, &self.options)
+        options::settings(&gravity, options::STEP, self.options.clone())
     }
 
     /// Number of rovers that a batch steps together in one SIMD register of this computer.
