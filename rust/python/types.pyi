@@ -1,8 +1,8 @@
 """Types of the compiled module, from which `make stub` writes `envs/rover_gym/_core.pyi`.
 
-A name with a type is a property. An argument that a function does not list has the type that `_ARGUMENTS` gives its name,
-or else that of its default. All else is the module's: docstrings, defaults, kinds of arguments and methods, base classes,
-special methods, and the types of the options that `options.rs` and `bed_options.rs` list in `rust/python/src`.
+A name with a type is a property. An argument that a function does not list has the type that `_ARGUMENTS` gives its
+name, or else that of its default. All else is the module's: docstrings, defaults, kinds of arguments and methods, base
+classes, special methods, and the types of the options that `options.rs` and `bed_options.rs` list in `rust/python/src`.
 """
 
 import os
@@ -497,8 +497,10 @@ class EpisodeBatch:
     threads: int
 
     def step(
-        actions: object, among: Sequence[RoverGrainSimulation | None] | None
-    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]: ...
+        actions: object,
+        among: Sequence[RoverGrainSimulation | None] | None,
+        info: int | Literal["all"] | None,
+    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], dict[str, Any]]: ...
     over: list[int]
 
     def infos() -> dict[str, Any]: ...
