@@ -38,35 +38,11 @@ impl<'py> Given<'py> {
         self.0
     }
 
-    /// A number.
-    pub fn number(self, default: f64, kind: Kind, field: &str) -> Result<f64> {
-        self.0
-            .map_or(Ok(default), |given| number(&given, kind, field))
-    }
-
     /// A number, or nothing where `None` was given.
     pub fn maybe(self, kind: Kind, field: &str) -> Result<Option<f64>> {
         self.some()
             .map(|given| number(&given, kind, field))
             .transpose()
-    }
-
-    /// A whole number that is not negative.
-    pub fn whole(self, default: u64, kind: Kind, field: &str) -> Result<u64> {
-        self.0
-            .map_or(Ok(default), |given| whole(&given, kind, field))
-    }
-
-    /// A count.
-    pub fn count(self, default: usize, kind: Kind, field: &str) -> Result<usize> {
-        self.0
-            .map_or(Ok(default), |given| count(&given, kind, field))
-    }
-
-    /// A truth value.
-    pub fn flag(self, default: bool, kind: Kind, field: &str) -> Result<bool> {
-        self.0
-            .map_or(Ok(default), |given| flag(&given, kind, field))
     }
 
     /// A text.
@@ -201,29 +177,9 @@ impl<'py> Named<'py> {
         read(&value, self.kind, &self.path(name))
     }
 
-    /// A number.
-    pub fn number(&self, name: &str, default: f64) -> Result<f64> {
-        self.get(name)?.number(default, self.kind, &self.path(name))
-    }
-
     /// A number, or nothing where it is missing or `None`.
     pub fn maybe(&self, name: &str) -> Result<Option<f64>> {
         self.get(name)?.maybe(self.kind, &self.path(name))
-    }
-
-    /// A whole number that is not negative.
-    pub fn whole(&self, name: &str, default: u64) -> Result<u64> {
-        self.get(name)?.whole(default, self.kind, &self.path(name))
-    }
-
-    /// A count.
-    pub fn count(&self, name: &str, default: usize) -> Result<usize> {
-        self.get(name)?.count(default, self.kind, &self.path(name))
-    }
-
-    /// A truth value.
-    pub fn flag(&self, name: &str, default: bool) -> Result<bool> {
-        self.get(name)?.flag(default, self.kind, &self.path(name))
     }
 
     /// A text.
@@ -231,6 +187,30 @@ impl<'py> Named<'py> {
         self.get(name)?.text(default, self.kind, &self.path(name))
     }
 }
+
+/// Methods that read an argument as the function of their name, with a default.
+macro_rules! readers {
+    ($($read:ident: $type:ty),+) => {
+        impl Given<'_> {
+            $(
+                /// The value, or the default where it is missing.
+                pub fn $read(self, default: $type, kind: Kind, field: &str) -> Result<$type> {
+                    self.0.map_or(Ok(default), |given| $read(&given, kind, field))
+                }
+            )+
+        }
+
+        impl Named<'_> {
+            $(
+                /// The value, or the default where it is missing.
+                pub fn $read(&self, name: &str, default: $type) -> Result<$type> {
+                    self.get(name)?.$read(default, self.kind, &self.path(name))
+                }
+            )+
+        }
+    };
+}
+readers!(number: f64, whole: u64, count: usize, flag: bool);
 
 /// How a value looks in a message.
 pub fn shown(value: &Bound<'_, PyAny>) -> String {

@@ -46,8 +46,8 @@ const VELOCITIES: usize = body_velocities(3);
 ///     terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
 ///         them, below the balls; none by default. Balls fall where the ground is unknown. A vessel
 ///         and a terrain cannot be combined.
-#[doc = ball_options!(documented "    gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.")]
-///
+///     gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
+#[doc = ball_options!(documented)]
 /// Raises:
 ///     ModelError: A radius or mass is not finite and positive.
 ///     StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or

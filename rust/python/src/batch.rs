@@ -8,9 +8,9 @@ use rover_core::simulation::Batch;
 use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Given, at_least_one, below, flags, refused};
-use crate::arrays::{Array, array};
+use crate::arrays::{Array, shaped};
 use crate::episode::{GivenSimulation, simulation};
-use crate::errors::{Kind, Result, Value};
+use crate::errors::{Kind, Result};
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Open, Release, Shared, Watch};
 use crate::simulation::Simulation;
@@ -52,13 +52,8 @@ pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> Result<Vec<bool>> {
 
 /// (n, wheels) commands in row-major order.
 fn commands(value: &Bound<'_, PyAny>, field: &'static str, shape: [usize; 2]) -> Result<Vec<f64>> {
-    let given = array(value, Kind::Command, field)?;
-    let view = given.as_array();
-    if view.shape() != shape {
-        let message = format!("{field}: needs shape {shape:?}, has {:?}", view.shape());
-        return Err(Kind::Command.error(field, message, Value::Count(view.ndim())));
-    }
-    Ok(view.iter().copied().collect())
+    let what = format!("{shape:?}");
+    Ok(shaped(value, Kind::Command, (field, &what), |own| own == shape)?.0)
 }
 
 #[pymethods]

@@ -12,7 +12,7 @@ use rover_core::system::grains::{
 };
 
 use crate::arguments::{Given, Named, flags};
-use crate::arrays::{Array, array, fresh, vector};
+use crate::arrays::{Array, fresh, shaped, vector};
 use crate::bed_options::BedOptions;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::planar_ground::quantity;
@@ -55,14 +55,10 @@ pub fn setup_error(e: GrainSetupError) -> BorderError {
 }
 
 /// An (n, width) array as rows, flattened.
-pub fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> PyResult<Vec<f64>> {
-    let any = array(value, kind, field)?;
-    let view = any.as_array();
-    if view.ndim() != 2 || view.shape()[1] != width {
-        let message = format!("{field}: needs shape (n, {width}), has {:?}", view.shape());
-        return Err(kind.error(field, message, Value::Count(view.len())).into());
-    }
-    Ok(view.iter().copied().collect())
+pub fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> Result<Vec<f64>> {
+    let what = format!("(n, {width})");
+    let fits = |shape: &[usize]| matches!(*shape, [_, n] if n == width);
+    Ok(shaped(value, kind, (field, &what), fits)?.0)
 }
 
 /// Grains of these radii and masses, (n,), of which some may be kinematic.
@@ -70,7 +66,7 @@ pub fn grains<const D: usize>(
     radius: &Bound<'_, PyAny>,
     mass: &Bound<'_, PyAny>,
     kinematic: Given<'_>,
-) -> PyResult<Grains<D>> {
+) -> Result<Grains<D>> {
     let radius = vector(radius, Kind::Model, "radius")?;
     let mass = vector(mass, Kind::Model, "mass")?;
     let grains = Grains::new(radius, mass).map_err(|e| grain_error(&e))?;
@@ -78,22 +74,23 @@ pub fn grains<const D: usize>(
         return Ok(grains);
     };
     let kinematic = flags(&kinematic, Kind::Model, "kinematic")?;
-    Ok(grains
+    grains
         .with_kinematic(kinematic)
-        .map_err(|e| grain_error(&e))?)
+        .map_err(|e| grain_error(&e))
 }
 
 /// Coordinates of grains, (n, 3), or their rates: of disks the angle may be missing.
 pub fn coordinates<const D: usize>(value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
-    let columns = array(value, Kind::State, field)?
-        .as_array()
-        .shape()
-        .get(1)
-        .copied();
-    if D != 2 || columns != Some(2) {
-        return Ok(rows(value, Kind::State, field, COORDINATES)?);
+    let what = format!("(n, {COORDINATES})");
+    let (flat, shape) = shaped(
+        value,
+        Kind::State,
+        (field, &what),
+        |shape| matches!(*shape, [_, n] if n == COORDINATES || n == D),
+    )?;
+    if shape[1] == COORDINATES {
+        return Ok(flat);
     }
-    let flat = rows(value, Kind::State, field, 2)?;
     Ok(flat
         .chunks_exact(2)
         .flat_map(|r| [r[0], r[1], 0.0])
@@ -112,14 +109,14 @@ fn check_rows<const D: usize>(n: usize, q: &[f64]) -> Result<()> {
 }
 
 /// Walls: a point of each and the normal to its free side, (m, 2 D).
-fn walls<const D: usize>(walls: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Wall<D>>> {
+fn walls<const D: usize>(walls: Option<&Bound<'_, PyAny>>) -> Result<Vec<Wall<D>>> {
     let Some(walls) = walls else {
         return Ok(Vec::new());
     };
     let flat = rows(walls, Kind::Terrain, "walls", 2 * D)?;
     let wall = |row: &[f64]| {
         let half = |from: usize| SVector::<f64, D>::from_column_slice(&row[from..from + D]);
-        Wall::new(half(0), half(D)).map_err(|e| quantity(Kind::Terrain, &e).into())
+        Wall::new(half(0), half(D)).map_err(|e| quantity(Kind::Terrain, &e))
     };
     flat.chunks_exact(2 * D).map(wall).collect()
 }

@@ -10,12 +10,12 @@ use rover_core::system::grains::{GrainFriction, GrainScene, Grains, SleepOptions
 use crate::arguments::Named;
 use crate::arrays::triple;
 use crate::errors::Result;
-use crate::options::{self, Described, GrainStabilisation, Row};
+use crate::options::{self, GrainStabilisation, Options, Row};
 use crate::planar::pair;
 
-/// Options of a bed as its arguments give them; without its gravity, which a pair or a triple gives.
-#[derive(Clone, Default)]
-pub struct BedOptions {
+/// Options of a bed in D dimensions as its arguments give them, but for gravity.
+#[derive(Default)]
+pub struct BedOptions<const D: usize> {
     pub friction: GrainFriction,
     pub cohesion: f64,
     pub cohesion_range: Option<f64>,
@@ -27,8 +27,7 @@ pub struct BedOptions {
 
 /// Options of all beds, followed by those of a class; see [`options::step_options`].
 macro_rules! grain_options {
-    ($then:ident { $($before:tt)* } { $($own:tt)* }) => { $crate::options::$then! {
-        $($before)*
+    ($then:ident $($own:tt)*) => { $crate::options::$then! {
         /// Coulomb's coefficient between grains.
         friction => friction.grains;
         /// Coulomb's coefficient of grains on walls and on the ground, vessel or terrain.
@@ -71,53 +70,59 @@ pub(crate) use grain_options;
 
 /// Options of beds of disks.
 macro_rules! disk_options {
-    ($then:ident $($before:literal)?) => { $crate::bed_options::grain_options! { $then { $($before;)? } {
-        /// Coulomb's coefficient of wheels.
-        wheel_friction => friction.wheels;
-    } } };
+    ($then:ident) => {
+        $crate::bed_options::grain_options! { $then
+            /// Coulomb's coefficient of wheels.
+            wheel_friction => friction.wheels;
+        }
+    };
 }
 pub(crate) use disk_options;
 
 /// Options of beds of balls.
 macro_rules! ball_options {
-    ($then:ident $($before:literal)?) => { $crate::bed_options::grain_options! { $then { $($before;)? } {
-        /// As `rolling_friction`, for rotation about the contact normal.
-        drilling_friction => friction.rolling.drilling;
-        /// Attractive force between bodies in contact, N: the pull that separates them. The
-        /// contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
-        /// impulse is at most friction (p_N + h cohesion).
-        cohesion => cohesion;
-        /// Gap up to which the attraction acts, m; 1% of the smallest radius by default, at
-        /// most 20%.
-        cohesion_range | None => cohesion_range;
-        /// Number of threads that solve the contact problem. The result does not depend on it.
-        /// With fewer than some thousands of balls, a second thread gains little.
-        threads | untold => step.solver.threads;
-    } } };
+    ($then:ident) => {
+        $crate::bed_options::grain_options! { $then
+            /// As `rolling_friction`, for rotation about the contact normal.
+            drilling_friction => friction.rolling.drilling;
+            /// Attractive force between bodies in contact, N: the pull that separates them. The
+            /// contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
+            /// impulse is at most friction (p_N + h cohesion).
+            cohesion => cohesion;
+            /// Gap up to which the attraction acts, m; 1% of the smallest radius by default, at
+            /// most 20%.
+            cohesion_range | None => cohesion_range;
+            /// Number of threads that solve the contact problem. The result does not depend on it.
+            /// With fewer than some thousands of balls, a second thread gains little.
+            threads | untold => step.solver.threads;
+        }
+    };
 }
 pub(crate) use ball_options;
-
-/// Options of beds in D dimensions.
-fn table<const D: usize>() -> &'static [Row<BedOptions>] {
-    const DISKS: &[Row<BedOptions>] = disk_options!(rows);
-    const BALLS: &[Row<BedOptions>] = ball_options!(rows);
-    if D == 2 { DISKS } else { BALLS }
-}
 
 /// Gravity of the Earth, m/s².
 const EARTH: f64 = 9.81;
 
-impl BedOptions {
-    /// The options that hold where none are given, in D dimensions.
-    fn usual<const D: usize>(mut step: StepOptions) -> Self {
-        (step.time_step, step.solver.tolerance) = if D == 2 { (1e-3, 1e-4) } else { (2e-3, 1e-3) };
-        step.solver.max_sweeps = 2000;
-        Self {
-            step,
-            ..Self::default()
-        }
-    }
+impl<const D: usize> Options for BedOptions<D> {
+    const TABLE: &'static [Row<Self>] = if D == 2 {
+        disk_options!(rows)
+    } else {
+        ball_options!(rows)
+    };
 
+    fn usual() -> Self {
+        let mut own = Self::default();
+        let step = &mut own.step;
+        (step.time_step, step.solver.tolerance) = match D {
+            2 => (1e-3, 1e-4),
+            _ => (2e-3, 1e-3),
+        };
+        step.solver.max_sweeps = 2000;
+        own
+    }
+}
+
+impl<const D: usize> BedOptions<D> {
     /// Reads the options of these grains by their names. `is_hollow`: whether what slides along a
     /// surface goes into it, as along the inside of a curve.
     ///
@@ -125,32 +130,43 @@ impl BedOptions {
     /// smallest one gains over its radius, √(g r): the same bed at another scale or under another
     /// gravity is solved alike. Those of disks are right to ten times the tolerance in m/s under the
     /// gravity of the Earth.
-    pub fn read<const D: usize>(
-        given: &Named<'_>,
-        grains: &Grains<D>,
-        is_hollow: bool,
-    ) -> Result<Self> {
-        let mut own = Self::usual::<D>(grain_options(grains));
-        options::read(table::<D>(), &mut own, given)?;
+    pub fn read(given: &Named<'_>, grains: &Grains<D>, is_hollow: bool) -> Result<Self> {
+        let mut own = Self::usual();
+        let (time_step, solver) = (own.step.time_step, own.step.solver);
+        own.step = StepOptions {
+            time_step,
+            solver,
+            ..grain_options(grains)
+        };
+        let usual = own.step.gravity.norm();
+        options::read(&mut own, given)?;
         own.rest.check()?;
         let step = &mut own.step;
-        let (usual, stabilisation) = (step.gravity.norm(), own.stabilisation);
         let gravity = given.read("gravity", |value, kind, field| match D {
             2 => Ok(pair(value, kind, field)?.push(0.0)),
             _ => triple(value, kind, field).map(Vector3::from),
         })?;
         step.gravity = gravity.unwrap_or(step.gravity);
-        step.stabilisation = stabilisation.map_or_else(
-            || usual_stabilisation(D, step.restitution, is_hollow),
-            |GrainStabilisation(given)| given,
-        );
+        step.stabilisation = match own.stabilisation {
+            Some(GrainStabilisation(given)) => given,
+            // What is struck away meets others that were not forecast, and goes into them.
+            None if step.restitution > 0.0 || is_hollow => Stabilisation::Projection,
+            // Under a machine balls sink into the ground by what the solver's tolerance allows.
+            None if D == 3 => Stabilisation::PushOut,
+            None => Stabilisation::None,
+        };
         let speed = if D == 2 {
             10.0
         } else {
             25.0 * (EARTH * grains.smallest()).sqrt()
         };
-        step.solver.velocity_tolerance =
-            speed * step.solver.tolerance * speed_scale(step.gravity.norm(), usual);
+        let weight = step.gravity.norm();
+        let scale = if weight > 0.0 {
+            (weight / usual).sqrt()
+        } else {
+            1.0
+        };
+        step.solver.velocity_tolerance = speed * step.solver.tolerance * scale;
         Ok(own)
     }
 
@@ -160,37 +176,15 @@ impl BedOptions {
     }
 }
 
-/// What is struck away meets others that were not forecast, and goes into them. Under a machine
-/// balls sink into the ground by what the solver's tolerance allows.
-fn usual_stabilisation(dimension: usize, restitution: f64, is_hollow: bool) -> Stabilisation {
-    if restitution > 0.0 || is_hollow {
-        Stabilisation::Projection
-    } else if dimension == 3 {
-        Stabilisation::PushOut
-    } else {
-        Stabilisation::None
-    }
-}
-
-/// Speeds go with the root of gravity, so the same bed under another gravity is solved alike; 1
-/// without gravity.
-fn speed_scale(gravity: f64, usual: f64) -> f64 {
-    if gravity > 0.0 {
-        (gravity / usual).sqrt()
-    } else {
-        1.0
-    }
-}
-
 /// The options of contacts, gravity and solver by the names of the arguments.
 pub fn settings<'py, const D: usize>(
     py: Python<'py>,
     step: &StepOptions,
     scene: &GrainScene<D>,
 ) -> Result<Bound<'py, PyDict>> {
-    let cohesion = scene.grains.cohesion();
     let gravity = PyTuple::new(py, &step.gravity.as_slice()[..D])?;
-    let known = BedOptions {
+    let cohesion = scene.grains.cohesion();
+    let known = BedOptions::<D> {
         friction: scene.friction,
         cohesion: cohesion.map_or(0.0, |own| own.force),
         cohesion_range: cohesion.map(|own| own.range),
@@ -198,11 +192,5 @@ pub fn settings<'py, const D: usize>(
         step: step.clone(),
         ..BedOptions::default()
     };
-    options::settings(&gravity, table::<D>(), known)
-}
-
-/// The options of beds in D dimensions in Python.
-pub fn described<const D: usize>(py: Python<'_>) -> PyResult<Vec<Described>> {
-    let usual = BedOptions::usual::<D>(StepOptions::default());
-    options::described(py, table::<D>(), usual)
+    options::settings(&gravity, known)
 }

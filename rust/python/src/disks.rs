@@ -39,8 +39,8 @@ use crate::shared::Open;
 ///         rate; none by default.
 ///     machine: Coordinates of the rover (x, y, theta, theta_A, theta_B) or of the rig (x, y, -,
 ///         theta, -), (5,), m and rad.
-#[doc = disk_options!(documented "    gravity: Gravity, (2,), m/s²; (0, -9.81) by default.")]
-///
+///     gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+#[doc = disk_options!(documented)]
 /// Raises:
 ///     ModelError: A radius or mass is not finite and positive, or the machine's data are invalid.
 ///     StateError: Positions have a wrong shape or an entry that is not finite, or disks, walls or

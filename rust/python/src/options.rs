@@ -84,56 +84,56 @@ const MAX_ITERATIONS: usize = 1000;
 /// its range. Of an option with the mark `None`, `None` stands for the default; one with the mark
 /// `untold` is not among the `settings`.
 ///
-/// `rows` makes a table of them. `documented` makes the entries of a docstring, after those that it
-/// is given.
+/// `rows` makes a table of them, `documented` the entries of a docstring.
 macro_rules! step_options {
-    ($then:ident $($before:literal)?) => { $crate::options::$then! {
-        $($before;)?
-        /// Coulomb's coefficient of every contact whose pair is not in `materials`.
-        friction => friction_coefficient;
-        /// Newton's coefficient of every contact whose pair is not in `materials`, in
-        /// [0, 1].
-        restitution => restitution;
-        /// Friction and restitution by pair of materials, in any order, such as
-        /// `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
-        /// restitution). None by default.
-        materials | None => materials;
-        /// Time step, s, from 1e-9 to 1000; 0.005 by default.
-        time_step | None => time_step;
-        /// "linearised" evaluates the forces once in each step; "newton" solves for the forces
-        /// at its end. "linearised" by default.
-        variant | None => variant;
-        /// Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
-        theta => theta;
-        /// A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
-        /// its normal velocity; in [0, 1].
-        forecast => forecast;
-        /// Method for the contact problem, as in `solve_friction_contact`.
-        solver => solver.method;
-        /// Largest relative residual of the contact problem; 1e-12 by default.
-        tolerance | None => solver.tolerance;
-        /// Largest number of iterations of the contact solver in a step.
-        max_iterations => solver.max_sweeps;
-        /// Largest amount of work of the contact solver in a step, in the unit of
-        /// `solve_friction_contact` (operations, not time). By default it grows with the number of
-        /// contacts.
-        budget | None => solver.budget;
-        /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
-        /// leaves them.
-        stabilisation => stabilisation;
-        /// Whether the contact solver starts from the last step's impulses.
-        warm_start => warm_start;
-    } };
+    ($then:ident) => {
+        $crate::options::$then! {
+            /// Coulomb's coefficient of every contact whose pair is not in `materials`.
+            friction => friction_coefficient;
+            /// Newton's coefficient of every contact whose pair is not in `materials`, in
+            /// [0, 1].
+            restitution => restitution;
+            /// Friction and restitution by pair of materials, in any order, such as
+            /// `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+            /// restitution). None by default.
+            materials | None => materials;
+            /// Time step, s, from 1e-9 to 1000; 0.005 by default.
+            time_step | None => time_step;
+            /// "linearised" evaluates the forces once in each step; "newton" solves for the forces
+            /// at its end. "linearised" by default.
+            variant | None => variant;
+            /// Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+            theta => theta;
+            /// A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+            /// its normal velocity; in [0, 1].
+            forecast => forecast;
+            /// Method for the contact problem, as in `solve_friction_contact`.
+            solver => solver.method;
+            /// Largest relative residual of the contact problem; 1e-12 by default.
+            tolerance | None => solver.tolerance;
+            /// Largest number of iterations of the contact solver in a step.
+            max_iterations => solver.max_sweeps;
+            /// Largest amount of work of the contact solver in a step, in the unit of
+            /// `solve_friction_contact` (operations, not time). By default it grows with the number of
+            /// contacts.
+            budget | None => solver.budget;
+            /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+            /// leaves them.
+            stabilisation => stabilisation;
+            /// Whether the contact solver starts from the last step's impulses.
+            warm_start => warm_start;
+        }
+    };
 }
 pub(crate) use step_options;
 
-/// Entries of a docstring's section "Args", without a line break at the end.
+/// The last entries of a docstring's section "Args", and the line break after the section.
 macro_rules! documented {
-    ($before:literal; $(
+    ($(
         #[doc = $first:literal] $(#[doc = $more:literal])*
         $name:ident $(| $mark:ident)* => $($place:ident).+;
     )+) => {
-        concat!($before $(, "\n    ", stringify!($name), ":", $first $(, "\n       ", $more)*)+)
+        concat!($("    ", stringify!($name), ":", $first $(, "\n       ", $more)*, "\n"),+)
     };
 }
 pub(crate) use documented;
@@ -163,8 +163,24 @@ impl<T> Row<T> {
     }
 }
 
-/// Options of machines.
-pub const STEP: &[Row<StepOptions>] = step_options!(rows);
+/// Options of a class of simulations.
+pub trait Options: Sized + 'static {
+    /// All of them.
+    const TABLE: &'static [Row<Self>];
+
+    /// Those that hold where none are given.
+    fn usual() -> Self;
+}
+
+impl Options for StepOptions {
+    const TABLE: &'static [Row<Self>] = step_options!(rows);
+
+    fn usual() -> Self {
+        let mut step = Self::default();
+        step.solver.max_sweeps = MAX_ITERATIONS;
+        step
+    }
+}
 
 /// The value of an option.
 pub trait Argument {
@@ -243,9 +259,9 @@ impl Argument for Materials {
     }
 }
 
-/// Reads the options of a table that were given by their names.
-pub fn read<T>(table: &[Row<T>], options: &mut T, given: &Named<'_>) -> Result<()> {
-    for row in table {
+/// Reads the options that were given by their names.
+pub fn read<T: Options>(options: &mut T, given: &Named<'_>) -> Result<()> {
+    for row in T::TABLE {
         if let Some(value) = given.get(row.name)?.given()
             && !(value.is_none() && row.has("None"))
         {
@@ -257,8 +273,7 @@ pub fn read<T>(table: &[Row<T>], options: &mut T, given: &Named<'_>) -> Result<(
 
 /// Reads the options of a machine that were given by their names.
 pub fn read_step(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
-    step.solver.max_sweeps = MAX_ITERATIONS;
-    read(STEP, &mut step, given)?;
+    read(&mut step, given)?;
     step.solver = checked(step.solver)?;
     Ok(step)
 }
@@ -266,15 +281,14 @@ pub fn read_step(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions
 /// The keyword arguments that make a simulation with these options.
 ///
 /// `gravity`: as the class gives it, a pair or a triple.
-pub fn settings<'py, T>(
+pub fn settings<'py, T: Options>(
     gravity: &Bound<'py, PyAny>,
-    table: &[Row<T>],
     mut options: T,
 ) -> Result<Bound<'py, PyDict>> {
     let py = gravity.py();
     let settings = PyDict::new(py);
     settings.set_item("gravity", gravity)?;
-    for row in table.iter().filter(|row| !row.has("untold")) {
+    for row in T::TABLE.iter().filter(|row| !row.has("untold")) {
         let value = (row.place)(&mut options).tell(py)?;
         if !value.is_none(py) {
             settings.set_item(row.name, value)?;
@@ -314,12 +328,10 @@ pub fn literal<T>(choices: &[(&str, T)]) -> String {
     format!("Literal[{}]", words.join(", "))
 }
 
-/// An option in Python: name, default and type.
-pub type Described = (&'static str, Py<PyAny>, String);
-
-/// The options of a table in Python, with these defaults.
-pub fn described<T>(py: Python<'_>, table: &[Row<T>], mut usual: T) -> PyResult<Vec<Described>> {
-    let described = table.iter().map(|row| {
+/// Name, default and type of each option in Python.
+pub fn described<T: Options>(py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>, String)>> {
+    let mut usual = T::usual();
+    let described = T::TABLE.iter().map(|row| {
         let value = (row.place)(&mut usual);
         Ok(if row.has("None") {
             (row.name, py.None(), value.python() + " | None")
@@ -328,11 +340,4 @@ pub fn described<T>(py: Python<'_>, table: &[Row<T>], mut usual: T) -> PyResult<
         })
     });
     described.collect()
-}
-
-/// The options of machines in Python.
-pub fn described_steps(py: Python<'_>) -> PyResult<Vec<Described>> {
-    let mut step = StepOptions::default();
-    step.solver.max_sweeps = MAX_ITERATIONS;
-    described(py, STEP, step)
 }

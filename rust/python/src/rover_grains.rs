@@ -23,18 +23,12 @@ impl From<TogetherError> for BorderError {
     fn from(e: TogetherError) -> Self {
         let message = e.to_string();
         match e {
-            TogetherError::Differs { field, grains, .. } => Self {
-                kind: Kind::Option,
-                message,
-                field: Some(field.to_owned()),
-                value: Value::Number(grains),
-            },
-            TogetherError::Overlap { depth, .. } => Self {
-                kind: Kind::State,
-                message,
-                field: Some("position".to_owned()),
-                value: Value::Number(depth),
-            },
+            TogetherError::Differs { field, grains, .. } => {
+                Kind::Option.error(field, message, Value::Number(grains))
+            }
+            TogetherError::Overlap { depth, .. } => {
+                Kind::State.error("position", message, Value::Number(depth))
+            }
             TogetherError::Friction(e) => grain_error(&e),
         }
     }
@@ -101,7 +95,7 @@ impl Stepped for Together {
         let (moving, mut watch) = (&mut *rover, Watch::new());
         let (link, grains) = (&mut *link, &mut *grains);
         let report = py.release(|| link.step(moving, grains, n, &mut || watch.go_on()))?;
-        Ok(watch.result(report)?.into())
+        Ok(StepReport::new(watch.result(report)?, 0))
     }
 
     fn energy(&self) -> Result<Energy> {

@@ -50,8 +50,8 @@ where
         let mut held = self.open()?;
         let (inner, mut watch) = (&mut *held, Watch::new());
         let done = py.release(|| inner.step_while(n, &mut || watch.go_on()))?;
-        let report = StepReport::from(watch.result(done)?);
-        Ok(report.with_undetermined_loads(S::undetermined_loads(&held)))
+        let report = watch.result(done)?;
+        Ok(StepReport::new(report, S::undetermined_loads(&held)))
     }
 
     fn energy(&self) -> Result<Energy> {
