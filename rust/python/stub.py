@@ -72,8 +72,10 @@ class Writer(ast.NodeTransformer):
         self.owner = owner = getattr(self.module, node.name)
         node.body = [one for one in node.body if not isinstance(one, ast.Expr)]
         if not issubclass(owner, Exception):
+            if owner.__text_signature__ and "__new__" not in map(name, node.body):
+                node.body[:0] = ast.parse("def __new__(): ...").body
             public = {one for one in vars(owner) if not one.startswith("_")}
-            self.compare(node.name, public | ({"__new__"} if owner.__text_signature__ else set()), node)
+            self.compare(node.name, public, node)
             if not owner.__flags__ & CAN_BE_SUBCLASSED:
                 node.decorator_list = [ast.Name("final")]
             elif owner.__basicsize__ > object.__basicsize__:

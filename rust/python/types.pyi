@@ -1,8 +1,9 @@
 """Types of the compiled module, from which `make stub` writes `envs/rover_gym/_core.pyi`.
 
 A name with a type is a property. An argument that a function does not list has the type that `_ARGUMENTS` gives its
-name, or else that of its default. All else is the module's: docstrings, defaults, kinds of arguments and methods, base
-classes, special methods, and the types of the options that `options.rs` and `bed_options.rs` list in `rust/python/src`.
+name, or else that of its default; a constructor may be left out. All else is the module's: docstrings, defaults, kinds
+of arguments and methods, base classes, special methods, and the types of the options that `options.rs` and
+`bed_options.rs` list in `rust/python/src`.
 """
 
 import os
@@ -95,7 +96,6 @@ class BusyError: ...
 class InternalError: ...
 
 class Motor:
-    def __new__(): ...
     stall_torque: float
     no_load_speed: float
     regenerating: bool
@@ -110,7 +110,6 @@ class Machine:
     wheels: slice
 
 class RoverModel:
-    def __new__(): ...
     from_file = staticmethod(model_files.from_file)
 
     def from_text() -> RoverModel: ...
@@ -176,7 +175,6 @@ class Terrain:
     def cast_rays() -> tuple[_Array, _Array]: ...
 
 class Plane:
-    def __new__(): ...
     normal: _Array
     offset: float
 
@@ -229,7 +227,6 @@ class HeightField:
     def coordinates_of(x: float) -> tuple[float, float]: ...
 
 class TriangleMesh:
-    def __new__(): ...
     from_file = staticmethod(terrain_files.triangle_mesh_from_file)
     material: str
     vertices: _Array
@@ -328,7 +325,6 @@ class AnySimulation:
     def restore(snapshot: Snapshot): ...
 
 class Simulation:
-    def __new__(): ...
     model: RoverModel
     terrain: Terrain
 
@@ -385,12 +381,10 @@ class PlanarGround:
     def height(x: Sequence[float] | _Array) -> _Array: ...
 
 class Line:
-    def __new__(): ...
     slope: float
     offset: float
 
 class Sine:
-    def __new__(): ...
     amplitude: float
     wavelength: float
     phase: float
@@ -444,7 +438,6 @@ class TwoWheelRoverSimulation:
     ): ...
 
 class MirroredRoverSimulation:
-    def __new__(): ...
     joints: list[list[str]]
     wheels: list[list[str]]
 
@@ -493,7 +486,6 @@ class DrawnEpisodes:
     def simulation() -> Simulation: ...
 
 class EpisodeBatch:
-    def __new__(): ...
     threads: int
 
     def step(

@@ -258,7 +258,7 @@ def test_the_stub_is_up_to_date() -> None:
         ("    def momentum(", "    momentum: float\n    def momentum(", "Simulation.momentum is no property"),
         ("stall_torque ", "", "Motor.__new__: types.pyi has no type for the argument stall_torque"),
         ("stall_torque ", "stall_torque stall ", "no function has stall"),
-        ("class Motor:\n    def __new__(", "class Motor:\n    def __new__(stall: float", "Motor.__new__ has no stall"),
+        ("class Motor:\n", "class Motor:\n    def __new__(stall: float): ...\n", "Motor.__new__ has no stall"),
         ("def exp(", "def exponential(", "the module: types.pyi has no type for exp"),
     ],
 )

@@ -4,6 +4,7 @@
 //! A number is a float, an integer, or what numpy or Python hold to be real; a truth value, a
 //! complex number, a time and a text are none, though `float()` or numpy would take some of them.
 
+use pyo3::PyTypeCheck;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyMapping, PyString};
@@ -45,12 +46,6 @@ impl<'py> Given<'py> {
             .transpose()
     }
 
-    /// A text.
-    pub fn text(self, default: &str, kind: Kind, field: &str) -> Result<String> {
-        self.0
-            .map_or_else(|| Ok(default.to_owned()), |given| text(&given, kind, field))
-    }
-
     /// An object of a class, or nothing where `None` was given. `what`: its name with an article.
     pub fn object<T>(self, kind: Kind, field: &str, what: &str) -> Result<Option<T>>
     where
@@ -62,6 +57,31 @@ impl<'py> Given<'py> {
         };
         self.some().map(read).transpose()
     }
+}
+
+/// An object of a class. `what`: its name with an article.
+pub fn object<'a, 'py, T: PyTypeCheck>(
+    given: &'a Bound<'py, PyAny>,
+    kind: Kind,
+    field: &str,
+    what: &str,
+) -> Result<&'a Bound<'py, T>> {
+    given.cast().map_err(|_| refused(given, kind, field, what))
+}
+
+/// The entries of an iterable, as a function reads them. `what`: all of them.
+pub fn each<'py, T>(
+    value: &Bound<'py, PyAny>,
+    kind: Kind,
+    (field, what): (&str, &str),
+    read: impl Fn(&Bound<'py, PyAny>, Kind, &str) -> Result<T>,
+) -> Result<Vec<T>> {
+    let entries = value.try_iter();
+    let entries = entries.map_err(|_| refused(value, kind, field, what))?;
+    let numbered = entries.enumerate();
+    numbered
+        .map(|(i, entry)| read(&entry?, kind, &format!("{field}[{i}]")))
+        .collect()
 }
 
 /// Whether an argument is a text or an `os.PathLike`.
@@ -90,14 +110,11 @@ impl<'py> Named<'py> {
 
     /// A mapping that is the argument `outer`.
     pub fn mapping(given: &Bound<'py, PyAny>, outer: &'static str, kind: Kind) -> Result<Self> {
-        match given.cast::<PyMapping>() {
-            Ok(mapping) => Ok(Self {
-                given: mapping.clone(),
-                outer: Some(outer),
-                kind,
-            }),
-            Err(_) => Err(refused(given, kind, outer, "a mapping")),
-        }
+        Ok(Self {
+            given: object(given, kind, outer, "a mapping")?.clone(),
+            outer: Some(outer),
+            kind,
+        })
     }
 
     /// The values by name, with errors of another kind.
@@ -180,11 +197,6 @@ impl<'py> Named<'py> {
     /// A number, or nothing where it is missing or `None`.
     pub fn maybe(&self, name: &str) -> Result<Option<f64>> {
         self.get(name)?.maybe(self.kind, &self.path(name))
-    }
-
-    /// A text.
-    pub fn text(&self, name: &str, default: &str) -> Result<String> {
-        self.get(name)?.text(default, self.kind, &self.path(name))
     }
 }
 
@@ -331,6 +343,13 @@ pub fn at_least_one(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result
     }
 }
 
+/// A number of threads, if one is given.
+pub fn threads(given: Option<&Bound<'_, PyAny>>) -> Result<Option<usize>> {
+    given
+        .map(|given| at_least_one(given, Kind::Option, "threads"))
+        .transpose()
+}
+
 /// A truth value.
 pub fn flag(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<bool> {
     let is_flag = value.is_instance_of::<PyBool>() || scalar_kind(value) == Some('b');
@@ -346,13 +365,7 @@ pub fn text(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<String>
 
 /// Truth values (n,).
 pub fn flags(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<bool>> {
-    let entries = value
-        .try_iter()
-        .map_err(|_| refused(value, kind, field, "booleans"))?;
-    entries
-        .enumerate()
-        .map(|(i, entry)| flag(&entry?, kind, &format!("{field}[{i}]")))
-        .collect()
+    each(value, kind, (field, "booleans"), flag)
 }
 
 /// Texts, or one.
@@ -360,11 +373,5 @@ pub fn texts(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<St
     if let Ok(one) = value.extract::<String>() {
         return Ok(vec![one]);
     }
-    let entries = value
-        .try_iter()
-        .map_err(|_| refused(value, kind, field, "a name or names"))?;
-    entries
-        .enumerate()
-        .map(|(i, entry)| text(&entry?, kind, &format!("{field}[{i}]")))
-        .collect()
+    each(value, kind, (field, "a name or names"), text)
 }

@@ -11,7 +11,7 @@ use rover_core::spatial::space::body_velocities;
 use rover_core::system::grains::{COORDINATES, Packing, Wall, arranged};
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Named, count, number, refused};
+use crate::arguments::{Named, count, each, number, refused};
 use crate::arrays::{Array, vector};
 use crate::bed_arguments::{self, Described, Packed, grain_error, packed, rows};
 use crate::bed_options::ball_options;
@@ -135,19 +135,17 @@ fn state(
 
 /// Numbers of balls, (n,); none for -1.
 fn numbers(before: &Bound<'_, PyAny>) -> Result<Vec<Option<u32>>> {
-    let wrong = |value: &Bound<'_, PyAny>, field: &str| {
-        refused(value, Kind::Model, field, "a whole number from -1")
-    };
-    let entries = before.try_iter().map_err(|_| wrong(before, "before"))?;
-    let read = |(i, entry): (usize, PyResult<Bound<'_, PyAny>>)| {
-        let entry = entry?;
-        match entry.extract::<i64>() {
+    let what = "a whole number from -1";
+    each(
+        before,
+        Kind::Model,
+        ("before", what),
+        |entry, kind, field| match entry.extract::<i64>() {
             Ok(-1) => Ok(None),
             Ok(number) if u32::try_from(number).is_ok() => Ok(u32::try_from(number).ok()),
-            _ => Err(wrong(&entry, &format!("before[{i}]"))),
-        }
-    };
-    entries.enumerate().map(read).collect()
+            _ => Err(refused(entry, kind, field, what)),
+        },
+    )
 }
 
 #[pymethods]

@@ -7,7 +7,7 @@ use rover_core::scalar::instructions::Instructions;
 use rover_core::simulation::Batch;
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Given, at_least_one, below, flags, refused};
+use crate::arguments::{self, Given, below, each, flags, refused};
 use crate::arrays::{Array, shaped};
 use crate::episode::{GivenSimulation, simulation};
 use crate::errors::{Kind, Result};
@@ -66,19 +66,17 @@ impl SimulationBatch {
         threads: Option<&Bound<'_, PyAny>>,
     ) -> Result<Self> {
         let field = "simulations";
-        let items = simulations
-            .try_iter()
-            .map_err(|_| refused(simulations, Kind::Option, field, "simulations"))?;
-        let (mut rovers, mut grounds) = (Vec::new(), Vec::new());
-        for (i, item) in items.enumerate() {
-            let item = item?;
-            let one = simulation(&item, &format!("{field}[{i}]"))?.get();
-            rovers.push(one.open()?.clone());
-            grounds.push(one.ground().clone());
-        }
-        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
-        let threads = threads.transpose()?;
-        let inner = Batch::new(rovers, scan_points(scan)?, threads)?;
+        let given = each(
+            simulations,
+            Kind::Option,
+            (field, field),
+            |one, _, field| {
+                let one = simulation(one, field)?.get();
+                Ok((one.open()?.clone(), one.ground().clone()))
+            },
+        )?;
+        let (rovers, grounds) = given.into_iter().unzip();
+        let inner = Batch::new(rovers, scan_points(scan)?, arguments::threads(threads)?)?;
         Ok(Self(Shared::new(Inner { inner, grounds })))
     }
 

@@ -72,13 +72,8 @@ impl BedSimulation {
         SharedBed<D>: Stepped,
         AnyBed: From<Arc<SharedBed<D>>>,
     {
-        let Described {
-            scene,
-            options,
-            sleep,
-            q,
-        } = given;
-        let made = GrainSimulation::new(Arc::new(scene), options, sleep, q);
+        let scene = Arc::new(given.scene);
+        let made = GrainSimulation::new(scene, given.options, given.sleep, given.q);
         let inner = Arc::new(Shared::new(made.map_err(setup_error)?));
         let base = AnySimulation::base(inner.clone()).add_subclass(Self(inner.clone().into()));
         Ok((base, inner))

@@ -9,7 +9,7 @@ use rover_task::episode::{
     BatchOutcome, EpisodeBatch as CoreBatch, EpisodeError, EpisodeOrigin as Began,
 };
 
-use crate::arguments::{Named, at_least_one, below, refused, text, whole};
+use crate::arguments::{self, Named, at_least_one, below, object, refused, text, whole};
 use crate::arrays::{Array, fresh, fresh_rows};
 use crate::batch::mask;
 use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request};
@@ -130,20 +130,6 @@ impl EpisodeBatch {
     }
 }
 
-fn distribution<'a, 'py>(
-    given: &'a Bound<'py, PyAny>,
-) -> Result<&'a Bound<'py, EpisodeDistribution>> {
-    let wrong = |_| {
-        refused(
-            given,
-            Kind::Option,
-            "distribution",
-            "an EpisodeDistribution",
-        )
-    };
-    given.cast().map_err(wrong)
-}
-
 /// The argument `among`: what links each rover of a batch with its grains.
 fn links(given: &Bound<'_, PyAny>, batch: &CoreBatch) -> Result<Vec<Arc<Together>>> {
     let what = "a RoverGrainSimulation of each rover";
@@ -187,12 +173,8 @@ impl EpisodeBatch {
     ) -> Result<Self> {
         let n = at_least_one(n, Kind::Option, "n")?;
         let max_steps = max_steps.map(|given| whole(given, Kind::Option, "max_steps"));
-        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
-        let (one, max_steps, threads) = (
-            simulation.0.get(),
-            max_steps.transpose()?,
-            threads.transpose()?,
-        );
+        let (max_steps, threads) = (max_steps.transpose()?, arguments::threads(threads)?);
+        let one = simulation.0.get();
         let batch = CoreBatch::new(rules.0, &*one.open()?, n, max_steps, threads)?;
         Ok(Self(Shared::new(Inner {
             batch,
@@ -356,10 +338,11 @@ impl EpisodeBatch {
         generators: &Bound<'_, PyAny>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<DrawnEpisodes> {
-        let distribution = self::distribution(distribution)?.get();
+        let what = "an EpisodeDistribution";
+        let of = object::<EpisodeDistribution>(distribution, Kind::Option, "distribution", what)?;
         let request = Request::parse(generators, options)?;
         let mut held = self.0.open()?;
-        distribution.draw_on(generators.py(), &request, &mut held.batch)
+        of.get().draw_on(generators.py(), &request, &mut held.batch)
     }
 
     /// Starts drawn episodes.
@@ -371,9 +354,8 @@ impl EpisodeBatch {
     /// Raises:
     ///     OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
     fn begin(&self, indices: &Bound<'_, PyAny>, episodes: &Bound<'_, PyAny>) -> Result<()> {
-        let found = episodes.cast::<DrawnEpisodes>();
-        let refuse = |_| refused(episodes, Kind::Option, "episodes", "DrawnEpisodes");
-        let drawn = found.map_err(refuse)?.get();
+        let drawn = object(episodes, Kind::Option, "episodes", "DrawnEpisodes")?;
+        let drawn: &DrawnEpisodes = drawn.get();
         let mut held = self.0.open()?;
         let places = held.indices(indices, Some(drawn.drawn.len()))?;
         for (&index, one) in places.iter().zip(&drawn.drawn) {
@@ -413,8 +395,8 @@ impl EpisodeBatch {
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<()> {
         let one = simulation.0.get();
-        let wrong = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
-        let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy();
+        let episode = object(episode, Kind::Option, "episode", "an EpisodeRun")?;
+        let episode = EpisodeRun::copy(episode.get());
         let origin = self::origin(origin, one.ground().clone())?;
         let given = Named::keywords(indices.py(), options)?;
         let random = given.need("generator", |value, kind, field| {

@@ -8,7 +8,7 @@ use rover_core::simulation::{
     AnySnapshot, GrainSimulation as Grains, RoverInGrains, RoverSimulation, TogetherError,
 };
 
-use crate::arguments::{Given, refused};
+use crate::arguments::{Given, object};
 use crate::arrays::Array;
 use crate::balls::GrainSimulation;
 use crate::bed_arguments::grain_error;
@@ -140,12 +140,9 @@ impl RoverGrainSimulation {
         grains: &Bound<'_, PyAny>,
         wheel_friction: Given<'_>,
     ) -> Result<PyClassInitializer<Self>> {
-        let rover = rover
-            .cast::<Simulation>()
-            .map_err(|_| refused(rover, Kind::Model, "rover", "a Simulation"))?;
-        let grains = grains
-            .cast::<GrainSimulation>()
-            .map_err(|_| refused(grains, Kind::Model, "grains", "a GrainSimulation"))?;
+        let rover = object::<Simulation>(rover, Kind::Model, "rover", "a Simulation")?;
+        let what = "a GrainSimulation";
+        let grains = object::<GrainSimulation>(grains, Kind::Model, "grains", what)?;
         let friction = wheel_friction.number(0.9, Kind::Option, "wheel_friction")?;
         let (moving, bed) = (rover.get().inner.clone(), grains.get().inner.clone());
         let link = RoverInGrains::new(&*moving.open()?, &*bed.open()?, friction)?;

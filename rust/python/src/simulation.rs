@@ -16,7 +16,7 @@ use rover_task::draw::DrawnGround;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, Named, at_least_one, number, text, texts};
+use crate::arguments::{self, Given, Named, number, text, texts};
 use crate::arrays::{
     Array, at_most, finite_shaped, fresh, fresh_matrix, fresh_rows, triple, vector,
 };
@@ -791,9 +791,8 @@ impl Simulation {
             ("commands", "(n, steps, nu)"),
             |s| s.len() == 3 && s[0] == n && s[2] == nu,
         )?;
-        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        let threads = threads.transpose()?.unwrap_or_else(cores);
+        let threads = arguments::threads(threads)?.unwrap_or_else(cores);
         let parameters = named_parameters(inner, parameters)?;
         let mut watch = Watch::new();
         let batch = TrajectoryBatch {

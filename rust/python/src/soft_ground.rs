@@ -7,7 +7,7 @@ use pyo3::types::PyDict;
 use rover_core::geometry::SoftGround as CoreGround;
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Given, refused};
+use crate::arguments::{Given, object};
 use crate::errors::{Kind, Result};
 use crate::planar_ground::quantity;
 use crate::sand::{numbers_of, soil_of};
@@ -55,13 +55,8 @@ impl SoftGround {
         rut_cell: Given<'_>,
     ) -> Result<PyClassInitializer<Self>> {
         let what = "a Plane, HeightField or TriangleMesh";
-        let refuse = |_| refused(surface, Kind::Terrain, "surface", what);
-        let drawn = surface
-            .cast::<Terrain>()
-            .map_err(refuse)?
-            .get()
-            .ground
-            .clone();
+        let drawn = object::<Terrain>(surface, Kind::Terrain, "surface", what)?;
+        let drawn = drawn.get().ground.clone();
         let cell = rut_cell.number(0.02, Kind::Terrain, "rut_cell")?;
         let made = CoreGround::new(drawn.terrain(), Arc::new(soil_of(soil)?), cell);
         let made = made.map_err(|e| quantity(Kind::Terrain, &e))?;
