@@ -13,7 +13,7 @@ use rover_task::draw::DrawnGround;
 
 use crate::arguments::{Named, count, each, number, refused};
 use crate::arrays::{Array, vector};
-use crate::bed_arguments::{self, Described, Packed, grain_error, packed, rows};
+use crate::bed_arguments::{self, Described, Packed, packed, rows};
 use crate::bed_options::ball_options;
 use crate::beds::{BedSimulation, SharedBed, columns};
 use crate::errors::{Kind, Result, Value};
@@ -188,12 +188,8 @@ impl GrainSimulation {
     #[getter]
     fn spin(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(columns(
-            inner.v(),
-            inner.description().grains.len(),
-            VELOCITIES,
-            3,
-        ))
+        let n = inner.description().grains.len();
+        Ok(columns(inner.v(), n, VELOCITIES, 3))
     }
 
     /// The terrain below the balls, or None.
@@ -228,7 +224,7 @@ impl GrainSimulation {
     ) -> Result<()> {
         let mut inner = self.open()?;
         let (q, v) = state(inner.description().grains.len(), position, velocity, spin)?;
-        inner.set_state(&q, &v).map_err(|e| grain_error(&e))
+        Ok(inner.set_state(&q, &v)?)
     }
 
     /// Replaces the balls. Time and options do not change.
@@ -269,9 +265,7 @@ impl GrainSimulation {
         given.finish()?;
         let (q, v) = state(grains.len(), position, velocity.as_ref(), spin.as_ref())?;
         let before = numbers(before)?;
-        inner
-            .exchange(grains, &q, &v, &before)
-            .map_err(|e| grain_error(&e))
+        Ok(inner.exchange(grains, &q, &v, &before)?)
     }
 }
 
@@ -366,10 +360,8 @@ pub fn arrange_balls(
     let seed = given.whole("seed", 0)?;
     given.finish()?;
     let radii = vector(radius, Kind::Model, "radius")?;
-    let places = radius
-        .py()
-        .release(|| arranged::<3>(&radii, corner, sides, seed))?;
-    let q = places.map_err(|e| grain_error(&e))?;
+    let py = radius.py();
+    let q = py.release(|| arranged::<3>(&radii, corner, sides, seed))??;
     Ok(columns(&q, radii.len(), COORDINATES, 0))
 }
 

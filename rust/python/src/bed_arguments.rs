@@ -18,39 +18,41 @@ use crate::errors::{BorderError, Kind, Result, Value};
 use crate::planar_ground::quantity;
 use crate::shared::Release;
 
-/// An error of the grains on its way to Python.
-pub fn grain_error(e: &GrainError) -> BorderError {
-    let field = e.field();
-    let kind = match field.split('[').next().unwrap_or_default() {
-        "position" | "velocity" | "spin" | "machine" | "machine_rate" => Kind::State,
-        "torques" | "pull" => Kind::Command,
-        "friction" | "wall_friction" | "wheel_friction" | "rolling_friction"
-        | "drilling_friction" | "cohesion" | "cohesion_range" => Kind::Option,
-        _ => Kind::Model,
-    };
-    let value = match e {
-        GrainError::Number(number) => return quantity(kind, number),
-        GrainError::Cohesion(e) => Value::Number(e.value()),
-        GrainError::Length { count, .. } | GrainError::TooMany { count, .. } => {
-            Value::Count(*count)
-        }
-        GrainError::Before { value, .. } => Value::Count(*value),
-        GrainError::Overlap { value, .. }
-        | GrainError::InWall { value, .. }
-        | GrainError::WheelIn { value, .. }
-        | GrainError::TooNarrow { value, .. }
-        | GrainError::Range { value } => Value::Number(*value),
-        GrainError::Empty => Value::Count(0),
-        _ => Value::Nothing,
-    };
-    kind.error(field, e.to_string(), value)
+impl From<GrainError> for BorderError {
+    fn from(e: GrainError) -> Self {
+        let field = e.field();
+        let kind = match field.split('[').next().unwrap_or_default() {
+            "position" | "velocity" | "spin" | "machine" | "machine_rate" => Kind::State,
+            "torques" | "pull" => Kind::Command,
+            "friction" | "wall_friction" | "wheel_friction" | "rolling_friction"
+            | "drilling_friction" | "cohesion" | "cohesion_range" => Kind::Option,
+            _ => Kind::Model,
+        };
+        let value = match &e {
+            GrainError::Number(number) => return quantity(kind, number),
+            GrainError::Cohesion(e) => Value::Number(e.value()),
+            GrainError::Length { count, .. } | GrainError::TooMany { count, .. } => {
+                Value::Count(*count)
+            }
+            GrainError::Before { value, .. } => Value::Count(*value),
+            GrainError::Overlap { value, .. }
+            | GrainError::InWall { value, .. }
+            | GrainError::WheelIn { value, .. }
+            | GrainError::TooNarrow { value, .. }
+            | GrainError::Range { value } => Value::Number(*value),
+            GrainError::Empty => Value::Count(0),
+            _ => Value::Nothing,
+        };
+        kind.error(field, e.to_string(), value)
+    }
 }
 
-/// An error of a bed that cannot be set up on its way to Python.
-pub fn setup_error(e: GrainSetupError) -> BorderError {
-    match e {
-        GrainSetupError::Options(e) => e.into(),
-        GrainSetupError::Grains(e) => grain_error(&e),
+impl From<GrainSetupError> for BorderError {
+    fn from(e: GrainSetupError) -> Self {
+        match e {
+            GrainSetupError::Options(e) => e.into(),
+            GrainSetupError::Grains(e) => e.into(),
+        }
     }
 }
 
@@ -69,14 +71,12 @@ pub fn grains<const D: usize>(
 ) -> Result<Grains<D>> {
     let radius = vector(radius, Kind::Model, "radius")?;
     let mass = vector(mass, Kind::Model, "mass")?;
-    let grains = Grains::new(radius, mass).map_err(|e| grain_error(&e))?;
+    let grains = Grains::new(radius, mass)?;
     let Some(kinematic) = kinematic.some() else {
         return Ok(grains);
     };
     let kinematic = flags(&kinematic, Kind::Model, "kinematic")?;
-    grains
-        .with_kinematic(kinematic)
-        .map_err(|e| grain_error(&e))
+    Ok(grains.with_kinematic(kinematic)?)
 }
 
 /// Coordinates of grains, (n, 3), or their rates: of disks the angle may be missing.
@@ -143,8 +143,7 @@ impl<const D: usize> Described<D> {
         check_rows::<D>(grains.len(), &q)?;
         let options = BedOptions::read(given, &grains, is_hollow)?;
         let (force, range) = (options.cohesion, options.cohesion_range);
-        let cohesion = Cohesion::new(force, range, grains.smallest());
-        let cohesion = cohesion.map_err(|e| grain_error(&e.into()))?;
+        let cohesion = Cohesion::new(force, range, grains.smallest()).map_err(GrainError::from)?;
         Ok(Self {
             sleep: options.sleep(),
             scene: GrainScene {
@@ -169,8 +168,7 @@ pub type Packed = (Array, Array, Array);
 
 /// Grains of a packing, built with the interpreter free for others.
 pub fn packed<const D: usize>(py: Python<'_>, packing: &Packing<D>) -> Result<Packed> {
-    let built = py.release(|| packing.build())?;
-    let (grains, q) = built.map_err(|e| grain_error(&e))?;
+    let (grains, q) = py.release(|| packing.build())??;
     let centres: Vec<f64> = q
         .chunks_exact(COORDINATES)
         .flat_map(|c| &c[..D])

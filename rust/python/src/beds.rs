@@ -12,7 +12,7 @@ use rover_core::system::grains::COORDINATES;
 
 use crate::arguments::flags;
 use crate::arrays::{Array, fresh, fresh_rows};
-use crate::bed_arguments::{Described, grain_error, setup_error};
+use crate::bed_arguments::Described;
 use crate::bed_options;
 use crate::contacts::GrainContacts;
 use crate::errors::{Kind, Result};
@@ -73,8 +73,8 @@ impl BedSimulation {
         AnyBed: From<Arc<SharedBed<D>>>,
     {
         let scene = Arc::new(given.scene);
-        let made = GrainSimulation::new(scene, given.options, given.sleep, given.q);
-        let inner = Arc::new(Shared::new(made.map_err(setup_error)?));
+        let made = GrainSimulation::new(scene, given.options, given.sleep, given.q)?;
+        let inner = Arc::new(Shared::new(made));
         let base = AnySimulation::base(inner.clone()).add_subclass(Self(inner.clone().into()));
         Ok((base, inner))
     }
@@ -194,7 +194,7 @@ impl BedSimulation {
     ///         left. Nothing has changed.
     fn remove(&self, which: &Bound<'_, PyAny>) -> Result<()> {
         let which = flags(which, Kind::Model, "which")?;
-        opened!(self, bed => bed.remove(&which).map_err(|e| grain_error(&e)))
+        opened!(self, bed => Ok(bed.remove(&which)?))
     }
 
     /// The contacts of the last step.

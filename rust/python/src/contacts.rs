@@ -94,23 +94,17 @@ impl Contacts {
             Part::Friction(_) => ("friction", -1),
         };
         let (kinds, wheels): (_, Vec<i64>) = parts.clone().map(kind_of).unzip();
+        let name = |part: &Part| part.name(model).to_owned();
+        let others = active.iter().map(|a| a.contact.other);
+        let axes = active.iter().map(|a| a.contact.frame.rows());
+        let axes = axes.map(|rows| rows.map(Into::into));
         Self {
-            bodies: parts.map(|part| part.name(model).to_owned()).collect(),
-            others: (active.iter())
-                .map(|a| {
-                    a.contact
-                        .other
-                        .map(|other| other.part.name(model).to_owned())
-                })
-                .collect(),
+            bodies: parts.map(name).collect(),
+            others: others.map(|a| a.map(|a| name(&a.part))).collect(),
             kinds,
             wheels: wheels.into(),
             points: rows(active, |a| a.position),
-            frames: frames(
-                active
-                    .iter()
-                    .map(|a| a.contact.frame.rows().map(Into::into)),
-            ),
+            frames: frames(axes),
             gaps: active.iter().map(|a| a.contact.gap()).collect(),
             impulses: rows(active, |a| a.impulse),
             velocities: rows(active, |a| a.velocity),

@@ -11,7 +11,7 @@ use rover_core::system::grains::Packing;
 
 use crate::arguments::{Given, Named, refused};
 use crate::arrays::{Array, fresh, fresh_rows, vector};
-use crate::bed_arguments::{Described, Packed, coordinates, grain_error, packed};
+use crate::bed_arguments::{Described, Packed, coordinates, packed};
 use crate::bed_options::disk_options;
 use crate::beds::{BedSimulation, SharedBed};
 use crate::errors::{Kind, Result, Value};
@@ -175,7 +175,7 @@ impl DiskSimulation {
             Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
             None => v.resize(v.len() + present.len(), 0.0),
         }
-        inner.set_state(&q, &v).map_err(|e| grain_error(&e))
+        Ok(inner.set_state(&q, &v)?)
     }
 
     /// Sets the torques of the rover's wheels.
@@ -187,9 +187,7 @@ impl DiskSimulation {
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
-        self.open()?
-            .set_inputs(&torques)
-            .map_err(|e| grain_error(&e))
+        Ok(self.open()?.set_inputs(&torques)?)
     }
 
     /// Sets an external force at the machine's centre, such as a drawbar load.
@@ -201,9 +199,7 @@ impl DiskSimulation {
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_pull(&self, pull: &Bound<'_, PyAny>) -> Result<()> {
         let pull = pair(pull, Kind::Command, "pull")?;
-        self.open()?
-            .set_pull(pull.into())
-            .map_err(|e| grain_error(&e))
+        Ok(self.open()?.set_pull(pull.into())?)
     }
 
     /// Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s.

@@ -187,11 +187,8 @@ impl PlanarSimulation {
     fn mass_matrix(&self) -> Result<Array> {
         let inner = self.open()?;
         let nv = inner.v().len();
-        Ok(fresh_matrix(&DMatrix::from_row_slice(
-            nv,
-            nv,
-            &inner.mass_matrix(),
-        )))
+        let M = DMatrix::from_row_slice(nv, nv, &inner.mass_matrix());
+        Ok(fresh_matrix(&M))
     }
 
     /// The friction-contact problem of the last step; if the step was split, of its last part.

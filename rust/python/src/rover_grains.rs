@@ -11,7 +11,6 @@ use rover_core::simulation::{
 use crate::arguments::{Given, object};
 use crate::arrays::Array;
 use crate::balls::GrainSimulation;
-use crate::bed_arguments::grain_error;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::report::{Energy, StepReport};
 use crate::shared::{Open, Release, Shared, Watch};
@@ -29,7 +28,7 @@ impl From<TogetherError> for BorderError {
             TogetherError::Overlap { depth, .. } => {
                 Kind::State.error("position", message, Value::Number(depth))
             }
-            TogetherError::Friction(e) => grain_error(&e),
+            TogetherError::Friction(e) => e.into(),
         }
     }
 }

@@ -246,12 +246,8 @@ impl Simulation {
     /// Rotation matrix R_WB, (3, 3), from the trunk's frame to the world frame.
     #[getter]
     fn rotation(&self) -> Result<Array> {
-        let R = self
-            .open()?
-            .state()
-            .configuration
-            .attitude
-            .to_rotation_matrix();
+        let held = self.open()?;
+        let R = held.state().configuration.attitude.to_rotation_matrix();
         let R = DMatrix::from_iterator(3, 3, R.matrix().iter().copied());
         Ok(fresh_matrix(&R))
     }
@@ -497,12 +493,8 @@ impl Simulation {
     /// Gap of each wheel now, (n_wheels,), m, positive when apart.
     #[getter]
     fn wheel_gaps(&self) -> Result<Array> {
-        Ok(self
-            .open()?
-            .wheel_contacts()
-            .iter()
-            .map(|c| c.gap)
-            .collect())
+        let contacts = self.open()?.wheel_contacts();
+        Ok(contacts.iter().map(|c| c.gap).collect())
     }
 
     /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
