@@ -151,11 +151,7 @@ pub fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[
 }
 
 /// N numbers.
-pub fn entries<const N: usize>(
-    value: &Bound<'_, PyAny>,
-    kind: Kind,
-    field: &str,
-) -> Result<[f64; N]> {
+fn entries<const N: usize>(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; N]> {
     let values = vector(value, kind, field)?;
     <[f64; N]>::try_from(values.as_slice()).map_err(|_| {
         let message = format!("{field}: needs {N} entries, has {}", values.len());

@@ -10,7 +10,7 @@ use rover_core::system::grains::{GrainFriction, GrainScene, Grains, SleepOptions
 use crate::arguments::Named;
 use crate::arrays::triple;
 use crate::errors::Result;
-use crate::options::{self, GrainStabilisation, Options, Row};
+use crate::options::{self, GrainStabilisation, OptionRow, Options};
 use crate::planar::pair;
 
 /// Options of a bed in D dimensions as its arguments give them, but for gravity.
@@ -26,7 +26,7 @@ pub struct BedOptions<const D: usize> {
 }
 
 /// Options of all beds, followed by those of a class; see [`options::step_options`].
-macro_rules! grain_options {
+macro_rules! any_bed_options {
     ($then:ident $($own:tt)*) => { $crate::options::$then! {
         /// Coulomb's coefficient between grains.
         friction => friction.grains;
@@ -66,12 +66,12 @@ macro_rules! grain_options {
         $($own)*
     } };
 }
-pub(crate) use grain_options;
+pub(crate) use any_bed_options;
 
 /// Options of beds of disks.
 macro_rules! disk_options {
     ($then:ident) => {
-        $crate::bed_options::grain_options! { $then
+        $crate::bed_options::any_bed_options! { $then
             /// Coulomb's coefficient of wheels.
             wheel_friction => friction.wheels;
         }
@@ -82,7 +82,7 @@ pub(crate) use disk_options;
 /// Options of beds of balls.
 macro_rules! ball_options {
     ($then:ident) => {
-        $crate::bed_options::grain_options! { $then
+        $crate::bed_options::any_bed_options! { $then
             /// As `rolling_friction`, for rotation about the contact normal.
             drilling_friction => friction.rolling.drilling;
             /// Attractive force between bodies in contact, N: the pull that separates them. The
@@ -104,7 +104,7 @@ pub(crate) use ball_options;
 const EARTH: f64 = 9.81;
 
 impl<const D: usize> Options for BedOptions<D> {
-    const TABLE: &'static [Row<Self>] = if D == 2 {
+    const TABLE: &'static [OptionRow<Self>] = if D == 2 {
         disk_options!(rows)
     } else {
         ball_options!(rows)

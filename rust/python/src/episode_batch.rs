@@ -354,8 +354,8 @@ impl EpisodeBatch {
     /// Raises:
     ///     OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
     fn begin(&self, indices: &Bound<'_, PyAny>, episodes: &Bound<'_, PyAny>) -> Result<()> {
-        let drawn = object(episodes, Kind::Option, "episodes", "DrawnEpisodes")?;
-        let drawn: &DrawnEpisodes = drawn.get();
+        let what = "DrawnEpisodes";
+        let drawn = object::<DrawnEpisodes>(episodes, Kind::Option, "episodes", what)?.get();
         let mut held = self.0.open()?;
         let places = held.indices(indices, Some(drawn.drawn.len()))?;
         for (&index, one) in places.iter().zip(&drawn.drawn) {
@@ -395,8 +395,8 @@ impl EpisodeBatch {
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<()> {
         let one = simulation.0.get();
-        let episode = object(episode, Kind::Option, "episode", "an EpisodeRun")?;
-        let episode = EpisodeRun::copy(episode.get());
+        let episode = object::<EpisodeRun>(episode, Kind::Option, "episode", "an EpisodeRun")?;
+        let episode = episode.get().copy();
         let origin = self::origin(origin, one.ground().clone())?;
         let given = Named::keywords(indices.py(), options)?;
         let random = given.need("generator", |value, kind, field| {

@@ -114,8 +114,8 @@ macro_rules! step_options {
             /// Largest number of iterations of the contact solver in a step.
             max_iterations => solver.max_sweeps;
             /// Largest amount of work of the contact solver in a step, in the unit of
-            /// `solve_friction_contact` (operations, not time). By default it grows with the number of
-            /// contacts.
+            /// `solve_friction_contact` (operations, not time). By default it grows with the
+            /// number of contacts.
             budget | None => solver.budget;
             /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
             /// leaves them.
@@ -141,7 +141,7 @@ pub(crate) use documented;
 /// The rows of a table.
 macro_rules! rows {
     ($($(#[doc = $doc:literal])+ $name:ident $(| $mark:ident)* => $($place:ident).+;)+) => {
-        &[$($crate::options::Row {
+        &[$($crate::options::OptionRow {
             name: stringify!($name),
             marks: &[$(stringify!($mark)),*],
             place: |options| &mut options.$($place).+,
@@ -151,13 +151,13 @@ macro_rules! rows {
 pub(crate) use rows;
 
 /// One option among options `T`.
-pub struct Row<T> {
+pub struct OptionRow<T> {
     pub name: &'static str,
     pub marks: &'static [&'static str],
     pub place: fn(&mut T) -> &mut dyn Argument,
 }
 
-impl<T> Row<T> {
+impl<T> OptionRow<T> {
     fn has(&self, mark: &str) -> bool {
         self.marks.contains(&mark)
     }
@@ -166,14 +166,14 @@ impl<T> Row<T> {
 /// Options of a class of simulations.
 pub trait Options: Sized + 'static {
     /// All of them.
-    const TABLE: &'static [Row<Self>];
+    const TABLE: &'static [OptionRow<Self>];
 
     /// Those that hold where none are given.
     fn usual() -> Self;
 }
 
 impl Options for StepOptions {
-    const TABLE: &'static [Row<Self>] = step_options!(rows);
+    const TABLE: &'static [OptionRow<Self>] = step_options!(rows);
 
     fn usual() -> Self {
         let mut step = Self::default();

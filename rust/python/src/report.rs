@@ -6,7 +6,7 @@ use rover_core::multibody::Energy as CoreEnergy;
 
 /// The report of a call of `step`: the fields of the core's, as properties.
 macro_rules! step_report {
-    ($($(#[doc = $doc:literal])+ $field:ident: $type:ty;)+) => {
+    ($($(#$doc:tt)+ $field:ident: $type:ty;)+) => {
         /// Summary of the time steps of one call: sums or worst values over the steps.
         #[pyclass(module = "rover_gym.core", frozen)]
         pub struct StepReport {
@@ -17,7 +17,7 @@ macro_rules! step_report {
         #[pymethods]
         impl StepReport {
             $(
-                $(#[doc = $doc])+
+                $(#$doc)+
                 #[getter]
                 fn $field(&self) -> $type {
                     self.inner.$field
@@ -44,13 +44,13 @@ macro_rules! step_report {
 
             /// Number of contacts whose impulses the motion of the last step does not determine.
             ///
-            /// 0 means that the motion determines the impulses of all contacts. Otherwise other impulses
-            /// cause the same motion, and the step returns those of least norm within the cones of
-            /// friction: four corners of a box share its weight like four equal springs. Friction counts:
-            /// six rigid wheels that drive straight could push sideways against each other, so the number
-            /// is 6. Contacts that yield, such as wheels with a `stiffness`, have determined impulses.
-            /// Always 0 for grains. In a group of more than 32 rigid contacts the solver chooses among the
-            /// impulses.
+            /// 0 means that the motion determines the impulses of all contacts. Otherwise other
+            /// impulses cause the same motion, and the step returns those of least norm within the
+            /// cones of friction: four corners of a box share its weight like four equal springs.
+            /// Friction counts: six rigid wheels that drive straight could push sideways against
+            /// each other, so the number is 6. Contacts that yield, such as wheels with a
+            /// `stiffness`, have determined impulses. Always 0 for grains. In a group of more than
+            /// 32 rigid contacts the solver chooses among the impulses.
             #[getter]
             fn undetermined_loads(&self) -> usize {
                 self.undetermined_loads
@@ -69,7 +69,8 @@ macro_rules! step_report {
             fn __repr__(&self) -> String {
                 let (status, inner) = (self.status(), &self.inner);
                 format!(
-                    "StepReport(status={status:?}, steps={}, iterations={}, residual={:.3e}, n_contacts={})",
+                    "StepReport(status={status:?}, steps={}, iterations={}, residual={:.3e}, \
+                     n_contacts={})",
                     inner.steps, inner.iterations, inner.residual, inner.n_contacts
                 )
             }
