@@ -83,11 +83,12 @@ pub(crate) use disk_options;
 macro_rules! ball_options {
     ($then:ident) => {
         $crate::bed_options::any_bed_options! { $then
-            /// As `rolling_friction`, for rotation about the contact normal.
+            /// Coefficient of friction against rotation about the contact normal, as
+            /// `rolling_friction`.
             drilling_friction => friction.rolling.drilling;
-            /// Attractive force between bodies in contact, N: the pull that separates them. The
-            /// contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
-            /// impulse is at most friction (p_N + h cohesion).
+            /// Attractive force between bodies in contact, N: the pull that separates them.
+            /// The contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the
+            /// tangential impulse is at most friction (p_N + h cohesion).
             cohesion => cohesion;
             /// Gap up to which the attraction acts, m; 1% of the smallest radius by default, at
             /// most 20%.
@@ -128,8 +129,8 @@ impl<const D: usize> BedOptions<D> {
     ///
     /// Velocities of balls are right to 25 times the tolerance, in units of the speed that the
     /// smallest one gains over its radius, √(g r): the same bed at another scale or under another
-    /// gravity is solved alike. Those of disks are right to ten times the tolerance in m/s under the
-    /// gravity of the Earth.
+    /// gravity is solved alike. Velocities of disks are right to ten times the tolerance in m/s
+    /// under the gravity of the Earth.
     pub fn read(given: &Named<'_>, grains: &Grains<D>, is_hollow: bool) -> Result<Self> {
         let mut own = Self::usual();
         let (time_step, solver) = (own.step.time_step, own.step.solver);

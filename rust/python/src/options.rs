@@ -1,6 +1,7 @@
 //! Options of simulations, declared once: `step_options!` lists those of machines, and
-//! `disk_options!` and `ball_options!` of [`crate::bed_options`] those of grains. Arguments are read
-//! and told again, and docstrings, signatures and the types of the stub made, from these lists.
+//! `disk_options!` and `ball_options!` of [`crate::bed_options`] those of grains. Arguments are
+//! read and told again, and docstrings, signatures and the types of the stub made, from these
+//! lists.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -168,7 +169,7 @@ pub trait Options: Sized + 'static {
     /// All of them.
     const TABLE: &'static [OptionRow<Self>];
 
-    /// Those that hold where none are given.
+    /// The options that hold where none are given.
     fn usual() -> Self;
 }
 
