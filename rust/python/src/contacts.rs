@@ -105,7 +105,7 @@ impl Contacts {
             wheels: wheels.into(),
             points: rows(active, |a| a.position),
             frames: frames(axes),
-            gaps: active.iter().map(|a| a.contact.gap()).collect(),
+            gaps: active.iter().map(|a| a.contact.gap).collect(),
             impulses: rows(active, |a| a.impulse),
             velocities: rows(active, |a| a.velocity),
         }
@@ -152,7 +152,7 @@ impl PlanarContacts {
             discs,
             points: rows(active, |a| a.position),
             normals: rows(active, |a| a.contact.normal()),
-            gaps: active.iter().map(|a| a.contact.gap()).collect(),
+            gaps: active.iter().map(|a| a.contact.gap).collect(),
             impulses: rows(active, |a| a.impulse),
             velocities: rows(active, |a| a.velocity),
         }
