@@ -32,17 +32,25 @@ class Writer(ast.NodeTransformer):
 
     def __init__(self, module: ModuleType) -> None:
         self.module = module
-        #: Types of options, and of private names that stand for words of the module.
+        #: Types of private names that stand for words of the module.
         self.known = {name: expression(text) for name, text in module._types.items()}
+        #: Types of arguments by name, and those of them that a function has.
+        self.usual: dict[str, str] = {}
+        self.met: set[str] = set()
         self.owner: type | None = None
         self.documented: set[str] = set()
 
     def stub(self, types: str) -> str:
         """The stub, whose lines ruff sets."""
         tree = ast.parse(types)
+        table = next(one for one in tree.body if isinstance(one, ast.Assign))
+        tree.body.remove(table)
+        self.usual = {one: text for text, names in ast.literal_eval(table.value).items() for one in names.split()}
         self.compare("the module", set(self.module.__all__), tree)
         tree.body[0] = docstring(self.module.__doc__ or "", "")
         made = ast.unparse(ast.fix_missing_locations(self.visit(tree)))
+        if idle := sorted(self.usual.keys() - self.met):
+            raise ValueError(f"no function has {', '.join(idle)}")
         return re.sub(r"\n\n(?=    (?:@|def ))", "\n", made)
 
     def compare(self, where: str, expected: set[str], node: ast.Module | ast.ClassDef) -> None:
@@ -64,8 +72,10 @@ class Writer(ast.NodeTransformer):
         self.owner = owner = getattr(self.module, node.name)
         node.body = [one for one in node.body if not isinstance(one, ast.Expr)]
         if not issubclass(owner, Exception):
+            if owner.__text_signature__ and "__new__" not in map(name, node.body):
+                node.body[:0] = ast.parse("def __new__(): ...").body
             public = {one for one in vars(owner) if not one.startswith("_")}
-            self.compare(node.name, public | ({"__new__"} if owner.__text_signature__ else set()), node)
+            self.compare(node.name, public, node)
             if not owner.__flags__ & CAN_BE_SUBCLASSED:
                 node.decorator_list = [ast.Name("final")]
             elif owner.__basicsize__ > object.__basicsize__:
@@ -126,9 +136,13 @@ class Writer(ast.NodeTransformer):
         return node
 
     def usual_type(self, full: str, one: inspect.Parameter) -> ast.expr:
-        """Type of an argument for which none is given: that of an option, or of its default."""
-        if "__signature__" in vars(self.owner or object) and one.name in self.known:
-            return self.known[one.name]
+        """Type of an argument for which the function gives none: that of an option, of its name, or of its default."""
+        options = self.module._options.get(getattr(self.owner, "__name__", None), {})
+        if one.name in options:
+            return expression(options[one.name])
+        if one.name in self.usual:
+            self.met.add(one.name)
+            return self.visit(expression(self.usual[one.name] + (" | None" if one.default is None else "")))
         if type(one.default) in (bool, int, float, str):
             return ast.Name(type(one.default).__name__)
         raise ValueError(f"{full}: {TYPES.name} has no type for the argument {one.name}")

@@ -200,8 +200,8 @@ def drive_all(
     while active.any() or waiting:
         actions, state = policy.predict(observation, state, sums.steps == 0)
         period += 1
-        observation, _, terminated, _, _ = batch.step(actions, active, has_scan=period % hold == 0)
-        sums.add(_places(batch, observation), batch.infos(), active)
+        observation, _, terminated, _, infos = batch.step(actions, active, has_scan=period % hold == 0, info="all")
+        sums.add(_places(batch, observation), infos, active)
         for i in np.flatnonzero(active & (terminated | (sums.steps >= limit))).tolist():
             done[running[i]] = sums.episode(i, running[i], batch.info(i))
             progress(len(done))

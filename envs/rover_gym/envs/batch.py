@@ -8,7 +8,8 @@ its observation, reward and termination.
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Unpack
+from functools import partial
+from typing import Any, ClassVar, Literal, NamedTuple, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -86,8 +87,11 @@ class Restored:
     grains: GrainSimulation | None = None
 
 
-#: What a step returns: observations, rewards, which episodes ended or reached the time limit, and which are over.
-Stepped = tuple[Observations, Array, Mask, Mask, list[int]]
+#: What a step returns: observations, rewards, which episodes ended, which reached the time limit, and infos.
+Stepped = tuple[Observations, Array, Mask, Mask, dict[str, Any]]
+
+#: Whose infos a step returns: one rover's by its index, all rovers' as arrays, or nobody's.
+Asked = int | Literal["all"] | None
 
 #: Last observations and infos of episodes that have ended, by rover.
 Finals = dict[int, tuple[Observations, dict[str, Any]]]
@@ -165,6 +169,8 @@ class RoverBatch:
         self._seeds: list[int | None] = [None] * self.n
         self._difficulties: list[Range | None] = [None] * self.n
         self._begun = np.zeros(self.n, np.bool_)
+        #: The rovers whose episode is over; None where the core must be asked.
+        self._over: list[int] | None = None
         self._started = False
         self._watchers: list[Callable[[Mask], None]] = []
 
@@ -275,6 +281,7 @@ class RoverBatch:
     def begin(self, drawn: "Drawn") -> None:
         """Starts drawn episodes."""
         chosen, episodes = drawn.chosen, drawn.episodes
+        self._over = None
         self.begin_drawn(chosen, episodes)
         self._begun[chosen] = True
         self._clipped[chosen] = 0
@@ -287,8 +294,8 @@ class RoverBatch:
         self._hand_back(self._handed_out.keys() & set(chosen))
 
     def step(
-        self, actions: object, active: Mask | None = None, *, has_scan: bool = True
-    ) -> tuple[Observations, Array, Mask, Mask, list[int]]:
+        self, actions: object, active: Mask | None = None, *, has_scan: bool = True, info: Asked = None
+    ) -> Stepped:
         """Applies actions `(n, n_actions)` for one control period.
 
         Args:
@@ -296,10 +303,11 @@ class RoverBatch:
             active: `(n,)` mask of the rovers to move; the others keep the values of their last period. None for all.
             has_scan: Whether the height scan is taken. Without, only observations of episodes that end here have new
                 heights; the others keep the last ones.
+            info: Whose infos to return.
 
         Returns:
             Observations `(n, size) float32`, rewards `(n,)`, a mask of terminated episodes, a mask of episodes that
-            have reached the time limit, and the indices of those that are over, one way or the other.
+            have reached the time limit, and infos, which are empty if none are asked for.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite; nothing has changed.
@@ -307,25 +315,34 @@ class RoverBatch:
             ResetNeeded: A rover has not been reset.
         """
         self._check_begun(actions)
-        before = self.episodes.observations() if self._terms else None
+        asked: Asked = info
+        before: Observations | None = None
+        if self._terms:  # their functions take infos and the last observations
+            asked, before = 0 if self.alone else "all", self.episodes.observations()
+        take = partial(self.episodes.step, active=active, has_scan=has_scan, among=self.movers, info=asked)
+        self._over = None
         with self._following_handed_out(self._handed_out if self.task.is_noisy else ()):
             # The core refuses what is outside [-1, 1] before anything moves: actions within pay for no check here.
             beyond: npt.NDArray[np.int64] | None = None
             try:
-                stepped = self.episodes.step(actions, active, has_scan=has_scan, among=self.movers)
+                stepped = take(actions)
             except CommandError:
                 given = check_actions(actions, (self.n, self.task.n_actions))
                 beyond, actions = (np.abs(given) > 1.0).sum(axis=1), np.clip(given, -1.0, 1.0)
                 if not beyond.any():
                     raise
-                stepped = self.episodes.step(actions, active, has_scan=has_scan, among=self.movers)
+                stepped = take(actions)
+        observation, rewards, terminated, truncated, infos = stepped
+        self._over = np.flatnonzero(terminated | truncated).tolist()
         moved = np.ones(self.n, np.bool_) if active is None else np.asarray(active)
         self._clipped[moved] = 0 if beyond is None else beyond[moved]
         if before is not None:
-            self._earn(before, actions, stepped, moved)
+            fields = before, np.asarray(actions, np.float64), observation
+            rewards += self._earn(fields, self._completed(infos, asked), moved)
         for watcher in self._watchers:
             watcher(moved)
-        return stepped
+        infos = self._completed(infos, asked) if info == asked else self._infos(info)
+        return observation, rewards, terminated, truncated, infos
 
     @contextmanager
     def watched(self, watcher: Callable[[Mask], None]) -> Iterator[None]:
@@ -340,7 +357,9 @@ class RoverBatch:
         finally:
             self._watchers.remove(watcher)
 
-    def step_on(self, actions: object, *, same_step: bool, has_scan: bool = True) -> tuple[Stepped, Finals]:
+    def step_on(
+        self, actions: object, *, same_step: bool, has_scan: bool = True, info: Asked = None
+    ) -> tuple[Stepped, Finals]:
         """Applies actions for one control period; rovers whose episode is over start the next.
 
         Args:
@@ -348,11 +367,13 @@ class RoverBatch:
             same_step: Whether an episode is followed by the next in the step that ends it. If not, the next one begins
                 in the following step, in which its rover does not move and earns nothing.
             has_scan: As of `step`.
+            info: As of `step`.
 
         Returns:
             What `step` returns, and with `same_step` the last observations and infos of the episodes that have ended.
-            Where an episode has begun, the observation is its first; with `same_step` all else is that of the episode
-            that has ended. If an episode that is to follow in the same step cannot begin, the next call refuses it.
+            Where an episode has begun, observation and info are its first; with `same_step` all else is that of the
+            episode that has ended. If an episode that is to follow in the same step cannot begin, the next call refuses
+            it.
 
         Raises:
             CommandError: As of `step`.
@@ -365,63 +386,83 @@ class RoverBatch:
             check_actions(actions, (self.n, self.task.n_actions))
             drawn = self.draw(starting)
             active = np.isin(np.arange(self.n), starting, invert=True)
-        stepped = self.step(actions, active, has_scan=has_scan)
-        observation, rewards, terminated, truncated, over = stepped
+        observation, rewards, terminated, truncated, infos = self.step(actions, active, has_scan=has_scan, info=info)
+        begun: list[int] = []
         if drawn is not None:
             self.begin(drawn)
-            observation[starting] = self.observation[starting]
+            begun += starting
             for values in (rewards, terminated, truncated):
                 values[starting] = 0
-            over = [i for i in over if i not in drawn.chosen]
         finals: Finals = {}
-        if same_step and over:
+        if same_step and (over := np.flatnonzero(terminated | truncated).tolist()):
             finals = {i: (observation[i].copy(), self.info(i)) for i in over}
             try:
                 self.begin(self.draw(over))
             except RoverGymError:
                 pass  # the next call refuses it
             else:
-                observation[over] = self.observation[over]
-        return (observation, rewards, terminated, truncated, over), finals
+                begun += over
+        if begun:
+            observation[begun] = self.observation[begun]
+            infos = self._infos(info)
+        return (observation, rewards, terminated, truncated, infos), finals
 
     @property
     def movers(self) -> Sequence[RoverGrainSimulation | None] | None:
         """What moves together with each rover; None where they are alone."""
         return None
 
-    def _earn(self, before: Observations, actions: Any, stepped: Stepped, moved: Mask) -> None:
-        """Calls the functions of `reward_terms` and adds what they give to the rewards of the rovers that moved."""
-        after, rewards = stepped[:2]
-        given = np.asarray(actions, np.float64)
-        terms, layout, infos = self.task.reward_terms, self.task.layout, self.infos()
-        counts = moved & (infos["termination"] != STEP_FAILED)
+    def _earn(self, fields: tuple[Observations, Array, Observations], infos: Mapping[str, Any], moved: Mask) -> Array:
+        """Calls the functions of `reward_terms` and returns what they give to each of the rovers that moved, `(n,)`.
+
+        Args:
+            fields: Observations before the period, actions, and observations after it.
+            infos: The infos of all rovers, or that of the one rover that is alone.
+            moved: `(n,)` mask of the rovers that moved.
+        """
+        terms, layout = self.task.reward_terms, self.task.layout
+        counts = moved & (np.asarray(infos["termination"]) != STEP_FAILED)
         if self.alone:
-            one = earn(terms, layout, before[0], given[0], after[0], self.info(0), counts[0])
+            before, actions, after = (field[0] for field in fields)
+            one = earn(terms, layout, before, actions, after, infos, counts[0])
             own = {name: term[None] for name, term in one.items()}
         else:
-            own = earn(terms, layout, before, given, after, infos, counts)
-        rewards += np.where(moved, total(own.values()), 0.0)
+            own = earn(terms, layout, *fields, infos, counts)
         for name, term in own.items():
             self._terms[name] = np.where(moved, term, self._terms[name])
+        return np.where(moved, total(own.values()), 0.0)
 
     @property
     def over(self) -> list[int]:
         """The rovers whose episode is over and whose next has not begun, in order."""
-        return self.episodes.over
+        if self._over is None:
+            self._over = self.episodes.over
+        return self._over
 
     def info(self, i: int) -> dict[str, Any]:
         """The info of rover i's last period or reset, as `RoverEnv` returns it."""
-        info = self.episodes.info(i)
-        info["reward_terms"] |= {name: float(term[i]) for name, term in self._terms.items()}
-        info["clipped_actions"] = int(self._clipped[i])
-        return info
+        return self._completed(self.episodes.info(i), i)
 
     def infos(self) -> dict[str, Any]:
         """The infos of all n rovers, as one array per key with Gymnasium's masks."""
-        infos = self.episodes.infos()
-        for name, term in self._terms.items():
-            infos["reward_terms"] |= {name: term.copy(), f"_{name}": np.ones(self.n, np.bool_)}
-        infos |= {"clipped_actions": self._clipped.copy(), "_clipped_actions": np.ones(self.n, np.bool_)}
+        return self._completed(self.episodes.infos(), "all")
+
+    def _infos(self, asked: Asked) -> dict[str, Any]:
+        """The infos that are asked for."""
+        if asked is None:
+            return {}
+        return self.infos() if asked == "all" else self.info(asked)
+
+    def _completed(self, infos: dict[str, Any], asked: Asked) -> dict[str, Any]:
+        """Adds to infos of the core what it does not know."""
+        if asked == "all":
+            everyone = np.ones(self.n, np.bool_)
+            for name, term in self._terms.items():
+                infos["reward_terms"] |= {name: term.copy(), f"_{name}": everyone}
+            infos |= {"clipped_actions": self._clipped.copy(), "_clipped_actions": everyone}
+        elif asked is not None:
+            infos["reward_terms"] |= {name: float(term[asked]) for name, term in self._terms.items()}
+            infos["clipped_actions"] = int(self._clipped[asked])
         return infos
 
     def snapshot(self) -> BatchSnapshot:
@@ -495,6 +536,7 @@ class RoverBatch:
     def adopt(self, i: int, checked: Restored) -> None:
         """Goes on from a checked snapshot."""
         snapshot = checked.snapshot
+        self._over = None
         self.episodes.resume(
             [i],
             checked.simulation,

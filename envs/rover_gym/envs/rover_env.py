@@ -461,16 +461,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         given: object = action
         try:
             if batch.n == 1 and isinstance(given, np.ndarray):
-                stepped = batch.step(given[None], has_scan=self.has_scan)
+                stepped = batch.step(given[None], has_scan=self.has_scan, info=i)
             else:
                 actions = np.zeros((batch.n, batch.task.n_actions))
                 actions[i] = check_actions(given, actions[i].shape)
-                stepped = batch.step(actions, np.arange(batch.n) == i, has_scan=self.has_scan)
+                stepped = batch.step(actions, np.arange(batch.n) == i, has_scan=self.has_scan, info=i)
         except CommandError:
             check_actions(given, (batch.task.n_actions,))  # names the entry without the rover
             raise
-        observation, reward, terminated, _, _ = stepped
-        info = batch.info(i)
+        observation, reward, terminated, _, info = stepped
         if self.on_period is not None:
             self.on_period(self, info)
         return observation[i].copy(), float(reward[i]), bool(terminated[i]), False, info

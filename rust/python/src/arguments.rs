@@ -4,6 +4,7 @@
 //! A number is a float, an integer, or what numpy or Python hold to be real; a truth value, a
 //! complex number, a time and a text are none, though `float()` or numpy would take some of them.
 
+use pyo3::PyTypeCheck;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyMapping, PyString};
@@ -38,41 +39,11 @@ impl<'py> Given<'py> {
         self.0
     }
 
-    /// A number.
-    pub fn number(self, default: f64, kind: Kind, field: &str) -> Result<f64> {
-        self.0
-            .map_or(Ok(default), |given| number(&given, kind, field))
-    }
-
     /// A number, or nothing where `None` was given.
     pub fn maybe(self, kind: Kind, field: &str) -> Result<Option<f64>> {
         self.some()
             .map(|given| number(&given, kind, field))
             .transpose()
-    }
-
-    /// A whole number that is not negative.
-    pub fn whole(self, default: u64, kind: Kind, field: &str) -> Result<u64> {
-        self.0
-            .map_or(Ok(default), |given| whole(&given, kind, field))
-    }
-
-    /// A count.
-    pub fn count(self, default: usize, kind: Kind, field: &str) -> Result<usize> {
-        self.0
-            .map_or(Ok(default), |given| count(&given, kind, field))
-    }
-
-    /// A truth value.
-    pub fn flag(self, default: bool, kind: Kind, field: &str) -> Result<bool> {
-        self.0
-            .map_or(Ok(default), |given| flag(&given, kind, field))
-    }
-
-    /// A text.
-    pub fn text(self, default: &str, kind: Kind, field: &str) -> Result<String> {
-        self.0
-            .map_or_else(|| Ok(default.to_owned()), |given| text(&given, kind, field))
     }
 
     /// An object of a class, or nothing where `None` was given. `what`: its name with an article.
@@ -86,6 +57,31 @@ impl<'py> Given<'py> {
         };
         self.some().map(read).transpose()
     }
+}
+
+/// An object of a class. `what`: its name with an article.
+pub fn object<'a, 'py, T: PyTypeCheck>(
+    given: &'a Bound<'py, PyAny>,
+    kind: Kind,
+    field: &str,
+    what: &str,
+) -> Result<&'a Bound<'py, T>> {
+    given.cast().map_err(|_| refused(given, kind, field, what))
+}
+
+/// The entries of an iterable, as a function reads them. `what`: all of them.
+pub fn each<'py, T>(
+    value: &Bound<'py, PyAny>,
+    kind: Kind,
+    (field, what): (&str, &str),
+    read: impl Fn(&Bound<'py, PyAny>, Kind, &str) -> Result<T>,
+) -> Result<Vec<T>> {
+    let entries = value.try_iter();
+    let entries = entries.map_err(|_| refused(value, kind, field, what))?;
+    let numbered = entries.enumerate();
+    numbered
+        .map(|(i, entry)| read(&entry?, kind, &format!("{field}[{i}]")))
+        .collect()
 }
 
 /// Whether an argument is a text or an `os.PathLike`.
@@ -114,14 +110,11 @@ impl<'py> Named<'py> {
 
     /// A mapping that is the argument `outer`.
     pub fn mapping(given: &Bound<'py, PyAny>, outer: &'static str, kind: Kind) -> Result<Self> {
-        match given.cast::<PyMapping>() {
-            Ok(mapping) => Ok(Self {
-                given: mapping.clone(),
-                outer: Some(outer),
-                kind,
-            }),
-            Err(_) => Err(refused(given, kind, outer, "a mapping")),
-        }
+        Ok(Self {
+            given: object(given, kind, outer, "a mapping")?.clone(),
+            outer: Some(outer),
+            kind,
+        })
     }
 
     /// The values by name, with errors of another kind.
@@ -201,36 +194,35 @@ impl<'py> Named<'py> {
         read(&value, self.kind, &self.path(name))
     }
 
-    /// A number.
-    pub fn number(&self, name: &str, default: f64) -> Result<f64> {
-        self.get(name)?.number(default, self.kind, &self.path(name))
-    }
-
     /// A number, or nothing where it is missing or `None`.
     pub fn maybe(&self, name: &str) -> Result<Option<f64>> {
         self.get(name)?.maybe(self.kind, &self.path(name))
     }
-
-    /// A whole number that is not negative.
-    pub fn whole(&self, name: &str, default: u64) -> Result<u64> {
-        self.get(name)?.whole(default, self.kind, &self.path(name))
-    }
-
-    /// A count.
-    pub fn count(&self, name: &str, default: usize) -> Result<usize> {
-        self.get(name)?.count(default, self.kind, &self.path(name))
-    }
-
-    /// A truth value.
-    pub fn flag(&self, name: &str, default: bool) -> Result<bool> {
-        self.get(name)?.flag(default, self.kind, &self.path(name))
-    }
-
-    /// A text.
-    pub fn text(&self, name: &str, default: &str) -> Result<String> {
-        self.get(name)?.text(default, self.kind, &self.path(name))
-    }
 }
+
+/// Methods that read an argument as the function of their name, with a default.
+macro_rules! readers {
+    ($($read:ident: $type:ty),+) => {
+        impl Given<'_> {
+            $(
+                /// The value, or the default where it is missing.
+                pub fn $read(self, default: $type, kind: Kind, field: &str) -> Result<$type> {
+                    self.0.map_or(Ok(default), |given| $read(&given, kind, field))
+                }
+            )+
+        }
+
+        impl Named<'_> {
+            $(
+                /// The value, or the default where it is missing.
+                pub fn $read(&self, name: &str, default: $type) -> Result<$type> {
+                    self.get(name)?.$read(default, self.kind, &self.path(name))
+                }
+            )+
+        }
+    };
+}
+readers!(number: f64, whole: u64, count: usize, flag: bool);
 
 /// How a value looks in a message.
 pub fn shown(value: &Bound<'_, PyAny>) -> String {
@@ -351,6 +343,13 @@ pub fn at_least_one(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result
     }
 }
 
+/// A number of threads, if one is given.
+pub fn threads(given: Option<&Bound<'_, PyAny>>) -> Result<Option<usize>> {
+    given
+        .map(|given| at_least_one(given, Kind::Option, "threads"))
+        .transpose()
+}
+
 /// A truth value.
 pub fn flag(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<bool> {
     let is_flag = value.is_instance_of::<PyBool>() || scalar_kind(value) == Some('b');
@@ -366,13 +365,7 @@ pub fn text(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<String>
 
 /// Truth values (n,).
 pub fn flags(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<bool>> {
-    let entries = value
-        .try_iter()
-        .map_err(|_| refused(value, kind, field, "booleans"))?;
-    entries
-        .enumerate()
-        .map(|(i, entry)| flag(&entry?, kind, &format!("{field}[{i}]")))
-        .collect()
+    each(value, kind, (field, "booleans"), flag)
 }
 
 /// Texts, or one.
@@ -380,11 +373,5 @@ pub fn texts(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vec<St
     if let Ok(one) = value.extract::<String>() {
         return Ok(vec![one]);
     }
-    let entries = value
-        .try_iter()
-        .map_err(|_| refused(value, kind, field, "a name or names"))?;
-    entries
-        .enumerate()
-        .map(|(i, entry)| text(&entry?, kind, &format!("{field}[{i}]")))
-        .collect()
+    each(value, kind, (field, "a name or names"), text)
 }

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 use crate::arguments::{number, refused, shown};
-use crate::errors::{BorderError, Kind, Result, Value};
+use crate::errors::{Kind, Result, Value};
 
 /// Largest number of entries of a list, a nested list or a range. Each entry becomes a Python
 /// object before NumPy makes an array of them.
@@ -109,7 +109,7 @@ pub fn at_most(value: &Bound<'_, PyAny>, n: usize, kind: Kind, field: &str) -> R
     }
 }
 
-/// Finite numbers of a shape that `fits`, row-major, with the shape; `what`: its name.
+/// Numbers of a shape that `fits`, row-major, with the shape; `what`: its name.
 pub fn shaped(
     value: &Bound<'_, PyAny>,
     kind: Kind,
@@ -122,12 +122,22 @@ pub fn shaped(
         let message = format!("{field}: needs shape {what}, has {:?}", view.shape());
         return Err(kind.error(field, message, Value::Count(view.ndim())));
     }
-    let values: Vec<f64> = view.iter().copied().collect();
+    Ok((view.iter().copied().collect(), view.shape().to_vec()))
+}
+
+/// Finite numbers of a shape that `fits`, as [`shaped`].
+pub fn finite_shaped(
+    value: &Bound<'_, PyAny>,
+    kind: Kind,
+    (field, what): (&str, &str),
+    fits: impl Fn(&[usize]) -> bool,
+) -> Result<(Vec<f64>, Vec<usize>)> {
+    let (values, shape) = shaped(value, kind, (field, what), fits)?;
     if let Some(x) = values.iter().find(|x| !x.is_finite()) {
         let message = format!("{field}: must be finite, has {x}");
         return Err(kind.error(field, message, Value::Number(*x)));
     }
-    Ok((values, view.shape().to_vec()))
+    Ok((values, shape))
 }
 
 /// One number for both, or two.
@@ -140,20 +150,23 @@ pub fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[
     <[f64; 2]>::try_from(values).map_err(|_| wrong())
 }
 
+/// N numbers.
+fn entries<const N: usize>(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; N]> {
+    let values = vector(value, kind, field)?;
+    <[f64; N]>::try_from(values.as_slice()).map_err(|_| {
+        let message = format!("{field}: needs {N} entries, has {}", values.len());
+        kind.error(field, message, Value::Count(values.len()))
+    })
+}
+
 /// Two numbers.
 pub fn two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 2]> {
-    let values = vector(value, kind, field)?;
-    let wrong = || refused(value, kind, field, "two numbers");
-    <[f64; 2]>::try_from(values).map_err(|_| wrong())
+    entries(value, kind, field)
 }
 
 /// Three numbers.
 pub fn triple(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 3]> {
-    let values = vector(value, kind, field)?;
-    <[f64; 3]>::try_from(values.as_slice()).map_err(|_| {
-        let message = format!("{field}: needs 3 entries, has {}", values.len());
-        kind.error(field, message, Value::Count(values.len()))
-    })
+    entries(value, kind, field)
 }
 
 /// Numbers on their way to Python, where they become a new array.
@@ -240,22 +253,9 @@ pub fn fresh_matrix(m: &rover_core::nalgebra::DMatrix<f64>) -> Array {
 
 /// (n, N) numbers of a terrain.
 pub fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> Result<Vec<[f64; N]>> {
-    let given = array(value, Kind::Terrain, field)?;
-    let view = given.as_array();
-    let is_empty = view.is_empty();
-    if !is_empty && (view.ndim() != 2 || view.shape()[1] != N) {
-        let message = format!("{field}: needs shape (n, {N}), has {:?}", view.shape());
-        let (name, value) = (Some(field.to_owned()), Value::Count(view.ndim()));
-        return Err(BorderError {
-            kind: Kind::Terrain,
-            message,
-            field: name,
-            value,
-        });
-    }
-    let flat: Vec<f64> = view.iter().copied().collect();
-    Ok(flat
-        .chunks_exact(N)
-        .map(|row| std::array::from_fn(|k| row[k]))
-        .collect())
+    let what = format!("(n, {N})");
+    let (flat, _) = shaped(value, Kind::Terrain, (field, &what), |shape| {
+        shape.contains(&0) || matches!(*shape, [_, n] if n == N)
+    })?;
+    Ok(flat.as_chunks::<N>().0.to_vec())
 }

@@ -8,12 +8,13 @@ use rover_core::geometry::{Support, TerrainSupport};
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::GrainSimulation as CoreSimulation;
 use rover_core::spatial::space::body_velocities;
-use rover_core::system::grains::{COORDINATES, Cohesion, Grains, Packing, Wall, arranged};
+use rover_core::system::grains::{COORDINATES, Packing, Wall, arranged};
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Named, count, number, refused};
+use crate::arguments::{Named, count, each, number, refused};
 use crate::arrays::{Array, vector};
-use crate::bed_arguments::{self, Described, Packed, grain_error, packed, rows};
+use crate::bed_arguments::{self, Described, Packed, packed, rows};
+use crate::bed_options::ball_options;
 use crate::beds::{BedSimulation, SharedBed, columns};
 use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
@@ -45,39 +46,8 @@ const VELOCITIES: usize = body_velocities(3);
 ///     terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
 ///         them, below the balls; none by default. Balls fall where the ground is unknown. A vessel
 ///         and a terrain cannot be combined.
-///     friction: Coulomb's coefficient between balls.
-///     wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
-///     rolling_friction: Coefficient of rolling friction of balls: the largest resisting moment
-///         divided by the normal force and the rolling radius r. Between two balls 1/r = 1/r_1 +
-///         1/r_2; on a wall, vessel or terrain r is the ball's radius. A ball stays at rest on a
-///         slope whose tangent is at most this coefficient.
-///     drilling_friction: The same for rotation about the contact normal. Neither acts on a rover,
-///         nor if Coulomb's coefficient is 0.
-///     cohesion: Attractive force between bodies in contact, N: the pull that separates them. The
-///         contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
-///         impulse is at most friction (p_N + h cohesion).
-///     cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
-///         default, at most 20%.
-///     restitution: Newton's coefficient of all contacts, in [0, 1].
 ///     gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
-///     time_step: Time step, s.
-///     tolerance: Largest relative residual of the contact problem. Errors of velocities are also
-///         at most 25 times this value, times the square root of gravity times the smallest radius;
-///         without gravity 9.81 m/s² is used.
-///     max_iterations: Largest number of sweeps of the contact solver in a step.
-///     stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart,
-///         "push_out" removes a fifth of the excessive overlap in each step, "none" leaves it. The
-///         first two may add energy by lifting the bodies above. The default is "push_out", or
-///         "projection" with restitution or in a vessel, whose curved walls cause an overlap in
-///         every step.
-///     penetration_tolerance: Overlap that stabilisation does not correct, m; 0.5% of the smallest
-///         radius by default.
-///     sleep: Whether to skip balls that are at rest and far from moving bodies.
-///     sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
-///     sleep_distance: A ball sleeps if no body within this distance moves, m; 0.2 by default.
-///     threads: Number of threads that solve the contact problem. The result does not depend on it.
-///         With fewer than some thousands of balls, a second thread gains little.
-///
+#[doc = ball_options!(documented)]
 /// Raises:
 ///     ModelError: A radius or mass is not finite and positive.
 ///     StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
@@ -96,19 +66,6 @@ impl GrainSimulation {
     fn open(&self) -> Result<MutexGuard<'_, Core>> {
         self.inner.open()
     }
-}
-
-/// Cohesion by its names; none without a force.
-fn cohering(grains: Grains<3>, given: &Named<'_>) -> Result<Grains<3>> {
-    let force = given.number("cohesion", 0.0)?;
-    let range = given.maybe("cohesion_range")?;
-    let cohesion = Cohesion::new(force, range, grains.smallest());
-    let cohesion = cohesion.map_err(|e| grain_error(&e.into()))?;
-    Ok(if force > 0.0 {
-        grains.with_cohesion(cohesion)
-    } else {
-        grains
-    })
 }
 
 /// Walls with their velocities (m, 3), m/s.
@@ -178,26 +135,24 @@ fn state(
 
 /// Numbers of balls, (n,); none for -1.
 fn numbers(before: &Bound<'_, PyAny>) -> Result<Vec<Option<u32>>> {
-    let wrong = |value: &Bound<'_, PyAny>, field: &str| {
-        refused(value, Kind::Model, field, "a whole number from -1")
-    };
-    let entries = before.try_iter().map_err(|_| wrong(before, "before"))?;
-    let read = |(i, entry): (usize, PyResult<Bound<'_, PyAny>>)| {
-        let entry = entry?;
-        match entry.extract::<i64>() {
+    let what = "a whole number from -1";
+    each(
+        before,
+        Kind::Model,
+        ("before", what),
+        |entry, kind, field| match entry.extract::<i64>() {
             Ok(-1) => Ok(None),
             Ok(number) if u32::try_from(number).is_ok() => Ok(u32::try_from(number).ok()),
-            _ => Err(wrong(&entry, &format!("before[{i}]"))),
-        }
-    };
-    entries.enumerate().map(read).collect()
+            _ => Err(refused(entry, kind, field, what)),
+        },
+    )
 }
 
 #[pymethods]
 impl GrainSimulation {
     #[new]
     #[pyo3(signature = (radius, mass, position, **options),
-        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, rolling_friction=0.0, drilling_friction=0.0, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None, threads=1)")]
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, gravity=None, **options)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
@@ -219,8 +174,6 @@ impl GrainSimulation {
         };
         let ground = (ground, vessel.is_some());
         let mut bed = Described::read([radius, mass, position], &given, ground)?;
-        bed.options.solver.threads = given.count("threads", 1)?;
-        bed.scene.grains = cohering(bed.scene.grains, &given)?;
         bed.scene.walls = moving(bed.scene.walls, given.some("wall_velocity")?.as_ref())?;
         given.finish()?;
         let (base, inner) = BedSimulation::build(bed)?;
@@ -235,12 +188,8 @@ impl GrainSimulation {
     #[getter]
     fn spin(&self) -> Result<Array> {
         let inner = self.open()?;
-        Ok(columns(
-            inner.v(),
-            inner.description().grains.len(),
-            VELOCITIES,
-            3,
-        ))
+        let n = inner.description().grains.len();
+        Ok(columns(inner.v(), n, VELOCITIES, 3))
     }
 
     /// The terrain below the balls, or None.
@@ -275,7 +224,7 @@ impl GrainSimulation {
     ) -> Result<()> {
         let mut inner = self.open()?;
         let (q, v) = state(inner.description().grains.len(), position, velocity, spin)?;
-        inner.set_state(&q, &v).map_err(|e| grain_error(&e))
+        Ok(inner.set_state(&q, &v)?)
     }
 
     /// Replaces the balls. Time and options do not change.
@@ -316,9 +265,7 @@ impl GrainSimulation {
         given.finish()?;
         let (q, v) = state(grains.len(), position, velocity.as_ref(), spin.as_ref())?;
         let before = numbers(before)?;
-        inner
-            .exchange(grains, &q, &v, &before)
-            .map_err(|e| grain_error(&e))
+        Ok(inner.exchange(grains, &q, &v, &before)?)
     }
 }
 
@@ -413,10 +360,8 @@ pub fn arrange_balls(
     let seed = given.whole("seed", 0)?;
     given.finish()?;
     let radii = vector(radius, Kind::Model, "radius")?;
-    let places = radius
-        .py()
-        .release(|| arranged::<3>(&radii, corner, sides, seed))?;
-    let q = places.map_err(|e| grain_error(&e))?;
+    let py = radius.py();
+    let q = py.release(|| arranged::<3>(&radii, corner, sides, seed))??;
     Ok(columns(&q, radii.len(), COORDINATES, 0))
 }
 

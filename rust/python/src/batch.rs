@@ -7,10 +7,10 @@ use rover_core::scalar::instructions::Instructions;
 use rover_core::simulation::Batch;
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Given, at_least_one, below, flags, refused};
-use crate::arrays::{Array, array};
+use crate::arguments::{self, Given, below, each, flags, refused};
+use crate::arrays::{Array, shaped};
 use crate::episode::{GivenSimulation, simulation};
-use crate::errors::{Kind, Result, Value};
+use crate::errors::{Kind, Result};
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Open, Release, Shared, Watch};
 use crate::simulation::Simulation;
@@ -52,13 +52,8 @@ pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> Result<Vec<bool>> {
 
 /// (n, wheels) commands in row-major order.
 fn commands(value: &Bound<'_, PyAny>, field: &'static str, shape: [usize; 2]) -> Result<Vec<f64>> {
-    let given = array(value, Kind::Command, field)?;
-    let view = given.as_array();
-    if view.shape() != shape {
-        let message = format!("{field}: needs shape {shape:?}, has {:?}", view.shape());
-        return Err(Kind::Command.error(field, message, Value::Count(view.ndim())));
-    }
-    Ok(view.iter().copied().collect())
+    let what = format!("{shape:?}");
+    Ok(shaped(value, Kind::Command, (field, &what), |own| own == shape)?.0)
 }
 
 #[pymethods]
@@ -71,19 +66,17 @@ impl SimulationBatch {
         threads: Option<&Bound<'_, PyAny>>,
     ) -> Result<Self> {
         let field = "simulations";
-        let items = simulations
-            .try_iter()
-            .map_err(|_| refused(simulations, Kind::Option, field, "simulations"))?;
-        let (mut rovers, mut grounds) = (Vec::new(), Vec::new());
-        for (i, item) in items.enumerate() {
-            let item = item?;
-            let one = simulation(&item, &format!("{field}[{i}]"))?.get();
-            rovers.push(one.open()?.clone());
-            grounds.push(one.ground().clone());
-        }
-        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
-        let threads = threads.transpose()?;
-        let inner = Batch::new(rovers, scan_points(scan)?, threads)?;
+        let given = each(
+            simulations,
+            Kind::Option,
+            (field, field),
+            |one, _, field| {
+                let one = simulation(one, field)?.get();
+                Ok((one.open()?.clone(), one.ground().clone()))
+            },
+        )?;
+        let (rovers, grounds) = given.into_iter().unzip();
+        let inner = Batch::new(rovers, scan_points(scan)?, arguments::threads(threads)?)?;
         Ok(Self(Shared::new(Inner { inner, grounds })))
     }
 

@@ -12,7 +12,8 @@ use rover_core::system::grains::COORDINATES;
 
 use crate::arguments::flags;
 use crate::arrays::{Array, fresh, fresh_rows};
-use crate::bed_arguments::{self, Described, grain_error, setup_error};
+use crate::bed_arguments::Described;
+use crate::bed_options;
 use crate::contacts::GrainContacts;
 use crate::errors::{Kind, Result};
 use crate::shared::{Open, Shared};
@@ -71,14 +72,9 @@ impl BedSimulation {
         SharedBed<D>: Stepped,
         AnyBed: From<Arc<SharedBed<D>>>,
     {
-        let Described {
-            scene,
-            options,
-            sleep,
-            q,
-        } = given;
-        let made = GrainSimulation::new(Arc::new(scene), options, sleep, q);
-        let inner = Arc::new(Shared::new(made.map_err(setup_error)?));
+        let scene = Arc::new(given.scene);
+        let made = GrainSimulation::new(scene, given.options, given.sleep, given.q)?;
+        let inner = Arc::new(Shared::new(made));
         let base = AnySimulation::base(inner.clone()).add_subclass(Self(inner.clone().into()));
         Ok((base, inner))
     }
@@ -185,7 +181,7 @@ impl BedSimulation {
     /// Options of contacts, gravity and solver, as keyword arguments.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        opened!(self, bed => Ok(bed_arguments::settings(py, bed.options(), bed.description())?))
+        opened!(self, bed => bed_options::settings(py, bed.options(), bed.description()))
     }
 
     /// Removes grains. The others keep their order.
@@ -198,7 +194,7 @@ impl BedSimulation {
     ///         left. Nothing has changed.
     fn remove(&self, which: &Bound<'_, PyAny>) -> Result<()> {
         let which = flags(which, Kind::Model, "which")?;
-        opened!(self, bed => bed.remove(&which).map_err(|e| grain_error(&e)))
+        opened!(self, bed => Ok(bed.remove(&which)?))
     }
 
     /// The contacts of the last step.

@@ -12,15 +12,6 @@ use rover_core::system::grains::GrainContact;
 
 use crate::arrays::{Array, fresh_rows};
 
-/// What all lists of contacts have, one row a contact.
-struct Columns {
-    points: Array,
-    normals: Array,
-    gaps: Array,
-    impulses: Array,
-    velocities: Array,
-}
-
 fn rows<C: LocatedContact>(
     active: &[ActiveContact<C>],
     f: impl Fn(&ActiveContact<C>) -> C::Local,
@@ -28,18 +19,6 @@ fn rows<C: LocatedContact>(
     let rows: Vec<C::Local> = active.iter().map(f).collect();
     let numbers = rows.iter().flat_map(AsRef::as_ref).copied();
     Array::shaped(numbers.collect(), &[rows.len(), C::Local::N])
-}
-
-impl Columns {
-    fn of<C: LocatedContact>(active: &[ActiveContact<C>]) -> Self {
-        Self {
-            points: rows(active, |a| a.position),
-            normals: rows(active, |a| a.contact.normal()),
-            gaps: active.iter().map(|a| a.contact.gap()).collect(),
-            impulses: rows(active, |a| a.impulse),
-            velocities: rows(active, |a| a.velocity),
-        }
-    }
 }
 
 /// Numbers of both bodies; -1 from `n_moving` on.
@@ -115,27 +94,20 @@ impl Contacts {
             Part::Friction(_) => ("friction", -1),
         };
         let (kinds, wheels): (_, Vec<i64>) = parts.clone().map(kind_of).unzip();
-        let columns = Columns::of(active);
+        let name = |part: &Part| part.name(model).to_owned();
+        let others = active.iter().map(|a| a.contact.other);
+        let axes = active.iter().map(|a| a.contact.frame.rows());
+        let axes = axes.map(|rows| rows.map(Into::into));
         Self {
-            bodies: parts.map(|part| part.name(model).to_owned()).collect(),
-            others: (active.iter())
-                .map(|a| {
-                    a.contact
-                        .other
-                        .map(|other| other.part.name(model).to_owned())
-                })
-                .collect(),
+            bodies: parts.map(name).collect(),
+            others: others.map(|a| a.map(|a| name(&a.part))).collect(),
             kinds,
             wheels: wheels.into(),
-            points: columns.points,
-            frames: frames(
-                active
-                    .iter()
-                    .map(|a| a.contact.frame.rows().map(Into::into)),
-            ),
-            gaps: columns.gaps,
-            impulses: columns.impulses,
-            velocities: columns.velocities,
+            points: rows(active, |a| a.position),
+            frames: frames(axes),
+            gaps: active.iter().map(|a| a.contact.gap).collect(),
+            impulses: rows(active, |a| a.impulse),
+            velocities: rows(active, |a| a.velocity),
         }
     }
 }
@@ -172,24 +144,17 @@ pub struct PlanarContacts {
 
 impl PlanarContacts {
     pub fn new(active: &[ActiveContact<PlanarContact>]) -> Self {
-        let Columns {
-            points,
-            normals,
-            gaps,
-            impulses,
-            velocities,
-        } = Columns::of(active);
         let discs = active
             .iter()
             .map(|a| i64::from(a.contact.key.disc))
             .collect();
         Self {
             discs,
-            points,
-            normals,
-            gaps,
-            impulses,
-            velocities,
+            points: rows(active, |a| a.position),
+            normals: rows(active, |a| a.contact.normal()),
+            gaps: active.iter().map(|a| a.contact.gap).collect(),
+            impulses: rows(active, |a| a.impulse),
+            velocities: rows(active, |a| a.velocity),
         }
     }
 }
@@ -247,13 +212,6 @@ impl GrainContacts {
         for one in &mut active {
             one.impulse[0] -= h * scene.attraction(&one.contact);
         }
-        let Columns {
-            points,
-            normals,
-            impulses,
-            velocities,
-            ..
-        } = Columns::of(&active);
         let on_first = |a: &ActiveContact<GrainContact<D>>| {
             let (axes, p) = (a.contact.frame(), &a.impulse);
             (1..D)
@@ -262,12 +220,12 @@ impl GrainContacts {
         };
         Self {
             bodies: numbers(&active, scene.grains.len() + wheels),
-            points,
-            normals,
+            points: rows(&active, |a| a.position),
+            normals: rows(&active, |a| a.contact.normal()),
             frames: frames(active.iter().map(|a| a.contact.frame().map(Into::into))),
             gaps: active.iter().map(|a| a.contact.gap_start).collect(),
-            impulses,
-            velocities,
+            impulses: rows(&active, |a| a.impulse),
+            velocities: rows(&active, |a| a.velocity),
             world_impulses: rows(&active, on_first),
             world_moments: fresh_rows(active.iter().map(|a| bed.moment(&a.contact))),
         }

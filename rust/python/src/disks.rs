@@ -11,7 +11,8 @@ use rover_core::system::grains::Packing;
 
 use crate::arguments::{Given, Named, refused};
 use crate::arrays::{Array, fresh, fresh_rows, vector};
-use crate::bed_arguments::{Described, Packed, coordinates, grain_error, packed};
+use crate::bed_arguments::{Described, Packed, coordinates, packed};
+use crate::bed_options::disk_options;
 use crate::beds::{BedSimulation, SharedBed};
 use crate::errors::{Kind, Result, Value};
 use crate::planar::pair;
@@ -38,28 +39,8 @@ use crate::shared::Open;
 ///         rate; none by default.
 ///     machine: Coordinates of the rover (x, y, theta, theta_A, theta_B) or of the rig (x, y, -,
 ///         theta, -), (5,), m and rad.
-///     friction: Coulomb's coefficient between disks.
-///     wall_friction: Coulomb's coefficient of disks on walls and ground.
-///     wheel_friction: Coulomb's coefficient of wheels.
-///     rolling_friction: Coefficient of rolling friction of disks: the largest resisting moment
-///         divided by the normal force and the rolling radius r. Between two disks 1/r = 1/r_1 +
-///         1/r_2; on a wall or the ground r is the disk's radius. It does not act on wheels, nor if
-///         Coulomb's coefficient is 0.
-///     restitution: Newton's coefficient of all contacts, in [0, 1].
 ///     gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
-///     time_step: Time step, s.
-///     tolerance: Largest relative residual of the contact problem. Errors of velocities are also
-///         at most ten times this value in m/s, times the square root of gravity / 9.81 m/s².
-///     max_iterations: Largest number of sweeps of the contact solver in a step.
-///     stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart, which may
-///         add energy by lifting those above; "none" leaves them. By default "projection" with
-///         restitution and "none" without.
-///     penetration_tolerance: Overlap that projection does not correct, m; 0.5% of the smallest
-///         radius by default.
-///     sleep: Whether to skip disks that are at rest and far from moving bodies.
-///     sleep_speed: Speed below which a disk is at rest, m/s; 5e-4 by default.
-///     sleep_distance: A disk sleeps if no body within this distance moves, m; 0.2 by default.
-///
+#[doc = disk_options!(documented)]
 /// Raises:
 ///     ModelError: A radius or mass is not finite and positive, or the machine's data are invalid.
 ///     StateError: Positions have a wrong shape or an entry that is not finite, or disks, walls or
@@ -101,7 +82,7 @@ fn machine(given: &Named<'_>) -> Result<Option<PlanarTree>> {
 impl DiskSimulation {
     #[new]
     #[pyo3(signature = (radius, mass, position, **options),
-        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, ground=None, rover=None, rig=None, machine=None, friction=0.5, wall_friction=0.5, wheel_friction=0.9, rolling_friction=0.0, restitution=0.0, gravity=None, time_step=0.001, tolerance=0.0001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, ground=None, rover=None, rig=None, machine=None, gravity=None, **options)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
@@ -194,7 +175,7 @@ impl DiskSimulation {
             Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
             None => v.resize(v.len() + present.len(), 0.0),
         }
-        inner.set_state(&q, &v).map_err(|e| grain_error(&e))
+        Ok(inner.set_state(&q, &v)?)
     }
 
     /// Sets the torques of the rover's wheels.
@@ -206,9 +187,7 @@ impl DiskSimulation {
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
-        self.open()?
-            .set_inputs(&torques)
-            .map_err(|e| grain_error(&e))
+        Ok(self.open()?.set_inputs(&torques)?)
     }
 
     /// Sets an external force at the machine's centre, such as a drawbar load.
@@ -220,9 +199,7 @@ impl DiskSimulation {
     ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_pull(&self, pull: &Bound<'_, PyAny>) -> Result<()> {
         let pull = pair(pull, Kind::Command, "pull")?;
-        self.open()?
-            .set_pull(pull.into())
-            .map_err(|e| grain_error(&e))
+        Ok(self.open()?.set_pull(pull.into())?)
     }
 
     /// Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s.

@@ -8,7 +8,7 @@ use pyo3::types::{PyBytes, PyDict, PyRange, PyTuple};
 use rover_task::draw::Domain;
 use rover_task::episode::{Ending, Episode as CoreEpisode, EpisodeSetting, EpisodeState, Rules};
 
-use crate::arguments::{Named, number, refused};
+use crate::arguments::{Named, number, object, refused};
 use crate::arrays::{Array, array, fresh, vector};
 use crate::episode_rules::EpisodeRules;
 use crate::errors::{Kind, Result, Value};
@@ -65,9 +65,7 @@ pub fn simulation<'a, 'py>(
     value: &'a Bound<'py, PyAny>,
     field: &str,
 ) -> Result<&'a Bound<'py, Simulation>> {
-    value
-        .cast()
-        .map_err(|_| refused(value, Kind::Option, field, "a Simulation"))
+    object(value, Kind::Option, field, "a Simulation")
 }
 
 /// The argument `rules`: `EpisodeRules`.
@@ -78,9 +76,8 @@ impl FromPyObject<'_, '_> for GivenRules {
     type Error = PyErr;
 
     fn extract(given: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
-        let found = given.cast::<EpisodeRules>();
-        let wrong = |_| refused(&given, Kind::Option, "rules", "EpisodeRules");
-        Ok(Self(found.map_err(wrong)?.get().inner.clone()))
+        let rules = object::<EpisodeRules>(&given, Kind::Option, "rules", "EpisodeRules")?;
+        Ok(Self(rules.get().inner.clone()))
     }
 }
 

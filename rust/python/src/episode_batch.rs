@@ -9,7 +9,7 @@ use rover_task::episode::{
     BatchOutcome, EpisodeBatch as CoreBatch, EpisodeError, EpisodeOrigin as Began,
 };
 
-use crate::arguments::{Named, at_least_one, below, refused, text, whole};
+use crate::arguments::{self, Named, at_least_one, below, object, refused, text, whole};
 use crate::arrays::{Array, fresh, fresh_rows};
 use crate::batch::mask;
 use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request};
@@ -22,9 +22,32 @@ use crate::shared::{Open, Release, Shared, Watch};
 use crate::simulation::Simulation;
 use crate::union;
 
-/// Observations, rewards, which episodes have ended, which have reached the time limit, and the
-/// indices of both.
-type Step = (Array<f32>, Array, Array<bool>, Array<bool>, Vec<usize>);
+/// Observations, rewards, which episodes have ended, which have reached the time limit, and infos.
+type Step<'py> = (
+    Array<f32>,
+    Array,
+    Array<bool>,
+    Array<bool>,
+    Bound<'py, PyDict>,
+);
+
+/// Whose infos are asked for.
+enum Asked {
+    Nobody,
+    One(usize),
+    All,
+}
+
+impl Asked {
+    /// The argument `info` of a batch of `n` rovers.
+    fn parse(given: Option<&Bound<'_, PyAny>>, n: usize) -> Result<Self> {
+        Ok(match given {
+            None => Self::Nobody,
+            Some(given) if given.extract::<String>().is_ok_and(|word| word == "all") => Self::All,
+            Some(index) => Self::One(below(index, n)?),
+        })
+    }
+}
 
 /// Start, rocks, seed of the rocks, and domain, as `EpisodeBatch.origin` tells them.
 type OriginRows = (Vec<f64>, Vec<f64>, u64, Vec<f64>);
@@ -57,6 +80,18 @@ impl Inner {
     /// Source of the infos of a rover.
     fn info_source(&self, index: usize) -> Result<InfoSource<'_>, EpisodeError> {
         Ok((self.batch.episode(index)?, self.batch.message(index)))
+    }
+
+    /// The infos that are asked for; nobody's are empty.
+    fn infos<'py>(&self, py: Python<'py>, asked: &Asked) -> Result<Bound<'py, PyDict>> {
+        match *asked {
+            Asked::Nobody => Ok(PyDict::new(py)),
+            Asked::One(index) => info(py, &self.info_source(index)?),
+            Asked::All => {
+                let sources = (0..self.grounds.len()).map(|i| self.info_source(i));
+                infos(py, &sources.collect::<Result<Vec<_>, _>>()?)
+            }
+        }
     }
 
     /// Keeps the ground of an episode that has begun.
@@ -93,20 +128,6 @@ impl EpisodeBatch {
         let index = below(index, held.batch.rovers().len())?;
         act(&mut held, index)
     }
-}
-
-fn distribution<'a, 'py>(
-    given: &'a Bound<'py, PyAny>,
-) -> Result<&'a Bound<'py, EpisodeDistribution>> {
-    let wrong = |_| {
-        refused(
-            given,
-            Kind::Option,
-            "distribution",
-            "an EpisodeDistribution",
-        )
-    };
-    given.cast().map_err(wrong)
 }
 
 /// The argument `among`: what links each rover of a batch with its grains.
@@ -152,12 +173,8 @@ impl EpisodeBatch {
     ) -> Result<Self> {
         let n = at_least_one(n, Kind::Option, "n")?;
         let max_steps = max_steps.map(|given| whole(given, Kind::Option, "max_steps"));
-        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
-        let (one, max_steps, threads) = (
-            simulation.0.get(),
-            max_steps.transpose()?,
-            threads.transpose()?,
-        );
+        let (max_steps, threads) = (max_steps.transpose()?, arguments::threads(threads)?);
+        let one = simulation.0.get();
         let batch = CoreBatch::new(rules.0, &*one.open()?, n, max_steps, threads)?;
         Ok(Self(Shared::new(Inner {
             batch,
@@ -186,29 +203,32 @@ impl EpisodeBatch {
     ///         heights.
     ///     among: A RoverGrainSimulation of each rover's `simulation`, if the rovers drive among
     ///         grains; they are then stepped one after the other.
+    ///     info: Which infos to return: "all" as `infos`, an index as `info`; none by default.
     ///
     /// Returns:
     ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes are
-    ///     terminated and which are truncated, (n_rovers,) each, and the indices of the rovers with
-    ///     either. A rover that is not active keeps the values of its last period.
+    ///     terminated and which are truncated, (n_rovers,) each, and infos; an empty dictionary if
+    ///     none are asked for. A rover that is not active keeps the values of its last period.
     ///
     /// Raises:
     ///     CommandError: The actions have a wrong shape or an entry that is not finite or outside
     ///         [-1, 1]. No rover has moved.
-    ///     OptionError: `active` or `among` is invalid, or an episode has not begun. No rover has
-    ///         moved.
-    #[pyo3(signature = (actions, active = None, *, has_scan = true, among = None))]
-    fn step(
+    ///     OptionError: `active`, `among` or `info` is invalid, or an episode has not begun. No
+    ///         rover has moved.
+    #[pyo3(signature = (actions, active = None, *, has_scan = true, among = None, info = None))]
+    fn step<'py>(
         &self,
-        py: Python<'_>,
+        py: Python<'py>,
         actions: &Bound<'_, PyAny>,
         active: Option<&Bound<'_, PyAny>>,
         has_scan: bool,
         among: Option<&Bound<'_, PyAny>>,
-    ) -> Result<Step> {
+        info: Option<&Bound<'_, PyAny>>,
+    ) -> Result<Step<'py>> {
         let mut held = self.0.open()?;
         let batch = &mut held.batch;
         let (n, size) = (batch.rovers().len(), batch.rules().size());
+        let asked = Asked::parse(info, n)?;
         let given = self::actions(actions, &[n, batch.rules().n_actions()])?;
         let active = active.map(|given| mask(given, n)).transpose()?;
         let active = active.as_deref();
@@ -236,10 +256,15 @@ impl EpisodeBatch {
             rewards,
             ended,
             truncated,
-            over,
+            ..
         } = watch.result(done)?;
-        let rows = Array::shaped(rows, &[n, size]);
-        Ok((rows, rewards.into(), ended.into(), truncated.into(), over))
+        Ok((
+            Array::shaped(rows, &[n, size]),
+            rewards.into(),
+            ended.into(),
+            truncated.into(),
+            held.infos(py, &asked)?,
+        ))
     }
 
     /// Sorted indices of the rovers whose episode is over and whose next has not begun.
@@ -254,10 +279,7 @@ impl EpisodeBatch {
     ///     For each entry an array (n_rovers,), and under its name with a leading underscore a mask
     ///     of the rovers that have the entry: all True.
     fn infos<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        let held = self.0.open()?;
-        let sources = (0..held.batch.rovers().len()).map(|i| held.info_source(i));
-        let sources: Vec<_> = sources.collect::<Result<_, _>>()?;
-        infos(py, &sources)
+        self.0.open()?.infos(py, &Asked::All)
     }
 
     /// The info of one rover, of its last control period or of its start.
@@ -265,7 +287,7 @@ impl EpisodeBatch {
     /// Args:
     ///     index: Index of the rover.
     fn info<'py>(&self, index: &Bound<'py, PyAny>) -> Result<Bound<'py, PyDict>> {
-        self.one(index, |held, i| info(index.py(), &held.info_source(i)?))
+        self.one(index, |held, i| held.infos(index.py(), &Asked::One(i)))
     }
 
     /// The last observations of all rovers, (n_rovers, size) float32; zeros before an episode.
@@ -316,10 +338,11 @@ impl EpisodeBatch {
         generators: &Bound<'_, PyAny>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<DrawnEpisodes> {
-        let distribution = self::distribution(distribution)?.get();
+        let what = "an EpisodeDistribution";
+        let of = object::<EpisodeDistribution>(distribution, Kind::Option, "distribution", what)?;
         let request = Request::parse(generators, options)?;
         let mut held = self.0.open()?;
-        distribution.draw_on(generators.py(), &request, &mut held.batch)
+        of.get().draw_on(generators.py(), &request, &mut held.batch)
     }
 
     /// Starts drawn episodes.
@@ -331,9 +354,8 @@ impl EpisodeBatch {
     /// Raises:
     ///     OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
     fn begin(&self, indices: &Bound<'_, PyAny>, episodes: &Bound<'_, PyAny>) -> Result<()> {
-        let found = episodes.cast::<DrawnEpisodes>();
-        let refuse = |_| refused(episodes, Kind::Option, "episodes", "DrawnEpisodes");
-        let drawn = found.map_err(refuse)?.get();
+        let what = "DrawnEpisodes";
+        let drawn = object::<DrawnEpisodes>(episodes, Kind::Option, "episodes", what)?.get();
         let mut held = self.0.open()?;
         let places = held.indices(indices, Some(drawn.drawn.len()))?;
         for (&index, one) in places.iter().zip(&drawn.drawn) {
@@ -373,8 +395,8 @@ impl EpisodeBatch {
         options: Option<&Bound<'_, PyDict>>,
     ) -> Result<()> {
         let one = simulation.0.get();
-        let wrong = |_| refused(episode, Kind::Option, "episode", "an EpisodeRun");
-        let episode = episode.cast::<EpisodeRun>().map_err(wrong)?.get().copy();
+        let episode = object::<EpisodeRun>(episode, Kind::Option, "episode", "an EpisodeRun")?;
+        let episode = episode.get().copy();
         let origin = self::origin(origin, one.ground().clone())?;
         let given = Named::keywords(indices.py(), options)?;
         let random = given.need("generator", |value, kind, field| {

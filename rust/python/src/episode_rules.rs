@@ -149,31 +149,15 @@ impl EpisodeRules {
     ///     Name, first entry, size, unit, scale (size,), lower and upper bound of scaled entries,
     ///     and meaning of each field.
     fn observation<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyTuple>>> {
-        let fields = self.inner.observation().into_iter();
-        fields
-            .map(
-                |Field {
-                     channel,
-                     entries,
-                     scale,
-                 }| {
-                    let [low, high] = channel.bounds;
-                    let (start, size) = (entries.start, entries.len());
-                    let scale = PyTuple::new(py, scale)?;
-                    let row = (
-                        channel.name,
-                        start,
-                        size,
-                        channel.unit,
-                        scale,
-                        low,
-                        high,
-                        channel.meaning,
-                    );
-                    Ok(row.into_pyobject(py)?)
-                },
-            )
-            .collect()
+        let row = |field: Field| {
+            let own = field.channel;
+            let ([low, high], scale) = (own.bounds, PyTuple::new(py, field.scale)?);
+            let (start, size) = (field.entries.start, field.entries.len());
+            let (name, unit, meaning) = (own.name, own.unit, own.meaning);
+            let row = (name, start, size, unit, scale, low, high, meaning);
+            Ok(row.into_pyobject(py)?)
+        };
+        self.inner.observation().into_iter().map(row).collect()
     }
 
     /// First entry, size, name, meaning, unit and scale of the built-in rover's observed fields.
@@ -194,24 +178,12 @@ impl EpisodeRules {
             points: 0,
             gravity: 9.81,
         };
-        let rows = fields(&sizes).into_iter().map(
-            |Field {
-                 channel: own,
-                 entries,
-                 ..
-             }| {
-                let (start, size) = (entries.start, entries.len());
-                (
-                    start,
-                    size,
-                    own.name,
-                    own.meaning,
-                    own.unit,
-                    own.scale.words(),
-                )
-            },
-        );
-        rows.collect()
+        let row = |field: Field| {
+            let (own, start, size) = (field.channel, field.entries.start, field.entries.len());
+            let (name, meaning, unit, scale) = (own.name, own.meaning, own.unit, own.scale.words());
+            (start, size, name, meaning, unit, scale)
+        };
+        fields(&sizes).into_iter().map(row).collect()
     }
 
     /// Name, unit and meaning of each entry of an info.

@@ -363,28 +363,17 @@ impl From<CommandError> for BorderError {
 impl From<BatchError> for BorderError {
     fn from(e: BatchError) -> Self {
         let message = e.to_string();
+        let of_rover = |index: usize, inner: Self| Self {
+            message: message.clone(),
+            field: inner.field.map(|field| match field.split_once('[') {
+                Some((name, entry)) => format!("{name}[{index}, {entry}"),
+                None => entry(&field, Some(&index)),
+            }),
+            ..inner
+        };
         let (field, value) = match e {
-            BatchError::Command { index, error } => {
-                let inner = Self::from(error);
-                let field = inner.field.map(|field| match field.split_once('[') {
-                    Some((name, entry)) => format!("{name}[{index}, {entry}"),
-                    None => entry(&field, Some(&index)),
-                });
-                return Self {
-                    message,
-                    field,
-                    ..inner
-                };
-            }
-            BatchError::Options { index, error } => {
-                let inner = Self::from(error);
-                let field = inner.field.map(|field| entry(&field, Some(&index)));
-                return Self {
-                    message,
-                    field,
-                    ..inner
-                };
-            }
+            BatchError::Command { index, error } => return of_rover(index, error.into()),
+            BatchError::Options { index, error } => return of_rover(index, error.into()),
             BatchError::Empty => ("simulations".to_owned(), Value::Count(0)),
             BatchError::Differs { index, actual, .. } => {
                 (entry("simulations", Some(&index)), Value::Count(actual))

@@ -7,7 +7,7 @@ use rover_core::solver::{
     ContactLaw, Rung, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
 };
 
-use crate::arguments::{Given, Named, whole};
+use crate::arguments::{Given, Named, text, whole};
 use crate::arrays::Array;
 use crate::errors::{Kind, Result, Value};
 use crate::given_problem::{Delassus, coefficients, flat, with_hint};
@@ -76,16 +76,9 @@ impl From<SolveReport> for SolverReport {
 #[pymethods]
 impl SolverReport {
     fn __repr__(&self) -> String {
-        let Self {
-            status,
-            stage,
-            iterations,
-            residual,
-            ..
-        } = self;
         format!(
-            "SolverReport(status={status:?}, stage={stage:?}, iterations={iterations}, \
-             residual={residual:.3e})"
+            "SolverReport(status={:?}, stage={:?}, iterations={}, residual={:.3e})",
+            self.status, self.stage, self.iterations, self.residual
         )
     }
 }
@@ -153,7 +146,10 @@ pub fn solve_friction_contact(
     let given = Named::keywords(py, options)?;
     let tolerance = tolerance.number(1e-8, Kind::Option, "tolerance")?;
     let dimension = given.count("dimension", 3)?;
-    let solver = given.text("solver", "auto")?;
+    let solver = match given.get("solver")?.given() {
+        Some(solver) => text(&solver, Kind::Option, "solver")?,
+        None => "auto".to_owned(),
+    };
     let max_iterations = given.count("max_iterations", 1000)?;
     let kind = match dimension {
         2 => Dimension::Two,

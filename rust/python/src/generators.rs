@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyInt;
 use rover_task::draw::{Pcg64, Pcg64State};
 
-use crate::arguments::{count, refused};
+use crate::arguments::{count, each, refused};
 use crate::arrays::{Array, check_size, fresh_rows};
 use crate::errors::{Kind, Result};
 
@@ -39,14 +39,9 @@ pub fn generators(value: &Bound<'_, PyAny>) -> Result<Vec<Pcg64>> {
 pub fn seed_generators(seeds: &Bound<'_, PyAny>) -> Result<Array<u64>> {
     let what = "whole numbers from 0";
     check_size(seeds, Kind::Option, "seeds")?;
-    let entries = seeds.try_iter();
-    let entries = entries.map_err(|_| refused(seeds, Kind::Option, "seeds", what))?;
-    let seeded = |(i, entry): (usize, PyResult<Bound<'_, PyAny>>)| -> Result<[u64; 4]> {
-        let entry = entry?;
-        let field = format!("seeds[{i}]");
-        let refuse = || refused(&entry, Kind::Option, &field, "a whole number from 0");
+    let seeded = |entry: &Bound<'_, PyAny>, kind, field: &str| -> Result<[u64; 4]> {
         if !entry.is_instance_of::<PyInt>() || entry.lt(0)? {
-            return Err(refuse());
+            return Err(refused(entry, kind, field, "a whole number from 0"));
         }
         let n_bits: usize = entry.call_method0("bit_length")?.extract()?;
         let n_words = n_bits.div_ceil(32).max(1);
@@ -58,7 +53,7 @@ pub fn seed_generators(seeds: &Bound<'_, PyAny>) -> Result<Array<u64>> {
             .collect();
         Ok(Pcg64::seeded(&words).state().halves())
     };
-    let rows: Vec<[u64; 4]> = entries.enumerate().map(seeded).collect::<Result<_>>()?;
+    let rows = each(seeds, Kind::Option, ("seeds", what), seeded)?;
     Ok(fresh_rows(rows))
 }
 

@@ -39,7 +39,7 @@ impl Delassus {
         if shape.len() != 2 || shape[0] != shape[1] {
             let message = format!("W: must be square, has shape {shape:?}");
             let value = Value::Numbers(shape.iter().map(|&s| s as f64).collect());
-            return Err(problem_error("W", message, value));
+            return Err(Kind::Problem.error("W", message, value));
         }
         Ok(Self::Dense(dense.as_array().iter().copied().collect()))
     }
@@ -56,7 +56,7 @@ impl Delassus {
             } else {
                 message
             };
-            return Err(problem_error("W", message, value));
+            return Err(Kind::Problem.error("W", message, value));
         }
         let rows = W.call_method1("tocsr", (true,))?; // a copy, which may be rearranged
         rows.call_method0("sum_duplicates")?;
@@ -87,7 +87,7 @@ pub fn coefficients(mu: &Bound<'_, PyAny>, n: usize, dimension: usize) -> Result
             String::new()
         };
         let message = format!("q: has {n} entries, not {dimension} for each contact{hint}");
-        return Err(problem_error("q", message, Value::Count(n)));
+        return Err(Kind::Problem.error("q", message, Value::Count(n)));
     }
     Ok(vec![given.as_array().sum(); n / dimension])
 }
@@ -123,9 +123,5 @@ fn as_index(number: f64) -> Result<usize> {
         return Ok(number as usize);
     }
     let message = format!("W: indices must be whole numbers >= 0, one is {number}");
-    Err(problem_error("W", message, Value::Number(number)))
-}
-
-fn problem_error(field: &str, message: String, value: Value) -> BorderError {
-    Kind::Problem.error(field, message, value)
+    Err(Kind::Problem.error("W", message, Value::Number(number)))
 }

@@ -8,6 +8,7 @@ mod arrays;
 mod balls;
 mod batch;
 mod bed_arguments;
+mod bed_options;
 mod beds;
 mod contacts;
 mod disks;

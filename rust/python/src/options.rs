@@ -1,5 +1,7 @@
-//! Options of a simulation's steps, declared once: `step_options!` lists them. Arguments are read
-//! and told again, and docstrings, signatures and the types of the stub made, from this list.
+//! Options of simulations, declared once: `step_options!` lists those of machines, and
+//! `disk_options!` and `ball_options!` of [`crate::bed_options`] those of grains. Arguments are
+//! read and told again, and docstrings, signatures and the types of the stub made, from these
+//! lists.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -44,11 +46,15 @@ pub const STABILISATIONS: [(&str, Stabilisation); 2] = [
     ("none", Stabilisation::None),
 ];
 /// Stabilisations of grains by name.
-pub const GRAIN_STABILISATIONS: [(&str, Stabilisation); 3] = [
-    ("projection", Stabilisation::Projection),
-    ("push_out", Stabilisation::PushOut),
-    ("none", Stabilisation::None),
+pub const GRAIN_STABILISATIONS: [(&str, GrainStabilisation); 3] = [
+    ("projection", GrainStabilisation(Stabilisation::Projection)),
+    ("push_out", GrainStabilisation(Stabilisation::PushOut)),
+    ("none", GrainStabilisation(Stabilisation::None)),
 ];
+
+/// A stabilisation of grains.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub struct GrainStabilisation(pub Stabilisation);
 
 /// Methods for the contact problem by name.
 pub const METHODS: [(&str, Method); 6] = by_name(Method::ALL);
@@ -74,87 +80,111 @@ const fn by_name<const N: usize>(methods: [Method; N]) -> [(&'static str, Method
 /// Largest number of iterations of the contact solver in a step, unless given.
 const MAX_ITERATIONS: usize = 1000;
 
-/// Every option but gravity, which is each class's own: its meaning, its name, whether `None`
-/// stands for its default, and its place in `StepOptions`. The type of the place tells how it is
-/// read; the core has its default and its range.
+/// Every option but gravity, which is each class's own: its meaning, its name, its marks, and its
+/// place in `StepOptions`. The type of the place tells how it is read; the core has its default and
+/// its range. Of an option with the mark `None`, `None` stands for the default; one with the mark
+/// `untold` is not among the `settings`.
 ///
-/// `rows` makes [`TABLE`] of them. `documented` makes the entries of a docstring, after those that
-/// it is given.
+/// `rows` makes a table of them, `documented` the entries of a docstring.
 macro_rules! step_options {
-    ($then:ident $($before:literal)?) => { $crate::options::$then! {
-        $($before;)?
-        /// Coulomb's coefficient of every contact whose pair is not in `materials`.
-        friction => friction_coefficient;
-        /// Newton's coefficient of every contact whose pair is not in `materials`, in
-        /// [0, 1].
-        restitution => restitution;
-        /// Friction and restitution by pair of materials, in any order, such as
-        /// `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
-        /// restitution). None by default.
-        materials | None => materials;
-        /// Time step, s, from 1e-9 to 1000; 0.005 by default.
-        time_step | None => time_step;
-        /// "linearised" evaluates the forces once in each step; "newton" solves for the forces
-        /// at its end. "linearised" by default.
-        variant | None => variant;
-        /// Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
-        theta => theta;
-        /// A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
-        /// its normal velocity; in [0, 1].
-        forecast => forecast;
-        /// Method for the contact problem, as in `solve_friction_contact`.
-        solver => solver.method;
-        /// Largest relative residual of the contact problem; 1e-12 by default.
-        tolerance | None => solver.tolerance;
-        /// Largest number of iterations of the contact solver in a step.
-        max_iterations => solver.max_sweeps;
-        /// Largest amount of work of the contact solver in a step, in the unit of
-        /// `solve_friction_contact` (operations, not time). By default it grows with the number of
-        /// contacts.
-        budget | None => solver.budget;
-        /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
-        /// leaves them.
-        stabilisation => stabilisation;
-        /// Whether the contact solver starts from the last step's impulses.
-        warm_start => warm_start;
-    } };
+    ($then:ident) => {
+        $crate::options::$then! {
+            /// Coulomb's coefficient of every contact whose pair is not in `materials`.
+            friction => friction_coefficient;
+            /// Newton's coefficient of every contact whose pair is not in `materials`, in
+            /// [0, 1].
+            restitution => restitution;
+            /// Friction and restitution by pair of materials, in any order, such as
+            /// `{("wheel", "rock"): (0.5, 0.1)}`; or a list of rows (name, name, friction,
+            /// restitution). None by default.
+            materials | None => materials;
+            /// Time step, s, from 1e-9 to 1000; 0.005 by default.
+            time_step | None => time_step;
+            /// "linearised" evaluates the forces once in each step; "newton" solves for the forces
+            /// at its end. "linearised" by default.
+            variant | None => variant;
+            /// Implicitness of the time stepping: weight of the end of the step, in [0.5, 1].
+            theta => theta;
+            /// A contact is active in a step if gap + forecast * time_step * u_N <= 0, with u_N
+            /// its normal velocity; in [0, 1].
+            forecast => forecast;
+            /// Method for the contact problem, as in `solve_friction_contact`.
+            solver => solver.method;
+            /// Largest relative residual of the contact problem; 1e-12 by default.
+            tolerance | None => solver.tolerance;
+            /// Largest number of iterations of the contact solver in a step.
+            max_iterations => solver.max_sweeps;
+            /// Largest amount of work of the contact solver in a step, in the unit of
+            /// `solve_friction_contact` (operations, not time). By default it grows with the
+            /// number of contacts.
+            budget | None => solver.budget;
+            /// Treatment of penetration: "projection" moves overlapping bodies apart, "none"
+            /// leaves them.
+            stabilisation => stabilisation;
+            /// Whether the contact solver starts from the last step's impulses.
+            warm_start => warm_start;
+        }
+    };
 }
 pub(crate) use step_options;
 
-/// Entries of a docstring's section "Args", without a line break at the end.
+/// The last entries of a docstring's section "Args", and the line break after the section.
 macro_rules! documented {
-    ($before:literal; $(
+    ($(
         #[doc = $first:literal] $(#[doc = $more:literal])*
-        $name:ident $(| $none:ident)? => $($place:ident).+;
+        $name:ident $(| $mark:ident)* => $($place:ident).+;
     )+) => {
-        concat!($before $(, "\n    ", stringify!($name), ":", $first $(, "\n       ", $more)*)+)
+        concat!($("    ", stringify!($name), ":", $first $(, "\n       ", $more)*, "\n"),+)
     };
 }
 pub(crate) use documented;
 
-/// The rows of [`TABLE`].
+/// The rows of a table.
 macro_rules! rows {
-    ($($(#[doc = $doc:literal])+ $name:ident $(| $none:ident)? => $($place:ident).+;)+) => {
-        &[$(Row {
+    ($($(#[doc = $doc:literal])+ $name:ident $(| $mark:ident)* => $($place:ident).+;)+) => {
+        &[$($crate::options::OptionRow {
             name: stringify!($name),
-            takes_none: !concat!("", $(stringify!($none))?).is_empty(),
-            place: |step| &mut step.$($place).+,
+            marks: &[$(stringify!($mark)),*],
+            place: |options| &mut options.$($place).+,
         }),+]
     };
 }
 pub(crate) use rows;
 
-/// One option.
-struct Row {
-    name: &'static str,
-    takes_none: bool,
-    place: fn(&mut StepOptions) -> &mut dyn Argument,
+/// One option among options `T`.
+pub struct OptionRow<T> {
+    pub name: &'static str,
+    pub marks: &'static [&'static str],
+    pub place: fn(&mut T) -> &mut dyn Argument,
 }
 
-const TABLE: &[Row] = step_options!(rows);
+impl<T> OptionRow<T> {
+    fn has(&self, mark: &str) -> bool {
+        self.marks.contains(&mark)
+    }
+}
+
+/// Options of a class of simulations.
+pub trait Options: Sized + 'static {
+    /// All of them.
+    const TABLE: &'static [OptionRow<Self>];
+
+    /// The options that hold where none are given.
+    fn usual() -> Self;
+}
+
+impl Options for StepOptions {
+    const TABLE: &'static [OptionRow<Self>] = step_options!(rows);
+
+    fn usual() -> Self {
+        let mut step = Self::default();
+        step.solver.max_sweeps = MAX_ITERATIONS;
+        step
+    }
+}
 
 /// The value of an option.
-trait Argument {
+pub trait Argument {
     /// Takes what was given for the option of this name.
     fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()>;
     /// The value in Python, which is read again as this one.
@@ -195,22 +225,24 @@ macro_rules! argument {
 }
 
 argument!(f64, "float", number);
+argument!(u64, "int", whole);
 argument!(usize, "int", count);
 argument!(bool, "bool", flag);
 argument!(Variant, VARIANTS);
 argument!(Method, SOLVERS);
 argument!(Stabilisation, STABILISATIONS);
+argument!(GrainStabilisation, GRAIN_STABILISATIONS);
 
-impl Argument for Option<u64> {
+impl<T: Argument + Default> Argument for Option<T> {
     fn read(&mut self, given: &Bound<'_, PyAny>, name: &str) -> Result<()> {
-        *self = Some(whole(given, Kind::Option, name)?);
-        Ok(())
+        self.insert(T::default()).read(given, name)
     }
     fn tell(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        (*self).into_py_any(py)
+        self.as_ref()
+            .map_or_else(|| Ok(py.None()), |own| own.tell(py))
     }
     fn python(&self) -> String {
-        "int".to_owned()
+        T::default().python()
     }
 }
 
@@ -228,16 +260,21 @@ impl Argument for Materials {
     }
 }
 
-/// Reads all options that were given by their names.
-pub fn read(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
-    step.solver.max_sweeps = MAX_ITERATIONS;
-    for row in TABLE {
+/// Reads the options that were given by their names.
+pub fn read<T: Options>(options: &mut T, given: &Named<'_>) -> Result<()> {
+    for row in T::TABLE {
         if let Some(value) = given.get(row.name)?.given()
-            && !(value.is_none() && row.takes_none)
+            && !(value.is_none() && row.has("None"))
         {
-            (row.place)(&mut step).read(&value, row.name)?;
+            (row.place)(options).read(&value, row.name)?;
         }
     }
+    Ok(())
+}
+
+/// Reads the options of a machine that were given by their names.
+pub fn read_step(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
+    read(&mut step, given)?;
     step.solver = checked(step.solver)?;
     Ok(step)
 }
@@ -245,16 +282,15 @@ pub fn read(mut step: StepOptions, given: &Named<'_>) -> Result<StepOptions> {
 /// The keyword arguments that make a simulation with these options.
 ///
 /// `gravity`: as the class gives it, a pair or a triple.
-pub fn settings<'py>(
+pub fn settings<'py, T: Options>(
     gravity: &Bound<'py, PyAny>,
-    step: &StepOptions,
+    mut options: T,
 ) -> Result<Bound<'py, PyDict>> {
     let py = gravity.py();
     let settings = PyDict::new(py);
     settings.set_item("gravity", gravity)?;
-    let mut step = step.clone();
-    for row in TABLE {
-        let value = (row.place)(&mut step).tell(py)?;
+    for row in T::TABLE.iter().filter(|row| !row.has("untold")) {
+        let value = (row.place)(&mut options).tell(py)?;
         if !value.is_none(py) {
             settings.set_item(row.name, value)?;
         }
@@ -294,12 +330,11 @@ pub fn literal<T>(choices: &[(&str, T)]) -> String {
 }
 
 /// Name, default and type of each option in Python.
-pub fn described(py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>, String)>> {
-    let mut step = StepOptions::default();
-    step.solver.max_sweeps = MAX_ITERATIONS;
-    let described = TABLE.iter().map(|row| {
-        let value = (row.place)(&mut step);
-        Ok(if row.takes_none {
+pub fn described<T: Options>(py: Python<'_>) -> PyResult<Vec<(&'static str, Py<PyAny>, String)>> {
+    let mut usual = T::usual();
+    let described = T::TABLE.iter().map(|row| {
+        let value = (row.place)(&mut usual);
+        Ok(if row.has("None") {
             (row.name, py.None(), value.python() + " | None")
         } else {
             (row.name, value.tell(py)?, value.python())

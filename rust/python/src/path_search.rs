@@ -1,6 +1,5 @@
 //! `PathSearch`: the cheapest of many paths over a height scan.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_task::paths::search::STEPS;
@@ -10,7 +9,7 @@ use rover_task::paths::{
 };
 
 use crate::arguments::{Named, at_least_one, count, finite, positive, refused};
-use crate::arrays::{Array, array, triple, two, vector};
+use crate::arrays::{Array, array, finite_shaped, shaped, triple, two, vector};
 use crate::errors::{Kind, Result};
 
 /// Beam search for the cheapest path of a rover over a height scan.
@@ -46,17 +45,9 @@ fn rows<const M: usize>(
     kind: Kind,
     field: &str,
 ) -> Result<Vec<[f64; M]>> {
-    let found: PyReadonlyArrayDyn<'_, f64> = array(value, kind, field)?;
-    let view = found.as_array();
-    if view.shape().last() != Some(&M) || !view.iter().all(|entry| entry.is_finite()) {
-        return Err(refused(
-            value,
-            kind,
-            field,
-            &format!("finite, in rows of {M}"),
-        ));
-    }
-    let flat: Vec<f64> = view.iter().copied().collect();
+    let what = format!("(..., {M})");
+    let fits = |shape: &[usize]| shape.last() == Some(&M);
+    let (flat, _) = finite_shaped(value, kind, (field, &what), fits)?;
     Ok(flat.as_chunks::<M>().0.to_vec())
 }
 
@@ -90,17 +81,9 @@ fn arcs(given: &Bound<'_, PyAny>, outer: &'static str) -> Result<Arcs> {
 
 /// Three rows of equal length.
 fn plane_fit(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[Vec<f64>; 3]> {
-    let found = array(value, kind, field)?;
-    let view = found.as_array();
-    let &[3, n] = view.shape() else {
-        return Err(refused(
-            value,
-            kind,
-            field,
-            "3 rows with an entry for each wheel",
-        ));
-    };
-    let flat: Vec<f64> = view.iter().copied().collect();
+    let fits = |shape: &[usize]| matches!(shape, [3, _]);
+    let (flat, shape) = shaped(value, kind, (field, "(3, n_wheels)"), fits)?;
+    let n = shape[1];
     Ok([0, 1, 2].map(|i| flat[i * n..(i + 1) * n].to_vec()))
 }
 
@@ -239,7 +222,7 @@ impl PathSearch {
             traps: poses(traps, Kind::Option, "traps")?,
             retreat: (retreat != 0.0).then_some(retreat),
             extra: match extra {
-                Some(given) => self.extra(given)?,
+                Some(given) => finite_entries(given, self.inner.n_first(), "extra", "costs")?,
                 None => Vec::new(),
             },
             ways: match ways {
@@ -360,37 +343,19 @@ impl PathSearch {
     }
 }
 
+/// `n` finite numbers; `what`: their plural.
+fn finite_entries(given: &Bound<'_, PyAny>, n: usize, field: &str, what: &str) -> Result<Vec<f64>> {
+    let found = vector(given, Kind::Option, field)?;
+    if found.len() == n && found.iter().all(|value| value.is_finite()) {
+        return Ok(found);
+    }
+    let what = format!("{n} finite {what}");
+    Err(refused(given, Kind::Option, field, &what))
+}
+
 impl PathSearch {
     /// A finite number for each point of the scan.
     fn at_points(&self, given: &Bound<'_, PyAny>, field: &str) -> Result<Vec<f64>> {
-        let found: Vec<f64> = match given.extract::<PyReadonlyArray1<'_, f64>>() {
-            Ok(ready) => ready.as_array().to_vec(),
-            Err(_) => vector(given, Kind::Option, field)?,
-        };
-        let n = self.inner.n_heights();
-        if found.len() == n && found.iter().all(|value| value.is_finite()) {
-            return Ok(found);
-        }
-        Err(refused(
-            given,
-            Kind::Option,
-            field,
-            &format!("{n} finite {field}"),
-        ))
-    }
-
-    /// A finite cost an arc.
-    fn extra(&self, given: &Bound<'_, PyAny>) -> Result<Vec<f64>> {
-        let n = self.inner.n_first();
-        let found = vector(given, Kind::Option, "extra")?;
-        if found.len() == n && found.iter().all(|cost| cost.is_finite()) {
-            return Ok(found);
-        }
-        Err(refused(
-            given,
-            Kind::Option,
-            "extra",
-            &format!("{n} finite costs"),
-        ))
+        finite_entries(given, self.inner.n_heights(), field, field)
     }
 }

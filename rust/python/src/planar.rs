@@ -9,10 +9,10 @@ use rover_core::simulation::PlanarSimulation as Core;
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Named, text};
-use crate::arrays::{Array, fresh, fresh_matrix, fresh_rows, vector};
+use crate::arrays::{Array, fresh, fresh_matrix, fresh_rows, two, vector};
 use crate::contacts::PlanarContacts;
-use crate::errors::{BorderError, Kind, Result, Value};
-use crate::options::{self, choice, name_of};
+use crate::errors::{BorderError, Kind, Result};
+use crate::options::{self, Options, choice, name_of};
 use crate::planar_ground::parse;
 use crate::shared::{Open, Shared};
 use crate::stepping::{AnySimulation, Problem, problem};
@@ -27,11 +27,11 @@ pub const RULES: [(&str, ContactRule); 2] = [
 macro_rules! planar_options {
     () => {
         concat!(
-            $crate::options::step_options!(documented
-                "    gravity: Gravity, (2,), m/s²; (0, -9.81) by default."),
-            "\n    contact: \"nearest\", the contact is the point of the ground nearest to the disc's",
-            "\n        centre, or \"centre_height\", the rule of the 2010 report, by which the centre itself",
-            "\n        stops at the ground."
+            "    gravity: Gravity, (2,), m/s²; (0, -9.81) by default.\n",
+            "    contact: \"nearest\", the contact is the point of the ground nearest to the disc's\n",
+            "        centre, or \"centre_height\", the rule of the 2010 report, by which the centre itself\n",
+            "        stops at the ground.\n",
+            $crate::options::step_options!(documented)
         )
     };
 }
@@ -47,17 +47,12 @@ pub struct PlanarSimulation {
 
 /// Two numbers.
 pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<Vector2<f64>> {
-    let values = vector(value, kind, field)?;
-    let [x, y] = values[..] else {
-        let message = format!("{field}: needs 2 entries, has {}", values.len());
-        return Err(kind.error(field, message, Value::Count(values.len())));
-    };
-    Ok(Vector2::new(x, y))
+    Ok(two(value, kind, field)?.into())
 }
 
 /// Reads the options that all planar simulations take.
 fn step_options(given: &Named<'_>) -> Result<(StepOptions, ContactRule)> {
-    let mut step = StepOptions::default();
+    let mut step = StepOptions::usual();
     if let Some(gravity) = given.read("gravity", pair)? {
         step.gravity = gravity.push(0.0);
     }
@@ -65,7 +60,7 @@ fn step_options(given: &Named<'_>) -> Result<(StepOptions, ContactRule)> {
         choice(field, &text(value, kind, field)?, &RULES)
     };
     let rule = given.read("contact", rule)?.unwrap_or(ContactRule::Nearest);
-    Ok((options::read(step, given)?, rule))
+    Ok((options::read_step(step, given)?, rule))
 }
 
 impl PlanarSimulation {
@@ -144,7 +139,7 @@ impl PlanarSimulation {
         let inner = self.open()?;
         let step = inner.options();
         let gravity = (step.gravity.x, step.gravity.y).into_pyobject(py)?;
-        let settings = options::settings(&gravity, step)?;
+        let settings = options::settings(&gravity, step.clone())?;
         settings.set_item("contact", name_of(inner.scene().rule, &RULES))?;
         Ok(settings)
     }
@@ -192,11 +187,8 @@ impl PlanarSimulation {
     fn mass_matrix(&self) -> Result<Array> {
         let inner = self.open()?;
         let nv = inner.v().len();
-        Ok(fresh_matrix(&DMatrix::from_row_slice(
-            nv,
-            nv,
-            &inner.mass_matrix(),
-        )))
+        let M = DMatrix::from_row_slice(nv, nv, &inner.mass_matrix());
+        Ok(fresh_matrix(&M))
     }
 
     /// The friction-contact problem of the last step; if the step was split, of its last part.

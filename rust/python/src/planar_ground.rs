@@ -8,7 +8,7 @@ use rover_core::planar::{
 use rover_core::quantity::QuantityError;
 use std::sync::Arc;
 
-use crate::arguments::{Given, number, refused};
+use crate::arguments::{Given, number, object};
 use crate::arrays::{Array, fresh, vector};
 use crate::errors::{BorderError, Kind, Result, Value};
 
@@ -307,13 +307,7 @@ impl Polyline {
 
 /// The ground in a Python object.
 pub fn parse(given: &Bound<'_, PyAny>) -> Result<Arc<dyn CoreGround>> {
-    match given.cast::<PlanarGround>() {
-        Ok(ground) => Ok(ground.get().0.clone()),
-        Err(_) => Err(refused(
-            given,
-            Kind::Terrain,
-            "ground",
-            "a Line, Sine, Spline or Polyline",
-        )),
-    }
+    let what = "a Line, Sine, Spline or Polyline";
+    let ground = object::<PlanarGround>(given, Kind::Terrain, "ground", what)?;
+    Ok(ground.get().0.clone())
 }

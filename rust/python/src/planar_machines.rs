@@ -7,7 +7,8 @@ use rover_core::nalgebra::Vector2;
 use rover_core::planar::{MirroredRover, PlanarBall, PlanarWheel, TwoWheelRover};
 use std::sync::Arc;
 
-use crate::arguments::{Named, number};
+use crate::arguments::Named;
+use crate::arrays::one_or_two;
 use crate::errors::{Kind, Result};
 use crate::model::RoverModel;
 use crate::planar::{PlanarSimulation, pair, planar_options};
@@ -21,7 +22,6 @@ use crate::planar_ground::border;
 ///     radius: Radius, m.
 ///     inertia: Inertia about the centre, kg m²; the inertia of a homogeneous disc by default.
 #[doc = planar_options!()]
-///
 /// Raises:
 ///     ModelError: `mass`, `radius` or `inertia` is not finite and positive.
 ///     TerrainError: `ground` is not a ground.
@@ -74,7 +74,6 @@ impl BallSimulation {
 ///     axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
 ///         default.
 #[doc = planar_options!()]
-///
 /// Raises:
 ///     ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
 ///     TerrainError: `ground` is not a ground.
@@ -98,14 +97,6 @@ impl TwoWheelRoverSimulation {
         let base = PlanarSimulation::build(rover, ground, parameters, given)?;
         Ok(base.add_subclass(Self))
     }
-}
-
-/// One number for both, or two.
-fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; 2]> {
-    if value.len().is_err() {
-        return Ok([number(value, kind, field)?; 2]);
-    }
-    Ok(pair(value, kind, field)?.into())
 }
 
 /// The rover of these keyword arguments. `parameters` receives all of them, defaults included.
@@ -159,7 +150,6 @@ pub fn two_wheel_rover(given: &Named<'_>, parameters: &Bound<'_, PyDict>) -> Res
 ///     model: The machine: an object, a name of the gallery or a file. It must be symmetric about
 ///         the trunk's x-y plane; the built-in rover by default.
 #[doc = planar_options!()]
-///
 /// Raises:
 ///     ModelError: The model is not symmetric.
 ///     TerrainError: `ground` is not a ground.

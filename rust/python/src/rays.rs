@@ -4,8 +4,8 @@ use pyo3::prelude::*;
 use rover_core::geometry::RayError;
 use rover_core::geometry::ray::{Hit, Ray, check_rays};
 
-use crate::arguments::{Given, shown};
-use crate::arrays::{Array, array, fresh_rows};
+use crate::arguments::Given;
+use crate::arrays::{Array, fresh_rows, shaped};
 use crate::errors::{BorderError, Kind, Result, Value, entry};
 
 /// Distances (n,) and normals (n, 3).
@@ -27,17 +27,10 @@ impl From<RayError> for BorderError {
 
 /// (n, 3) numbers, or (3,) for all rays.
 fn triples(value: &Bound<'_, PyAny>, field: &str) -> Result<(Vec<[f64; 3]>, bool)> {
-    let given = array(value, Kind::Option, field)?;
-    let view = given.as_array();
-    let is_one = view.shape() == [3];
-    if !is_one && (view.ndim() != 2 || view.shape()[1] != 3) {
-        let shape = view.shape();
-        let message = format!("{field}: needs shape (n, 3) or (3,), has {shape:?}");
-        return Err(Kind::Option.error(field, message, Value::Text(shown(value))));
-    }
-    let flat: Vec<f64> = view.iter().copied().collect();
-    let rows = flat.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect();
-    Ok((rows, is_one))
+    let what = (field, "(n, 3) or (3,)");
+    let fits = |shape: &[usize]| matches!(shape, [3] | [_, 3]);
+    let (flat, shape) = shaped(value, Kind::Option, what, fits)?;
+    Ok((flat.as_chunks::<3>().0.to_vec(), shape == [3]))
 }
 
 /// Checked rays, and their range, m.

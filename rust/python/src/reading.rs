@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 use rover_core::simulation::ReadingLayout;
 
-use crate::arrays::{array, two};
+use crate::arrays::{finite_shaped, two};
 use crate::errors::{Kind, Result, Value};
 
 /// Names with their slices.
@@ -27,16 +27,9 @@ pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> Result<Vec<[f64; 2]>> {
 
 /// Finite points (n, 2).
 pub fn points(given: &Bound<'_, PyAny>, field: &str) -> Result<Vec<[f64; 2]>> {
-    let points = array(given, Kind::Option, field)?;
-    let view = points.as_array();
-    let is_finite = view.iter().all(|x| x.is_finite());
-    if view.ndim() != 2 || view.shape()[1] != 2 || !is_finite {
-        let shape = view.shape();
-        let message = format!("{field}: needs finite numbers of shape (n, 2), has {shape:?}");
-        return Err(Kind::Option.error(field, message, Value::Count(view.ndim())));
-    }
-    let flat: Vec<f64> = view.iter().copied().collect();
-    Ok(flat.chunks_exact(2).map(|p| [p[0], p[1]]).collect())
+    let fits = |shape: &[usize]| matches!(shape, [_, 2]);
+    let (flat, _) = finite_shaped(given, Kind::Option, (field, "(n, 2)"), fits)?;
+    Ok(flat.as_chunks::<2>().0.to_vec())
 }
 
 /// A finite place on the map; the origin where nothing is given.

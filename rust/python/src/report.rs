@@ -4,86 +4,134 @@ use pyo3::prelude::*;
 use rover_core::integrator::StepReport as CoreReport;
 use rover_core::multibody::Energy as CoreEnergy;
 
-/// Summary of the time steps of one call: sums or worst values over the steps.
-#[pyclass(module = "rover_gym.core", frozen)]
-pub struct StepReport {
-    inner: CoreReport,
-    /// Whether the steps "converged" or "not_converged".
-    ///
-    /// "converged" means that the contact solver met its tolerance in every step.
-    #[pyo3(get)]
-    status: &'static str,
-    /// Whether the contact solver met its tolerance in every step.
-    #[pyo3(get)]
-    is_converged: bool,
+/// The report of a call of `step`: the fields of the core's, as properties.
+macro_rules! step_report {
+    ($($(#$doc:tt)+ $field:ident: $type:ty;)+) => {
+        /// Summary of the time steps of one call: sums or worst values over the steps.
+        #[pyclass(module = "rover_gym.core", frozen)]
+        pub struct StepReport {
+            inner: CoreReport,
+            undetermined_loads: usize,
+        }
+
+        #[pymethods]
+        impl StepReport {
+            $(
+                $(#$doc)+
+                #[getter]
+                fn $field(&self) -> $type {
+                    self.inner.$field
+                }
+            )+
+
+            /// Whether the steps "converged" or "not_converged".
+            ///
+            /// "converged" means that the contact solver met its tolerance in every step.
+            #[getter]
+            fn status(&self) -> &'static str {
+                if self.is_converged() {
+                    "converged"
+                } else {
+                    "not_converged"
+                }
+            }
+
+            /// Whether the contact solver met its tolerance in every step.
+            #[getter]
+            fn is_converged(&self) -> bool {
+                self.inner.is_converged()
+            }
+
+            /// Number of contacts whose impulses the motion of the last step does not determine.
+            ///
+            /// 0 means that the motion determines the impulses of all contacts. Otherwise other
+            /// impulses cause the same motion, and the step returns those of least norm within the
+            /// cones of friction: four corners of a box share its weight like four equal springs.
+            /// Friction counts: six rigid wheels that drive straight could push sideways against
+            /// each other, so the number is 6. Contacts that yield, such as wheels with a
+            /// `stiffness`, have determined impulses. Always 0 for grains. In a group of more than
+            /// 32 rigid contacts the solver chooses among the impulses.
+            #[getter]
+            fn undetermined_loads(&self) -> usize {
+                self.undetermined_loads
+            }
+
+            /// Combines this report with that of the following steps.
+            ///
+            /// Args:
+            ///     later: Report of the following steps.
+            fn followed_by(&self, later: &Self) -> Self {
+                let mut inner = self.inner;
+                inner.merge(&later.inner);
+                Self::new(inner, later.undetermined_loads)
+            }
+
+            fn __repr__(&self) -> String {
+                let (status, inner) = (self.status(), &self.inner);
+                format!(
+                    "StepReport(status={status:?}, steps={}, iterations={}, residual={:.3e}, \
+                     n_contacts={})",
+                    inner.steps, inner.iterations, inner.residual, inner.n_contacts
+                )
+            }
+        }
+    };
+}
+
+step_report! {
     /// Whether a contact problem stayed unsolved because the solver's `budget` was spent.
     ///
     /// With a larger `budget` it may be solved.
-    #[pyo3(get)]
-    budget_exhausted: bool,
+    budget_exhausted: bool;
     /// Number of steps taken.
-    #[pyo3(get)]
-    steps: usize,
+    steps: usize;
     /// Iterations of the contact solver, summed over the steps.
-    #[pyo3(get)]
-    iterations: usize,
+    iterations: usize;
     /// Newton iterations of the scheme, summed over the steps; 0 with the linearised scheme.
-    #[pyo3(get)]
-    newton_iterations: usize,
+    newton_iterations: usize;
     /// Largest relative residual of a step's contact problem, computed from its impulses.
     ///
     /// If the energy audit slowed a rebound (`restitution` above 0), the residual includes the
     /// difference from Newton's law. `status` describes the solver alone.
-    #[pyo3(get)]
-    residual: f64,
+    residual: f64;
     /// Largest number of contacts in a step.
-    #[pyo3(get)]
-    n_contacts: usize,
+    n_contacts: usize;
     /// Largest number of contacts in a step along whose normal closed loops let nothing move.
     ///
     /// Example: the wheels of a machine that is welded to a stand. Such a contact bears no load,
     /// unless its wheel is elastic, and an overlap there cannot be removed.
-    #[pyo3(get)]
-    immovable_contacts: usize,
+    immovable_contacts: usize;
     /// Widest gap of a closed loop at the end of a step, m or rad; 0 without loops.
     ///
     /// Above 1e-6 the status is "not_converged".
-    #[pyo3(get)]
-    loop_gap: f64,
+    loop_gap: f64;
     /// Number of repeated steps.
     ///
     /// A step is repeated if a motor reached its torque-speed line, if the energy audit requires
     /// implicit gyroscopic terms, or if Newton's law of restitution had no solution.
-    #[pyo3(get)]
-    retaken: usize,
+    retaken: usize;
     /// Number of steps that took more than the usual effort.
     ///
     /// Such a step is taken alone, with every means of solving its contacts, and in halves where
     /// that fails. Always 0 for planar machines, for grains and for the variant "newton", whose
     /// steps all are.
-    #[pyo3(get)]
-    fallbacks: usize,
+    fallbacks: usize;
     /// Largest energy gain of a step beyond the work done on it, relative to the kinetic energy.
-    #[pyo3(get)]
-    energy_gain: f64,
+    energy_gain: f64;
     /// Spurious energy gain of the scheme that the audit removed, summed over the steps, J.
-    #[pyo3(get)]
-    energy_removed: f64,
+    energy_removed: f64;
     /// Work of torques, motors and wrenches, summed over the steps, J.
-    #[pyo3(get)]
-    energy_supplied: f64,
+    energy_supplied: f64;
     /// Energy that commands since the last call have added to held joints, J.
     ///
     /// `Simulation.energy` contains it from the command on, so it is not part of the change over
     /// the call. 0 in the first call after the state was set or restored.
-    #[pyo3(get)]
-    energy_of_set_points: f64,
+    energy_of_set_points: f64;
     /// Energy dissipated by friction, impacts, dampers and sand, summed over the steps, J.
     ///
     /// It can be negative with Newton's law of restitution and friction. A new contact counts as an
     /// impact if it closes faster than gravity explains.
-    #[pyo3(get)]
-    energy_dissipated: f64,
+    energy_dissipated: f64;
     /// Numerical energy loss of the scheme, summed over the steps, J; negative if energy is gained.
     ///
     /// The change of the energy over the call is `energy_supplied` plus `energy_lifted` and
@@ -91,95 +139,27 @@ pub struct StepReport {
     /// `energy_lost` therefore contains the errors of the time stepping and the work of reactions
     /// in persistent contacts. In smooth motion it shrinks with the square of the time step. Always
     /// 0 for grains, whose energy is not audited.
-    #[pyo3(get)]
-    energy_lost: f64,
+    energy_lost: f64;
     /// Work against gravity and springs by removing penetration, summed over the steps, J.
     ///
     /// The work of the actuators on the way is part of `energy_supplied`.
-    #[pyo3(get)]
-    energy_lifted: f64,
+    energy_lifted: f64;
     /// Energy released by elastic wheels, summed over the steps, J; negative if they stored energy.
     ///
     /// Wheels are elastic if the model gives them a `stiffness`. The energy of their springs is
     /// part of neither the kinetic nor the potential energy. It is an account: a step enters what
     /// the wheels took from the machine, up to what their deflections can hold, and the sum over a
     /// run is no more than they held at its start.
-    #[pyo3(get)]
-    energy_released: f64,
-    /// Number of contacts whose impulses the motion of the last step does not determine.
-    ///
-    /// 0 means that the motion determines the impulses of all contacts. Otherwise other impulses
-    /// cause the same motion, and the step returns those of least norm within the cones of
-    /// friction: four corners of a box share its weight like four equal springs. Friction counts:
-    /// six rigid wheels that drive straight could push sideways against each other, so the number
-    /// is 6. Contacts that yield, such as wheels with a `stiffness`, have determined impulses.
-    /// Always 0 for grains. In a group of more than 32 rigid contacts the solver chooses among the
-    /// impulses.
-    #[pyo3(get)]
-    undetermined_loads: usize,
+    energy_released: f64;
 }
 
-impl From<CoreReport> for StepReport {
-    fn from(inner: CoreReport) -> Self {
+impl StepReport {
+    /// The core's report, and the number of contacts whose impulses the motion leaves open.
+    pub fn new(inner: CoreReport, undetermined_loads: usize) -> Self {
         Self {
             inner,
-            status: if inner.is_converged() {
-                "converged"
-            } else {
-                "not_converged"
-            },
-            is_converged: inner.is_converged(),
-            budget_exhausted: inner.budget_exhausted,
-            steps: inner.steps,
-            iterations: inner.iterations,
-            newton_iterations: inner.newton_iterations,
-            residual: inner.residual,
-            n_contacts: inner.n_contacts,
-            immovable_contacts: inner.immovable_contacts,
-            loop_gap: inner.loop_gap,
-            retaken: inner.retaken,
-            fallbacks: inner.fallbacks,
-            energy_gain: inner.energy_gain,
-            energy_removed: inner.energy_removed,
-            energy_supplied: inner.energy_supplied,
-            energy_of_set_points: inner.energy_of_set_points,
-            energy_dissipated: inner.energy_dissipated,
-            energy_lost: inner.energy_lost,
-            energy_lifted: inner.energy_lifted,
-            energy_released: inner.energy_released,
-            undetermined_loads: 0,
-        }
-    }
-}
-
-impl StepReport {
-    /// With the number of contacts whose impulses the motion leaves open.
-    #[must_use]
-    pub fn with_undetermined_loads(self, undetermined_loads: usize) -> Self {
-        Self {
             undetermined_loads,
-            ..self
         }
-    }
-}
-
-#[pymethods]
-impl StepReport {
-    /// Combines this report with that of the following steps.
-    ///
-    /// Args:
-    ///     later: Report of the following steps.
-    fn followed_by(&self, later: &Self) -> Self {
-        let mut inner = self.inner;
-        inner.merge(&later.inner);
-        Self::from(inner).with_undetermined_loads(later.undetermined_loads)
-    }
-
-    fn __repr__(&self) -> String {
-        format!(
-            "StepReport(status={:?}, steps={}, iterations={}, residual={:.3e}, n_contacts={})",
-            self.status, self.steps, self.iterations, self.residual, self.n_contacts
-        )
     }
 }
 
@@ -198,11 +178,10 @@ pub struct Energy {
 
 impl From<CoreEnergy> for Energy {
     fn from(inner: CoreEnergy) -> Self {
-        let total = inner.total();
         Self {
             kinetic: inner.kinetic,
             potential: inner.potential,
-            total,
+            total: inner.total(),
         }
     }
 }

@@ -8,10 +8,9 @@ use rover_core::simulation::{
     AnySnapshot, GrainSimulation as Grains, RoverInGrains, RoverSimulation, TogetherError,
 };
 
-use crate::arguments::{Given, refused};
+use crate::arguments::{Given, object};
 use crate::arrays::Array;
 use crate::balls::GrainSimulation;
-use crate::bed_arguments::grain_error;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::report::{Energy, StepReport};
 use crate::shared::{Open, Release, Shared, Watch};
@@ -23,19 +22,13 @@ impl From<TogetherError> for BorderError {
     fn from(e: TogetherError) -> Self {
         let message = e.to_string();
         match e {
-            TogetherError::Differs { field, grains, .. } => Self {
-                kind: Kind::Option,
-                message,
-                field: Some(field.to_owned()),
-                value: Value::Number(grains),
-            },
-            TogetherError::Overlap { depth, .. } => Self {
-                kind: Kind::State,
-                message,
-                field: Some("position".to_owned()),
-                value: Value::Number(depth),
-            },
-            TogetherError::Friction(e) => grain_error(&e),
+            TogetherError::Differs { field, grains, .. } => {
+                Kind::Option.error(field, message, Value::Number(grains))
+            }
+            TogetherError::Overlap { depth, .. } => {
+                Kind::State.error("position", message, Value::Number(depth))
+            }
+            TogetherError::Friction(e) => e.into(),
         }
     }
 }
@@ -101,7 +94,7 @@ impl Stepped for Together {
         let (moving, mut watch) = (&mut *rover, Watch::new());
         let (link, grains) = (&mut *link, &mut *grains);
         let report = py.release(|| link.step(moving, grains, n, &mut || watch.go_on()))?;
-        Ok(watch.result(report)?.into())
+        Ok(StepReport::new(watch.result(report)?, 0))
     }
 
     fn energy(&self) -> Result<Energy> {
@@ -146,12 +139,9 @@ impl RoverGrainSimulation {
         grains: &Bound<'_, PyAny>,
         wheel_friction: Given<'_>,
     ) -> Result<PyClassInitializer<Self>> {
-        let rover = rover
-            .cast::<Simulation>()
-            .map_err(|_| refused(rover, Kind::Model, "rover", "a Simulation"))?;
-        let grains = grains
-            .cast::<GrainSimulation>()
-            .map_err(|_| refused(grains, Kind::Model, "grains", "a GrainSimulation"))?;
+        let rover = object::<Simulation>(rover, Kind::Model, "rover", "a Simulation")?;
+        let what = "a GrainSimulation";
+        let grains = object::<GrainSimulation>(grains, Kind::Model, "grains", what)?;
         let friction = wheel_friction.number(0.9, Kind::Option, "wheel_friction")?;
         let (moving, bed) = (rover.get().inner.clone(), grains.get().inner.clone());
         let link = RoverInGrains::new(&*moving.open()?, &*bed.open()?, friction)?;

@@ -2,109 +2,53 @@
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
-use rover_core::quantity::{Demand, QuantityError};
+use rover_core::quantity::{self as checks, Demand, QuantityError};
+use rover_core::sand::test_bed::rules_within;
 use rover_core::sand::{
-    Bekker, Flow, Interface, OperatingPoint, Resistive, SandState, SandWheel, Soil, StressLaw,
-    Sunk, TestBed, WheelPerformance,
+    Bekker, OperatingPoint, Resistive, SandState, SandWheel, Soil, StressLaw, Sunk, TestBed,
+    WheelInSand, WheelPerformance,
 };
 
-use crate::arguments::{Given, number, refused, whole};
+use crate::arguments::{Given, number, refused};
 use crate::arrays::{Array, fresh, fresh_rows, rows};
-use crate::errors::{BorderError, Kind};
+use crate::errors::{Kind, Result, Value};
 use crate::planar_ground::quantity;
 use crate::shared::Release;
 
-/// Numbers of a soil by their names.
-struct Numbers<'py>(Bound<'py, PyMapping>);
+/// Numbers of a soil that are 0 where they are missing.
+const OPTIONAL: [&str; 3] = ["stress_angle", "stress_angle_slip", "slip_sinkage"];
 
-impl<'py> Numbers<'py> {
-    /// Numbers from a mapping, or from an object whose attribute `numbers` is one.
-    fn of(soil: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let numbers = match soil.getattr("numbers") {
-            Ok(numbers) => numbers,
-            Err(_) => soil.clone(),
-        };
-        let mapping = numbers.cast_into::<PyMapping>().map_err(|_| {
-            refused(
-                soil,
-                Kind::Terrain,
-                "soil",
-                "a Soil or a mapping of its numbers",
-            )
-        })?;
-        Ok(Self(mapping))
-    }
-
-    fn get(&self, name: &str) -> PyResult<f64> {
-        let value = self.0.get_item(name).map_err(|_| BorderError {
-            kind: Kind::Terrain,
-            message: format!("soil: has no {name}"),
-            field: Some("soil".to_owned()),
-            value: crate::errors::Value::Text(name.to_owned()),
-        })?;
-        Ok(number(&value, Kind::Terrain, name)?)
-    }
-
-    /// A number that may be missing.
-    fn or_zero(&self, name: &str) -> PyResult<f64> {
-        if self.0.contains(name)? {
-            self.get(name)
+/// A soil from a mapping of its numbers, or from an object whose attribute `numbers` is one.
+pub fn soil_of(given: &Bound<'_, PyAny>) -> Result<Soil> {
+    let what = "a Soil or a mapping of its numbers";
+    let wrong = |_| refused(given, Kind::Terrain, "soil", what);
+    let numbers = given.getattr("numbers").unwrap_or_else(|_| given.clone());
+    let numbers = numbers.cast_into::<PyMapping>().map_err(wrong)?;
+    let mut soil = Soil {
+        law: if numbers.contains("frictional_modulus")? {
+            StressLaw::Bekker(Bekker::default())
         } else {
-            Ok(0.0)
+            StressLaw::Resistive(Resistive::default())
+        },
+        memory: 0.0,
+        reload: 0.0,
+    };
+    for (name, own) in soil.numbers_mut() {
+        if OPTIONAL.contains(&name) && !numbers.contains(name)? {
+            continue;
         }
+        let value = numbers.get_item(name).map_err(|_| {
+            let message = format!("soil: has no {name}");
+            Kind::Terrain.error("soil", message, Value::Text(name.to_owned()))
+        })?;
+        *own = number(&value, Kind::Terrain, name)?;
     }
-
-    fn interface(&self, name: &str) -> PyResult<Interface> {
-        Ok(Interface {
-            friction: self.get(&format!("{name}_friction"))?,
-            follow: self.get(&format!("{name}_follow"))?,
-        })
-    }
-}
-
-/// A soil from Python.
-pub fn soil_of(given: &Bound<'_, PyAny>) -> PyResult<Soil> {
-    let numbers = Numbers::of(given)?;
-    let law = if numbers.0.contains("frictional_modulus")? {
-        StressLaw::Bekker(Bekker {
-            cohesive_modulus: numbers.get("cohesive_modulus")?,
-            frictional_modulus: numbers.get("frictional_modulus")?,
-            exponent: numbers.get("exponent")?,
-            cohesion: numbers.get("cohesion")?,
-            internal_friction: numbers.get("internal_friction")?,
-            shear_modulus: numbers.get("shear_modulus")?,
-            stress_angle: numbers.or_zero("stress_angle")?,
-            stress_angle_slip: numbers.or_zero("stress_angle_slip")?,
-            slip_sinkage: numbers.or_zero("slip_sinkage")?,
-        })
-    } else {
-        StressLaw::Resistive(Resistive {
-            density: numbers.get("density")?,
-            internal_friction: numbers.get("internal_friction")?,
-            stiffness_factor: numbers.get("stiffness_factor")?,
-            tread: numbers.interface("tread")?,
-            wall: numbers.interface("wall")?,
-            grousers: numbers.interface("grouser")?,
-            flow: Flow {
-                dilatancy: numbers.get("dilatancy")?,
-                grip: numbers.get("grip")?,
-                width: numbers.get("grip_width")?,
-                fluidity: numbers.get("fluidity")?,
-                mobilisation: numbers.get("mobilisation")?,
-            },
-        })
-    };
-    let soil = Soil {
-        law,
-        memory: numbers.get("memory")?,
-        reload: numbers.get("reload")?,
-    };
     soil.check().map_err(|e| quantity(Kind::Terrain, &e))?;
     Ok(soil)
 }
 
 /// Numbers of a soil by their names.
-pub fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> PyResult<Bound<'py, PyDict>> {
+pub fn numbers_of<'py>(py: Python<'py>, soil: &Soil) -> Result<Bound<'py, PyDict>> {
     let numbers = PyDict::new(py);
     for (name, value) in soil.clone().numbers_mut() {
         numbers.set_item(name, *value)?;
@@ -118,25 +62,20 @@ pub fn sand_to_dict<'py>(
     sand: &SandState,
     slip: &[f64],
     cell: f64,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> Result<Bound<'py, PyDict>> {
     let found = PyDict::new(py);
-    let of = |value: fn(&rover_core::sand::WheelInSand) -> f64| -> Vec<f64> {
-        sand.wheels.iter().map(value).collect()
-    };
-    let forces: Vec<[f64; 3]> = sand.wheels.iter().map(|wheel| wheel.force).collect();
-    let moments: Vec<[f64; 3]> = sand.wheels.iter().map(|wheel| wheel.moment).collect();
+    let of = |value: fn(&WheelInSand) -> f64| sand.wheels.iter().map(value).collect::<Array>();
+    let forces = sand.wheels.iter().map(|wheel| wheel.force);
+    let moments = sand.wheels.iter().map(|wheel| wheel.moment);
     found.set_item("force", fresh_rows(forces))?;
     found.set_item("moment", fresh_rows(moments))?;
-    found.set_item("sinkage", fresh(&of(|wheel| wheel.sinkage)))?;
-    found.set_item("absorbed", fresh(&of(|wheel| wheel.absorbed)))?;
+    found.set_item("sinkage", of(|wheel| wheel.sinkage))?;
+    found.set_item("absorbed", of(|wheel| wheel.absorbed))?;
     found.set_item("slip", fresh(slip))?;
-    let ruts = sand.ruts.cells().into_iter();
-    let ruts: Vec<[f64; 3]> = ruts
-        .map(|(i, k, depth)| {
-            let place = |index| (f64::from(index) + 0.5) * cell;
-            [place(i), place(k), depth]
-        })
-        .collect();
+    let ruts = sand.ruts.cells().into_iter().map(|(i, k, depth)| {
+        let place = |index| (f64::from(index) + 0.5) * cell;
+        [place(i), place(k), depth]
+    });
     found.set_item("ruts", fresh_rows(ruts))?;
     Ok(found)
 }
@@ -182,6 +121,12 @@ fn listed(found: WheelPerformance) -> [f64; 5] {
     [sinkage, drawbar, lateral, lift, torque]
 }
 
+/// A number above 0.
+fn positive(given: &Bound<'_, PyAny>, field: &str) -> Result<f64> {
+    let value = number(given, Kind::Option, field)?;
+    checks::positive(field, value).map_err(|e| quantity(Kind::Option, &e))
+}
+
 #[pymethods]
 impl WheelBed {
     #[new]
@@ -197,40 +142,33 @@ impl WheelBed {
         grouser_height: Given<'_>,
         grousers: Given<'_>,
         accuracy: Given<'_>,
-    ) -> PyResult<Self> {
+    ) -> Result<Self> {
         let soil = soil_of(soil)?;
-        let positive = |value: f64, field: &str| {
-            let checked = rover_core::quantity::positive(field, value);
-            checked.map_err(|e| quantity(Kind::Option, &e))
-        };
-        let grousers = match grousers.given() {
-            Some(n) => whole(&n, Kind::Option, "grousers")?,
-            None => 0,
-        };
+        let grousers = grousers.whole(0, Kind::Option, "grousers")?;
         let wheel = SandWheel {
-            radius: positive(number(radius, Kind::Option, "radius")?, "radius")?,
-            width: positive(number(width, Kind::Option, "width")?, "width")?,
+            radius: positive(radius, "radius")?,
+            width: positive(width, "width")?,
             rounding: rounding.number(0.0, Kind::Option, "rounding")?,
             grouser_height: grouser_height.number(0.0, Kind::Option, "grouser_height")?,
             grousers: u32::try_from(grousers).unwrap_or(u32::MAX),
         };
-        let most = 0.5 * wheel.width;
+        let (most, half) = (wheel.radius, 0.5 * wheel.width);
         for (field, value, range, high) in [
-            ("rounding", wheel.rounding, "from 0 to half the width", most),
+            ("rounding", wheel.rounding, "from 0 to half the width", half),
             (
                 "grouser_height",
                 wheel.grouser_height,
                 "from 0 to the radius",
-                wheel.radius,
+                most,
             ),
         ] {
             if !(0.0..=high).contains(&value) {
                 let error = QuantityError::new(field, Demand::Within(range), value);
-                return Err(quantity(Kind::Option, &error).into());
+                return Err(quantity(Kind::Option, &error));
             }
         }
         let accuracy = accuracy.number(0.002, Kind::Option, "accuracy")?;
-        let rules = rover_core::sand::test_bed::rules_within(&wheel, &soil, accuracy);
+        let rules = rules_within(&wheel, &soil, accuracy);
         Ok(Self {
             bed: TestBed { wheel, soil, rules },
         })
@@ -260,7 +198,7 @@ impl WheelBed {
     ///
     /// Raises:
     ///     OptionError: `drives` has a wrong shape or an entry that is not finite.
-    fn steady(&self, py: Python<'_>, drives: &Bound<'_, PyAny>) -> PyResult<Array> {
+    fn steady(&self, py: Python<'_>, drives: &Bound<'_, PyAny>) -> Result<Array> {
         let drives = rows::<5>(drives, "drives")?;
         let found = py.release(|| {
             let runs = drives
@@ -283,7 +221,7 @@ impl WheelBed {
     ///
     /// Raises:
     ///     OptionError: An argument has a wrong shape or is not finite.
-    fn forces(&self, sinkage: &Bound<'_, PyAny>, drives: &Bound<'_, PyAny>) -> PyResult<Array> {
+    fn forces(&self, sinkage: &Bound<'_, PyAny>, drives: &Bound<'_, PyAny>) -> Result<Array> {
         let sinkage = number(sinkage, Kind::Option, "sinkage")?;
         let drives = rows::<5>(drives, "drives")?;
         let found = drives
@@ -309,13 +247,8 @@ impl WheelBed {
         drives: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
         time_step: &Bound<'_, PyAny>,
-    ) -> PyResult<Array> {
+    ) -> Result<Array> {
         let drives = rows::<5>(drives, "drives")?;
-        let positive = |given: &Bound<'_, PyAny>, field: &str| {
-            let value = number(given, Kind::Option, field)?;
-            let checked = rover_core::quantity::positive(field, value);
-            checked.map_err(|e| PyErr::from(quantity(Kind::Option, &e)))
-        };
         let (mass, h) = (positive(mass, "mass")?, positive(time_step, "time_step")?);
         let mut state = Sunk::default();
         let found = drives.iter().map(|drive| {

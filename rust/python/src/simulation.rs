@@ -12,18 +12,19 @@ use rover_core::simulation::{
     ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation as CoreSimulation,
     TrajectoryBatch, state_size, with_sand,
 };
-use rover_core::solver::SolverOptions;
 use rover_task::draw::DrawnGround;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, Named, at_least_one, number, text, texts};
-use crate::arrays::{Array, at_most, fresh, fresh_matrix, fresh_rows, shaped, triple, vector};
+use crate::arguments::{self, Given, Named, number, text, texts};
+use crate::arrays::{
+    Array, at_most, finite_shaped, fresh, fresh_matrix, fresh_rows, triple, vector,
+};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Result, Value};
 use crate::linearisation::{Linearisation, StepDerivatives, named_parameters, of_trajectory};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
-use crate::options::{self, step_options};
+use crate::options::{self, Options, step_options};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::sand::sand_to_dict;
@@ -40,12 +41,11 @@ use crate::{terrain, union};
 ///     model: The machine, a name of the gallery, or a file; the built-in rover by default.
 ///     terrain: A terrain, the file of a map or a mesh, or a list of several; flat ground at height
 ///         0 by default.
-#[doc = step_options!(documented
-    "    gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.")]
+///     gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
 ///     accuracy: Chooses `time_step`, `variant` and `tolerance` by `accuracy_options`: "fast",
 ///         "balanced", "reference", or the allowed error on a path of 20 m on flat ground, m. These
 ///         three options cannot be given beside it.
-///
+#[doc = step_options!(documented)]
 /// Raises:
 ///     ModelError: `model` is none of these, or its file does not contain a model.
 ///     TerrainError: `terrain` is none of these, or its file is damaged.
@@ -131,17 +131,11 @@ impl Simulation {
             Some(given) => terrain::parse(given)?,
         };
         let chosen = accuracy::chosen(&given)?;
-        let usual = StepOptions {
-            gravity: checked_gravity(given.some("gravity")?.as_ref())?,
-            time_step: chosen.time_step,
-            variant: chosen.variant,
-            solver: SolverOptions {
-                tolerance: chosen.tolerance,
-                ..SolverOptions::default()
-            },
-            ..StepOptions::default()
-        };
-        let options = options::read(usual, &given)?;
+        let mut step = StepOptions::usual();
+        step.gravity = checked_gravity(given.some("gravity")?.as_ref())?;
+        (step.time_step, step.variant) = (chosen.time_step, chosen.variant);
+        step.solver.tolerance = chosen.tolerance;
+        let options = options::read_step(step, &given)?;
         given.finish()?;
         let inner = CoreSimulation::new(model, terrain.terrain(), options)?;
         Ok(Self::of(inner, terrain))
@@ -220,7 +214,7 @@ impl Simulation {
     fn settings<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let gravity = &self.options.gravity;
         let gravity = (gravity.x, gravity.y, gravity.z).into_pyobject(py)?;
-        options::settings(&gravity, &self.options)
+        options::settings(&gravity, self.options.clone())
     }
 
     /// Number of rovers that a batch steps together in one SIMD register of this computer.
@@ -252,12 +246,8 @@ impl Simulation {
     /// Rotation matrix R_WB, (3, 3), from the trunk's frame to the world frame.
     #[getter]
     fn rotation(&self) -> Result<Array> {
-        let R = self
-            .open()?
-            .state()
-            .configuration
-            .attitude
-            .to_rotation_matrix();
+        let held = self.open()?;
+        let R = held.state().configuration.attitude.to_rotation_matrix();
         let R = DMatrix::from_iterator(3, 3, R.matrix().iter().copied());
         Ok(fresh_matrix(&R))
     }
@@ -503,12 +493,8 @@ impl Simulation {
     /// Gap of each wheel now, (n_wheels,), m, positive when apart.
     #[getter]
     fn wheel_gaps(&self) -> Result<Array> {
-        Ok(self
-            .open()?
-            .wheel_contacts()
-            .iter()
-            .map(|c| c.gap)
-            .collect())
+        let contacts = self.open()?.wheel_contacts();
+        Ok(contacts.iter().map(|c| c.gap).collect())
     }
 
     /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
@@ -784,22 +770,21 @@ impl Simulation {
         let held = self.open()?;
         let inner = &*held;
         let (nx, nu) = (state_size(inner), 2 * self.model.wheels().len());
-        let (mut states, shape) = shaped(states, Kind::State, ("states", "(n, nx)"), |s| {
+        let (mut states, shape) = finite_shaped(states, Kind::State, ("states", "(n, nx)"), |s| {
             s.len() == 2 && (s[1] == nx || s[1] == 2 * self.model.nv())
         })?;
         let n = shape[0];
         if shape[1] < nx {
             states = with_sand(inner, &states);
         }
-        let (commands, shape) = shaped(
+        let (commands, shape) = finite_shaped(
             commands,
             Kind::Command,
             ("commands", "(n, steps, nu)"),
             |s| s.len() == 3 && s[0] == n && s[2] == nu,
         )?;
-        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        let threads = threads.transpose()?.unwrap_or_else(cores);
+        let threads = arguments::threads(threads)?.unwrap_or_else(cores);
         let parameters = named_parameters(inner, parameters)?;
         let mut watch = Watch::new();
         let batch = TrajectoryBatch {

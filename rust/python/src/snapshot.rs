@@ -73,8 +73,7 @@ pub fn other_kind() -> BorderError {
 
 /// The argument `snapshot`.
 pub fn snapshot<'a, 'py>(given: &'a Bound<'py, PyAny>) -> Result<&'a Bound<'py, Snapshot>> {
-    let found = given.cast::<Snapshot>();
-    found.map_err(|_| arguments::refused(given, Kind::State, "snapshot", "a Snapshot"))
+    arguments::object(given, Kind::State, "snapshot", "a Snapshot")
 }
 
 /// Bytes of a snapshot or an episode that cannot be read.

@@ -7,8 +7,8 @@ use pyo3::types::PyDict;
 use rover_core::geometry::SoftGround as CoreGround;
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Given, refused};
-use crate::errors::Kind;
+use crate::arguments::{Given, object};
+use crate::errors::{Kind, Result};
 use crate::planar_ground::quantity;
 use crate::sand::{numbers_of, soil_of};
 use crate::terrain::Terrain;
@@ -53,15 +53,10 @@ impl SoftGround {
         surface: &Bound<'_, PyAny>,
         soil: &Bound<'_, PyAny>,
         rut_cell: Given<'_>,
-    ) -> PyResult<PyClassInitializer<Self>> {
+    ) -> Result<PyClassInitializer<Self>> {
         let what = "a Plane, HeightField or TriangleMesh";
-        let refuse = |_| refused(surface, Kind::Terrain, "surface", what);
-        let drawn = surface
-            .cast::<Terrain>()
-            .map_err(refuse)?
-            .get()
-            .ground
-            .clone();
+        let drawn = object::<Terrain>(surface, Kind::Terrain, "surface", what)?;
+        let drawn = drawn.get().ground.clone();
         let cell = rut_cell.number(0.02, Kind::Terrain, "rut_cell")?;
         let made = CoreGround::new(drawn.terrain(), Arc::new(soil_of(soil)?), cell);
         let made = made.map_err(|e| quantity(Kind::Terrain, &e))?;
@@ -77,7 +72,7 @@ impl SoftGround {
 
     /// Numbers of the soil by their names.
     #[getter]
-    fn soil<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn soil<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         numbers_of(py, self.inner.soil())
     }
 
@@ -87,11 +82,7 @@ impl SoftGround {
         self.inner.cell()
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let py = slf.py();
-        let own = slf.get();
-        let arguments = (own.surface(py), own.soil(py)?, own.rut_cell());
-        let arguments = arguments.into_pyobject(py)?.into_any();
-        Ok((slf.get_type().into_any(), arguments))
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> Result<(Py<PyAny>, Bound<'py, PyDict>, f64)> {
+        Ok((self.surface(py), self.soil(py)?, self.rut_cell()))
     }
 }

@@ -9,7 +9,7 @@ use rover_core::geometry::{
 };
 use rover_task::draw::DrawnGround;
 
-use crate::arguments::{Given, Named, number, refused, whole};
+use crate::arguments::{Given, Named, number, object, refused, whole};
 use crate::arrays::{Array, fresh_rows, one_or_two, rows, vector};
 use crate::errors::{Kind, Result};
 use crate::materials;
@@ -19,11 +19,8 @@ use crate::terrain::{Terrain, parse};
 
 /// A plane, or none.
 fn plane(given: Option<&Bound<'_, PyAny>>) -> Result<Option<CorePlane>> {
-    let read = |given: &Bound<'_, PyAny>| match given.cast::<Plane>() {
-        Ok(plane) => Ok(plane.get().inner),
-        Err(_) => Err(refused(given, Kind::Terrain, "ground", "a Plane")),
-    };
-    given.map(read).transpose()
+    let read = |given| object::<Plane>(given, Kind::Terrain, "ground", "a Plane");
+    Ok(given.map(read).transpose()?.map(|plane| plane.get().inner))
 }
 
 /// Fixed spheres, with or without a plane under them. Immutable.

@@ -7,7 +7,7 @@ use rover_core::integrator::{Local, UnilateralContact};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{AnySnapshot, DenseOperator, Scene, Simulation};
 
-use crate::arguments::count;
+use crate::arguments::Given;
 use crate::arrays::{Array, fresh, fresh_matrix};
 use crate::errors::{Kind, Result};
 use crate::report::{Energy, StepReport};
@@ -50,8 +50,8 @@ where
         let mut held = self.open()?;
         let (inner, mut watch) = (&mut *held, Watch::new());
         let done = py.release(|| inner.step_while(n, &mut || watch.go_on()))?;
-        let report = StepReport::from(watch.result(done)?);
-        Ok(report.with_undetermined_loads(S::undetermined_loads(&held)))
+        let report = watch.result(done)?;
+        Ok(StepReport::new(report, S::undetermined_loads(&held)))
     }
 
     fn energy(&self) -> Result<Energy> {
@@ -110,9 +110,9 @@ impl AnySimulation {
     /// Raises:
     ///     StepError: A step failed. The state is the one before that step.
     ///     OptionError: `n` is not a whole number from 0.
-    #[pyo3(signature = (n = Steps(1)), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Steps) -> Result<StepReport> {
-        self.0.step(py, n.0)
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Given<'_>) -> Result<StepReport> {
+        self.0.step(py, n.count(1, Kind::Option, "n")?)
     }
 
     /// Kinetic and potential energy now.
@@ -135,17 +135,6 @@ impl AnySimulation {
     ///         other grains. Nothing has changed.
     pub fn restore(&self, snapshot: &Bound<'_, PyAny>) -> Result<()> {
         self.0.restore(&self::snapshot(snapshot)?.get().0)
-    }
-}
-
-/// The argument `n` of `step`: a number of steps.
-struct Steps(usize);
-
-impl FromPyObject<'_, '_> for Steps {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
-        Ok(Self(count(&given, Kind::Option, "n")?))
     }
 }
 

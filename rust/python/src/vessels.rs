@@ -58,12 +58,7 @@ impl Drum {
     }
 
     fn __repr__(&self) -> String {
-        let Self {
-            radius,
-            length,
-            rate,
-            ..
-        } = self;
+        let (radius, length, rate) = (self.radius, self.length, self.rate);
         format!("Drum(radius={radius}, length={length}, rate={rate})")
     }
 }
@@ -120,16 +115,12 @@ impl Silo {
             let message = format!("hole: must be 0 without a floor, is {hole}");
             return Err(KIND.error("hole", message, Value::Number(hole)));
         }
-        let axis = axis
-            .map(|a| two(a, KIND, "axis"))
-            .transpose()?
-            .unwrap_or_default()
-            .into();
+        let axis = axis.map(|a| two(a, KIND, "axis")).transpose()?;
         let made = Self {
             radius,
             floor,
             hole,
-            axis,
+            axis: axis.unwrap_or_default().into(),
         };
         made.inner()?;
         Ok(made)

@@ -166,7 +166,7 @@ class RoverVecEnv(VecEnv):
             self._begin(self.batch.draw(waiting))
         with nullcontext() if self._sensed is None else self._sensed.sampling():
             stepped, finals = self.batch.step_on(self._actions, same_step=True, has_scan=self.has_scan)
-        observation, earned, terminated, timed_out, ended = stepped
+        observation, earned, terminated, timed_out, _ = stepped
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
         for i, (seen, last) in finals.items():
@@ -176,7 +176,7 @@ class RoverVecEnv(VecEnv):
                 last["terminal_observation"] = with_readings(seen, self._sensed.readings_of(i))
             infos[i] = last
         if not self.batch.over:
-            self._tell_resets(ended)
+            self._tell_resets(np.flatnonzero(dones).tolist())
         # Only a rover that flies off at 1e37 m/s earns a reward out of float32's range.
         most = float(np.finfo(np.float32).max)
         reward = np.clip(earned, -most, most).astype(np.float32)

@@ -150,12 +150,10 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             if over := self.batch.over:
                 check_actions(actions, (self.num_envs, self.batch.task.n_actions))
                 raise ResetNeeded(f"rovers {over}: call reset() with reset_mask first")
-            observation, reward, terminated, truncated, _ = self.batch.step(actions)
-            return observation, reward, terminated, truncated, self.batch.infos()
+            return self.batch.step(actions, info="all")
         same_step = mode == AutoresetMode.SAME_STEP
-        stepped, finals = self.batch.step_on(actions, same_step=same_step)
-        observation, reward, terminated, truncated, _ = stepped
-        infos = self.batch.infos()
+        stepped, finals = self.batch.step_on(actions, same_step=same_step, info="all")
+        observation, reward, terminated, truncated, infos = stepped
         for i, (last, info) in finals.items():
             infos = self._add_info(infos, {"final_obs": last, "final_info": info}, i)
         return observation, reward, terminated, truncated, infos

@@ -124,11 +124,11 @@ def bed_width(count: int, layers: int, radius_max: float) -> float:
     return -(-count // layers) * 2.0 * radius_max * 1.004
 
 
-def step_count(field: str, duration: float, time_step: float) -> int:
+def step_count(field: str, duration: float, time_step: float, most: int = MOST_STEPS) -> int:
     """Number of steps in a time; raises an OptionError that names `field` above the step limit."""
     steps = duration / time_step
-    if not steps <= MOST_STEPS:
-        refuse(OptionError, field, duration, f"must take at most {MOST_STEPS} steps of {time_step:g} s")
+    if not steps <= most:
+        refuse(OptionError, field, duration, f"must take at most {most} steps of {time_step:g} s")
     return round(steps)
 
 

@@ -26,7 +26,7 @@ use friction_contact::scalar::elementary::{exp_m1, ln};
 use friction_contact::scalar::{Lane, LaneMask};
 
 /// A soil in the model of Bekker, Janosi and Hanamoto.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bekker {
     /// k_c, N/m^(n+1).
     pub cohesive_modulus: f64,

@@ -53,7 +53,7 @@ const CUBICS: [[f64; 20]; 3] = [
 ];
 
 /// How sand meets one kind of surface: bare metal, or sand held between grousers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Interface {
     /// μ_s, largest ratio of the stress along the surface to that along its normal.
     pub friction: f64,
@@ -73,7 +73,7 @@ impl Interface {
 }
 
 /// Properties of the sand that the law uses, beyond ξ.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Flow {
     /// ψ, dilatancy.
     pub dilatancy: f64,

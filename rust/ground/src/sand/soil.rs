@@ -29,7 +29,7 @@ pub enum StressLaw {
 }
 
 /// Sand in resistive force theory.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Resistive {
     /// ρ, kg/m³.
     pub density: f64,

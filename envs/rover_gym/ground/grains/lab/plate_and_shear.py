@@ -25,14 +25,15 @@ each other; a dragged plate would push a heap before it, whose resistance is no 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rover_gym.core import OptionError
+from rover_gym.core import GrainSimulation, OptionError
 from rover_gym.core.validation import checked, number, refuse, whole
-from rover_gym.ground.grains.ball_bed import BallBed
+from rover_gym.ground.grains.ball_bed import Array, BallBed
 from rover_gym.ground.grains.lab.rig import (
     Rig,
     check_room,
@@ -105,9 +106,7 @@ def plate_test(
     top = clear_height(bed, 0.5 * bed.width, 0.5 * bed.depth, radius)
     way = top - surface + depth
     grains = ground(bed, **options)
-    steps = step_count("depth", way / speed, grains.time_step)
-    if steps < samples:
-        refuse(OptionError, "samples", samples, f"must be at most {steps}, the number of steps")
+    steps = _steps("depth", way / speed, grains, samples)
     mass = float(bed.mass.sum())  # any: the press is driven
     machine = describe_disc(bed, radius, max(way, largest), mass)
     rig = Rig(bed, machine, {"press": top}, tool_friction=friction, **options)
@@ -116,12 +115,7 @@ def plate_test(
         place = top - speed * (k + 1) * rig.time_step
         force, moment = rig.step({"press": place, "disc": 0.0})
         rows[k] = surface - rig.place("press"), force[1] / (np.pi * radius**2), moment[1]
-    points = []
-    for stretch in np.array_split(rows, samples):
-        middle, pressure, torque = stretch.mean(axis=0)
-        error = float(stretch[:, 1].std() / np.sqrt(len(stretch)))
-        points.append(PlatePoint(float(middle), float(pressure), error, float(torque)))
-    return points
+    return [PlatePoint(*means) for means in _stretches(rows, samples)]
 
 
 @dataclass(frozen=True)
@@ -186,9 +180,7 @@ def shear_test(
     if surface < 2.0 * largest:
         refuse(OptionError, "bed", surface, f"must be at least two of the largest balls high, {2.0 * largest:.3g} m")
     grains = ground(bed, **options)
-    steps = step_count("displacement", displacement / speed, grains.time_step)
-    if steps < samples:
-        refuse(OptionError, "samples", samples, f"must be at most {steps}, the number of steps")
+    steps = _steps("displacement", displacement / speed, grains, samples)
     area = np.pi * radius**2
     load = sigma * area
     machine = describe_disc(bed, radius, surface, load / fall(grains), vanes=vanes, vane_height=0.5 * largest)
@@ -201,9 +193,19 @@ def shear_test(
         angle = speed * (k + 1) * rig.time_step / arm
         force, moment = rig.step({"disc": angle})
         rows[k] = arm * angle, -moment[1] / (area * arm), force[1] / area, surface - rig.place("press")
-    points = []
+    return [ShearPoint(*means) for means in _stretches(rows, samples)]
+
+
+def _stretches(rows: Array, samples: int) -> Iterator[list[float]]:
+    """Means of the columns over equal stretches, with the standard error of the second after it."""
     for stretch in np.array_split(rows, samples):
-        middle, stress, pressure, sinkage = (float(mean) for mean in stretch.mean(axis=0))
-        error = float(stretch[:, 1].std() / np.sqrt(len(stretch)))
-        points.append(ShearPoint(middle, stress, error, pressure, sinkage))
-    return points
+        middle, measured, *others = stretch.mean(axis=0).tolist()
+        yield [middle, measured, float(stretch[:, 1].std() / np.sqrt(len(stretch))), *others]
+
+
+def _steps(field: str, duration: float, grains: GrainSimulation, samples: int) -> int:
+    """Number of steps in a time, at least as many as samples."""
+    steps = step_count(field, duration, grains.time_step)
+    if steps < samples:
+        refuse(OptionError, "samples", samples, f"must be at most {steps}, the number of steps")
+    return steps

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from rover_gym.core import GrainSimulation, OptionError, Plane, RoverGrainSimulation, RoverModel, Simulation
 from rover_gym.core.files import written_whole
 from rover_gym.core.validation import checked, number, refuse
+from rover_gym.ground.grains import disk_bed
 from rover_gym.ground.grains.ball_bed import BallBed
 
 if TYPE_CHECKING:
@@ -142,10 +143,7 @@ def fall(grains: GrainSimulation) -> float:
 
 def step_count(field: str, duration: float, time_step: float) -> int:
     """Number of steps in a time, at least one; raises an OptionError naming `field` above the limit."""
-    steps = duration / time_step
-    if not steps <= MOST_STEPS:
-        refuse(OptionError, field, duration, f"must take at most {MOST_STEPS} steps of {time_step:g} s")
-    return max(1, round(steps))
+    return max(1, disk_bed.step_count(field, duration, time_step, MOST_STEPS))
 
 
 def larger_than_grains(field: str, value: object, bed: BallBed) -> float:
