@@ -18,7 +18,7 @@ from pages import held
 from rover_gym import Plane, RoverModel, SphereField
 from rover_gym.core.rotations import axis_angles, continuous, quaternions
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
-from rover_gym.record.rover_run import moving_mean
+from rover_gym.record.run import moving_mean
 from rover_gym.show.figures import draw_run
 from rover_gym.show.frames.appearance import rover_parts, sphere_mesh
 from rover_gym.show.replay import write_gltf, write_page, write_vrml

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from rover_gym.record.rover_run import Run
+    from rover_gym.record.run import Run
 
     Sheet: TypeAlias = Figure | SubFigure
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import PlanarGround, Polyline, RoverModel
-from rover_gym.record.rover_run import moving_mean
+from rover_gym.record.run import moving_mean
 from rover_gym.show.frames.appearance import (
     AXLE_COLOUR,
     GROUND_COLOUR,
