@@ -14,6 +14,7 @@ holds the rover on a slope.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,12 +26,15 @@ from rover_gym.core import OptionError, atan2, sin_cos
 from rover_gym.core.validation import number, refuse
 from rover_gym.drive.pd_policy import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.drive.regulator import WheelRegulator
+from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
-
-Array = npt.NDArray[np.float64]
 
 #: Entries of a command: speed, curvature, sideways.
 N_COMMANDS = 3
+
+#: Applies actions to rovers `(n,)`, of which some are active, with or without the height scan. Returns observations,
+#: rewards, and which episodes have ended or reached their time limit.
+Step = Callable[[Observations, Mask, bool], tuple[Observations, Array, Mask, Mask]]
 
 
 def command_space() -> "gym.spaces.Box[np.float32]":
@@ -121,6 +125,37 @@ class CommandController:
         if self._steered_wheels:
             actions[:, self._n_wheels :] = np.clip(set_points / self._max_steering, -1.0, 1.0)
         return actions
+
+    def hold(
+        self, seen: Observations, commands: npt.NDArray[Any], periods: int, moved: Mask, step: Step
+    ) -> tuple[Observations, Array, Mask, Mask]:
+        """Holds commands `(n, 3)` for some control periods or until a rover's episode ends.
+
+        The height scan is taken once a command, in the last of its periods, and where an episode ends.
+
+        Args:
+            seen: `(n, size)` the last observations.
+            commands: The commands.
+            periods: How many.
+            moved: `(n,)` the rovers that move.
+            step: Takes a control period.
+
+        Returns:
+            The last observations, sums of the rewards `(n,)`, which episodes have ended, and which have reached their
+            time limit.
+        """
+        active, rewards = moved.copy(), np.zeros(len(moved))
+        terminated, truncated = np.zeros_like(moved), np.zeros_like(moved)
+        for left in reversed(range(periods)):
+            if not active.any():
+                break
+            actions = self.act(seen, commands)
+            seen, earned, ended, timed_out = step(actions, active, left == 0)
+            rewards[active] += earned[active]
+            terminated |= ended & active
+            truncated |= timed_out & active
+            active &= ~(terminated | truncated)
+        return seen, rewards, terminated, truncated
 
     def _set_points(self, angles: Array) -> Array:
         """`(n, joints)` the mean angle of each joint's wheels, rad, within the steering limit; from `(n, n_wheels)`."""

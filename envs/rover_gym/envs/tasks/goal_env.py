@@ -279,15 +279,15 @@ class RoverGoalVectorEnv(GoalRewards, RoverCommandVectorEnv):
 
     def __init__(self, num_envs: int = 1, *, reward_type: RewardType = "sparse", **arguments: Any) -> None:
         RoverCommandVectorEnv.__init__(self, num_envs, **arguments)
-        held, features = self.held, self.held.features
-        self.set_goals(self.rovers.prototype, self.num_envs, reward_type, held.observation_space, features.goal_entries)
+        features = self.held.features
+        self.set_goals(self.rovers.prototype, self.num_envs, reward_type, features.space, features.goal_entries)
         self.show(self.goal_space)
 
     def observe(self) -> GoalDict:
         """The dictionaries of all rovers."""
         rovers = self.rovers.envs
         places, goals = np.array([rover.simulation.q for rover in rovers]), np.array([rover.goal for rover in rovers])
-        return self.observe_goals(self.held.observe(), self.held.seen, places, goals)
+        return self.observe_goals(super().observe(), self.seen, places, goals)
 
     def reward(self, rewards: Array, observations: GoalDict, moved: Mask) -> Array:
         """The rewards of the goals; 0 where a rover's next episode has only begun."""
