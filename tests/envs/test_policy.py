@@ -8,8 +8,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from rover_gym import HeightField, PDPolicy, RoverEnv
 from rover_gym.drive import CommandController, CommandLimits
