@@ -94,10 +94,9 @@ class ArcFeatures:
         rover = self._view(row[None], np.array([slope]))[0]
         shared = np.concatenate((seen[0], rover[: GOAL.start], rover[GOAL.stop :]))
         along = seen[1:].reshape(n, -1)
-        features: Features = np.concatenate(
+        return np.concatenate(
             (along, self._commands, np.broadcast_to(shared, (n, len(shared)))), axis=1, dtype=np.float32
         )
-        return features
 
 
 class ArcForecast:

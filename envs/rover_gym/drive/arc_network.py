@@ -60,8 +60,7 @@ class ArcNetwork:
         for i in range(len(DENSE)):
             y = np.maximum(y @ arrays[f"dense_{i}"].T + arrays[f"dense_bias_{i}"], np.float32(0.0))
         last = len(DENSE)
-        logits: Single = y @ arrays[f"dense_{last}"].T + arrays[f"dense_bias_{last}"]
-        return logits
+        return y @ arrays[f"dense_{last}"].T + arrays[f"dense_bias_{last}"]
 
     def save(self, path: Path) -> None:
         """Writes the arrays in half precision as a compressed `.npz` file."""

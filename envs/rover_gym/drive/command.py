@@ -161,5 +161,4 @@ class CommandController:
         """`(n, joints)` the mean angle of each joint's wheels, rad, within the steering limit; from `(n, n_wheels)`."""
         means = [angles[:, own].mean(axis=1) for own in self._steered_wheels]
         stacked = np.stack(means, axis=1) if means else np.zeros((len(angles), 0))
-        within: Array = np.clip(stacked, -self._max_steering, self._max_steering)
-        return within
+        return np.clip(stacked, -self._max_steering, self._max_steering)

@@ -544,8 +544,7 @@ class ScanPolicy:
     def _over_plane(self, row: Array, slope: list[float]) -> Array:
         """The scan's heights above the ground plane, m, so that a slope alone has no cost."""
         rise = slope[0] * self._offsets[:, 0] + slope[1] * self._offsets[:, 1]
-        heights: Array = row[self._heights] * self._scale[self._heights] - rise
-        return heights
+        return row[self._heights] * self._scale[self._heights] - rise
 
     def _boldness(self, fruitless: float) -> float:
         """Factor on the cost of risks after a time without progress, s."""

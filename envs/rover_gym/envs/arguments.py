@@ -136,8 +136,7 @@ def check_terrain(field: str, value: object) -> str | Terrain:
             value,
             f"must be one of {', '.join(TERRAINS)}, the file of a map or a mesh, or a terrain",
         )
-    terrain: Terrain = value
-    return terrain
+    return value
 
 
 def _ground(field: str, value: object) -> Any:

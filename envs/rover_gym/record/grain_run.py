@@ -394,5 +394,4 @@ def _of_balls(trajectory: Trajectory, path: str | Path, name: str) -> Array:
     value = trajectory.attributes.get(f"grain_{name}")
     if not isinstance(value, np.ndarray) or value.ndim != 1:
         refuse(RecordingError, f"{path}: grain_{name}", value, "must be an array with an entry for each of the balls")
-    result: Array = value.astype(np.float64)
-    return result
+    return value.astype(np.float64)

@@ -104,8 +104,7 @@ class GoalRewards:
             StateError: A goal has a wrong shape.
         """
         away = _distances(achieved_goal, desired_goal)
-        reward: Array = np.exp(-away) if self.reward_type == "dense" else (away <= self.goal_tolerance).astype(float)
-        return reward
+        return np.exp(-away) if self.reward_type == "dense" else (away <= self.goal_tolerance).astype(float)
 
     def compute_terminated(self, achieved_goal: npt.ArrayLike, desired_goal: npt.ArrayLike, info: Any) -> Mask:
         """Whether an episode ends `(...)` with achieved and desired goals `(..., 2)`: at the goal, or in failure.
@@ -212,8 +211,7 @@ def _distances(achieved: npt.ArrayLike, desired: npt.ArrayLike) -> Array:
             refuse(StateError, field, place.shape, "must have x and z on its last axis")
         places.append(place)
     away = places[0] - places[1]
-    distance: Array = np.hypot(away[..., 0], away[..., 1])
-    return distance
+    return np.hypot(away[..., 0], away[..., 1])
 
 
 class RoverGoalEnv(GoalObservation):
