@@ -23,5 +23,5 @@ from .core import (
     accuracy_options as accuracy_options,
     solve_friction_contact as solve_friction_contact,
 )
-from .drive.pd_policy import PDPolicy as PDPolicy
+from .drive.pd.pd_policy import PDPolicy as PDPolicy
 from .envs.rover_env import RoverEnv as RoverEnv

@@ -22,7 +22,7 @@ from rover_gym import OptionError
 from rover_gym.cli import app, drive_command, evaluate_command
 from rover_gym.cli.console import FIRST_STEPS
 from rover_gym.core.validation import refuse
-from rover_gym.drive.network_files import ANYWHERE, FOLDER
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER
 from rover_gym.record import read_trajectory
 
 NO_FILE = "cannot be written"

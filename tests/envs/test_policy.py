@@ -12,7 +12,7 @@ from hypothesis import given, strategies as st
 
 from rover_gym import HeightField, PDPolicy, RoverEnv
 from rover_gym.drive import CommandController, CommandLimits
-from rover_gym.drive.regulator import SLACK, WheelRegulator
+from rover_gym.drive.commands.regulator import SLACK, WheelRegulator
 from rover_gym.envs import wheel_centres
 from rover_gym.envs.batch import RoverBatch
 

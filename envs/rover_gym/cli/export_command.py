@@ -33,9 +33,8 @@ from rover_gym.cli.usage import WholeHelp
 from rover_gym.core import OptionError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
-from rover_gym.drive.named_policy import Policy
-from rover_gym.drive.pd_policy import find_rover_env
-from rover_gym.drive.random_policy import RandomPolicy
+from rover_gym.drive.commands.driven import Policy, find_rover_env
+from rover_gym.drive.pd.random_policy import RandomPolicy
 from rover_gym.envs.registration import ENVIRONMENTS
 from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_writer import FPS, write_mcap

@@ -16,7 +16,7 @@ from rover_gym.core import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
 from rover_gym.drive.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
-from rover_gym.drive.planner_policy import PlannerPolicy
+from rover_gym.drive.planning.planner_policy import PlannerPolicy
 from rover_gym.envs.arguments import ARGUMENTS, TERRAINS, terrain_name
 from rover_gym.envs.episode_scene import map_place
 from rover_gym.envs.registration import ENVIRONMENTS as REGISTERED

@@ -16,7 +16,7 @@ from rover_gym.cli.usage import WholeHelp
 from rover_gym.core import OptionError
 from rover_gym.core.validation import number, refuse
 from rover_gym.drive import PDPolicy, Policy, SandGains, SandPolicy, drive_all
-from rover_gym.drive.dug_in import DugIn
+from rover_gym.drive.pd.dug_in import DugIn
 from rover_gym.ground.sand import (
     SingleWheel,
     Soil,

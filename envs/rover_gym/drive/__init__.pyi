@@ -1,8 +1,9 @@
-from .arc_forecast import FORECAST_FILE as FORECAST_FILE, ForesightCosts as ForesightCosts
-from .arc_network import ArcNetwork as ArcNetwork
-from .arc_network_policy import ArcNetworkPolicy as ArcNetworkPolicy
-from .arc_search import PathCosts as PathCosts
-from .command import CommandController as CommandController, CommandLimits as CommandLimits
+from .arcs.arc_network import ArcNetwork as ArcNetwork
+from .arcs.arc_network_policy import ArcNetworkPolicy as ArcNetworkPolicy
+from .arcs.guided_policy import GuidedPolicy as GuidedPolicy
+from .commands.command import CommandController as CommandController, CommandLimits as CommandLimits
+from .commands.driven import ObservingPolicy as ObservingPolicy, Policy as Policy
+from .commands.features import Features as Features
 from .evaluation import (
     ENDS as ENDS,
     Episode as Episode,
@@ -16,14 +17,14 @@ from .evaluation import (
     summarise as summarise,
     wilson_interval as wilson_interval,
 )
-from .features import Features as Features
-from .field_plan import FieldPlan as FieldPlan
-from .ground_map import MapOptions as MapOptions
-from .guided_policy import GuidedPolicy as GuidedPolicy
-from .named_policy import NamedPolicy as NamedPolicy, Policy as Policy, named_policy as named_policy
-from .network_files import Network as Network, PolicyError as PolicyError
-from .pd_policy import PDGains as PDGains, PDPolicy as PDPolicy
-from .planner_policy import PlannerOptions as PlannerOptions, PlannerPolicy as PlannerPolicy
-from .rollouts import Ends as Ends, Rollouts as Rollouts
-from .sand_policy import SandGains as SandGains, SandPolicy as SandPolicy
-from .scan_policy import ScanGains as ScanGains, ScanPolicy as ScanPolicy
+from .forecast.arc_forecast import FORECAST_FILE as FORECAST_FILE, ForesightCosts as ForesightCosts
+from .forecast.network_files import Network as Network, PolicyError as PolicyError
+from .named_policy import NamedPolicy as NamedPolicy, named_policy as named_policy
+from .pd.pd_policy import PDGains as PDGains, PDPolicy as PDPolicy
+from .pd.sand_policy import SandGains as SandGains, SandPolicy as SandPolicy
+from .planning.planner_policy import PlannerOptions as PlannerOptions, PlannerPolicy as PlannerPolicy
+from .planning.rollouts import Ends as Ends, Rollouts as Rollouts
+from .scan.scan_policy import ScanGains as ScanGains, ScanPolicy as ScanPolicy
+from .search.arc_search import PathCosts as PathCosts
+from .search.field_plan import FieldPlan as FieldPlan
+from .search.ground_map import MapOptions as MapOptions

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from rover_gym.core import OptionError
 from rover_gym.core.validation import number, refuse, whole
-from rover_gym.drive.named_policy import Policy, named_policy
+from rover_gym.drive.commands.driven import Policy
+from rover_gym.drive.named_policy import named_policy
 from rover_gym.envs.batch import RoverBatch
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 from rover_gym.core import OptionError
 from rover_gym.core.validation import refuse
-from rover_gym.drive.arc_driver import (
+from rover_gym.drive.arcs.arc_driver import (
     ArcDriver,
     ArcObservation,
     arc_of,
@@ -18,7 +18,7 @@ from rover_gym.drive.arc_driver import (
     check_arcs,
     observation_space,
 )
-from rover_gym.drive.scan_policy import ScanGains, ScanPolicy, hold_periods
+from rover_gym.drive.scan.scan_policy import ScanGains, ScanPolicy, hold_periods
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.play_keys import keys_to_action
@@ -63,7 +63,7 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
     ## Action
 
     `Discrete(64)`, held for 0.2 s, or until the episode ends. Actions 0 to 31 are the arcs of
-    `rover_gym.drive.arc_driver.ARCS` at cruising speed: 25 forward, 7 backward. Actions 32 to 63 are the same arcs
+    `rover_gym.drive.arcs.arc_driver.ARCS` at cruising speed: 25 forward, 7 backward. Actions 32 to 63 are the same arcs
     while pushing, as the planner does where a rock stops the rover. Curvature and sideways motion are relative to what
     the rover can steer; a rover that does not steer all wheels drives an arc without its sideways motion.
 

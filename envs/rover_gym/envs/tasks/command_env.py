@@ -13,9 +13,9 @@ from gymnasium.vector import AutoresetMode
 
 from rover_gym.core import CommandError, OptionError
 from rover_gym.core.validation import array, known_keys, refuse, whole
-from rover_gym.drive.command import N_COMMANDS, CommandController, CommandLimits, command_space
-from rover_gym.drive.features import Features
-from rover_gym.drive.pd_policy import find_rover_env
+from rover_gym.drive.commands.command import N_COMMANDS, CommandController, CommandLimits, command_space
+from rover_gym.drive.commands.driven import find_rover_env
+from rover_gym.drive.commands.features import Features
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.batch import BatchSnapshot
 from rover_gym.envs.env_snapshot import EnvSnapshot

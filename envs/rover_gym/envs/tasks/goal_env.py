@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from rover_gym.core import OptionError, StateError, sin_cos
 from rover_gym.core.validation import array, refuse
-from rover_gym.drive.pd_policy import find_rover_env
+from rover_gym.drive.commands.driven import find_rover_env
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.tasks.command_env import (

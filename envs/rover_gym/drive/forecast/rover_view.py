@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import Plane, RoverModel, exp
-from rover_gym.drive.command import CommandController
+from rover_gym.drive.commands.command import CommandController
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.start import drive_signs, wheel_centres
 

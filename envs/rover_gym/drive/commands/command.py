@@ -9,8 +9,8 @@ of a wheel at `(x, z)` from that point, divided by `v`, is
 
 The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and its rim speed is
 `v (a cos(delta) + l sin(delta))`. A wheel that does not steer has delta = 0. With beta = 0 these are `PDPolicy`'s
-formulas. The torques come from the same wheel regulator (`policy.regulator`), with a feedforward of the force that
-holds the rover on a slope.
+formulas. The torques come from the same wheel regulator, `rover_gym.drive.commands.regulator`, with a feedforward of
+the force that holds the rover on a slope.
 """
 
 import math
@@ -24,8 +24,8 @@ import numpy.typing as npt
 
 from rover_gym.core import OptionError, atan2, sin_cos
 from rover_gym.core.validation import number, refuse
-from rover_gym.drive.pd_policy import SCRUB_RATE, WIDENING, YAW, Turning
-from rover_gym.drive.regulator import WheelRegulator
+from rover_gym.drive.commands.regulator import YAW, WheelRegulator
+from rover_gym.drive.commands.turning import SCRUB_RATE, WIDENING, Turning
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
 

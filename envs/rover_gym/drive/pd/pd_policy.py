@@ -1,6 +1,7 @@
 """The PD baseline, which drives by the observation alone with one turning centre and regulated wheel speeds.
 
-It drives any rover: one whose wheels steer, all or some, and one that turns by skidding (`policy.turning`).
+It drives any rover: one whose wheels steer, all or some, and one that turns by skidding; see
+`rover_gym.drive.commands.turning`.
 
 The rover turns about a centre at `(x_c, -1/kappa)` in the trunk's (x, z), where `kappa` is the curvature, positive to
 the left. `x_c` is the x of the wheels without steering, or the middle of the wheelbase if all or none steer. A wheel at
@@ -20,112 +21,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
-import numpy.typing as npt
 
-from rover_gym.core import OptionError, RoverModel, StateError, atan2, sin_cos
-from rover_gym.core.validation import array, number, refuse
-from rover_gym.drive.features import check_observed
-from rover_gym.drive.regulator import Regulator, WheelRegulator
-from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.start import Steering, wheel_centres
-
-#: Commanded curvature of a skidding rover relative to that of the path.
-WIDENING = 1.5
-
-#: Sideways friction that a rover overcomes when it turns by skidding, over its weight: more than flat ground needs,
-#: since on rough ground two wheels carry most of it.
-SCRUB = 1.2
-
-#: Yaw rate from which on all of this friction is expected, rad/s.
-SCRUB_RATE = 0.2
-
-#: Time constant of the yaw rate of a rover that skids, s.
-YAW_RESPONSE = 0.1
-
-#: Friction that a rover which skids is sure to have: what its wheels may need to start or to stop a turn.
-SURE_FRICTION = 0.5
-
-#: Time within which such a rover shall stop a turn, s.
-YAW_STOP = 0.3
-
-#: Distance below which two lengths of a rover count as equal, m.
-TINY = 1e-6
-
-#: Place of the rate about the trunk's y axis in the velocity.
-YAW = 4
-
-
-@dataclass(frozen=True)
-class Turning:
-    """The wheels about the point that turns on the path.
-
-    Attributes:
-        x_c: x of that point in the trunk's frame, m.
-        wheels: x and z of each wheel from that point, m.
-        steering: The steering entry of an action for each wheel.
-        yaw_gain: Force of each wheel for the yaw rate that is missing, N s/rad: 0 unless the rover skids, positive on
-            the right, negative on the left.
-        scrub: Force of each wheel against the sideways friction of a left turn, N, with the same signs.
-        yaw_acceleration: Largest that the wheels' friction gives a rover that skids, rad/s2; infinite for others.
-    """
-
-    x_c: float
-    wheels: tuple[tuple[float, float], ...]
-    steering: Steering
-    yaw_gain: tuple[float, ...]
-    scrub: tuple[float, ...]
-    yaw_acceleration: float = math.inf
-
-    @classmethod
-    def of(cls, model: RoverModel, weight: float) -> "Turning":
-        """The constants of a model with its joints at zero and a weight, N."""
-        centres, steering = wheel_centres(model), Steering.of(model)
-        fixed = [float(x) for (x, _), entry in zip(centres, steering.entries, strict=True) if entry < 0]
-        if fixed and steering.joints:
-            x_c = sum(fixed) / len(fixed)
-        else:
-            x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
-        wheels = tuple((float(x - x_c), float(z)) for x, z in centres)
-        width = sum(abs(z) for _, z in wheels)
-        gain, scrub, acceleration = 0.0, 0.0, math.inf
-        if not steering.joints and width > TINY:
-            mass_matrix = model.mass_matrix(np.zeros(model.nq), coordinates="state")
-            inertia = float(mass_matrix[YAW, YAW])
-            gain = inertia / YAW_RESPONSE / width
-            acceleration = SURE_FRICTION * weight / len(wheels) * width / inertia
-            scrub = SCRUB * weight / len(wheels) * sum(abs(x) for x, _ in wheels) / width
-        sides = [math.copysign(1.0, z) if abs(z) > TINY else 0.0 for _, z in wheels]
-        yaw_gain, scrubs = (tuple(side * force for side in sides) for force in (gain, scrub))
-        return cls(x_c, wheels, steering, yaw_gain, scrubs, acceleration)
-
-    @property
-    def skids(self) -> bool:
-        """Whether the rover has no steering."""
-        return not self.steering.joints
-
-    def max_curvature_at(self, speed: float) -> float:
-        """The largest curvature at a speed, m/s, out of which friction stops the turn in `YAW_STOP`, 1/m."""
-        return self.yaw_acceleration * YAW_STOP / speed
-
-    def max_curvature(self, max_steering: float) -> float:
-        """The largest curvature that keeps every wheel within the steering limit and rolling forward, 1/m.
-
-        This solves tan(delta) = kappa |x| / (1 - kappa |z|) of the inner wheels for kappa. delta stays below 90
-        degrees, since a wheel beyond the turning centre would have to turn round. A rover that skids turns about a
-        point one track beside its middle, where the inner wheels still run at half the speed.
-        """
-        sine, cosine = sin_cos(min(max_steering, math.radians(89.0)))
-        tangent = sine / cosine
-        limits = [1e3]
-        for (x, z), entry in zip(self.wheels, self.steering.entries, strict=True):
-            if entry >= 0 and abs(x) + abs(z) * tangent > TINY:
-                limits.append(tangent / (abs(x) + abs(z) * tangent))
-            elif entry < 0 and abs(z) > TINY:
-                limits.append(0.5 / abs(z) if self.skids else 1.0 / abs(z))
-        return min(limits)
-
+from rover_gym.core import OptionError, atan2, sin_cos
+from rover_gym.core.validation import number, refuse
+from rover_gym.drive.commands.driven import Actions, ObservingPolicy, State, driven_rover
+from rover_gym.drive.commands.regulator import YAW, Regulator, WheelRegulator
+from rover_gym.drive.commands.turning import SCRUB_RATE, WIDENING, Turning
+from rover_gym.envs.observation import Array, Mask
 
 _Row = Sequence[float]
 
@@ -157,8 +60,8 @@ class PDGains:
             number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
 
 
-class PDPolicy:
-    """Drives `Rover-v0` to its goal; stateless, with stable-baselines3's `predict`.
+class PDPolicy(ObservingPolicy):
+    """Drives `Rover-v0` to its goal; stateless, with the `predict` of `ObservingPolicy`.
 
     The policy compares four paths and takes the cheapest: forward or backward, with a left or right turn at the largest
     curvature, then straight. On this path it follows the circle through the goal (pure pursuit), within the largest
@@ -172,11 +75,11 @@ class PDPolicy:
 
     def __init__(self, env: Any, gains: PDGains | None = None, regulator: Regulator | None = None) -> None:
         rover = driven_rover(env, type(self).__name__)
+        super().__init__(rover)
         if gains is not None and not isinstance(gains, PDGains):
             refuse(OptionError, "gains", gains, "must be PDGains")
         self.gains = PDGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
-        self._size = layout.size
         self._scale = layout.scale
         self._roll = layout["q"].start + 3
         self._pitch = layout["q"].start + 5
@@ -194,24 +97,8 @@ class PDPolicy:
         self._regulator = WheelRegulator(rover, self.gains.response) if regulator is None else regulator
         self.max_curvature = self._turning.max_curvature(self._max_steering)
 
-    def predict(
-        self,
-        observation: npt.NDArray[np.float32],
-        state: tuple[npt.NDArray[Any], ...] | None = None,
-        episode_start: npt.NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
-    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
-        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
-
-        The signature is stable-baselines3's. The policy has no state: it returns `state` unchanged and ignores
-        `episode_start` and `deterministic`.
-
-        Raises:
-            StateError: The observation has a wrong shape or an entry that is not finite.
-        """
-        given = array("observation", observation, error=StateError)
-        check_observed(given, self._size)
-        rows = np.atleast_2d(given).astype(np.float64, copy=False)
+    def act(self, rows: Array, state: State, _starts: Mask, _deterministic: bool) -> tuple[Actions, State]:
+        """Actions and the unchanged state: the policy has none."""
         drives = [self._drive(row) for row in (rows * self._scale).tolist()]
         shape = (len(rows), self._n_wheels)
         wanted, force = (np.array([drive[k] for drive in drives]).reshape(shape) for k in (0, 1))
@@ -220,7 +107,7 @@ class PDPolicy:
         if self._steered_wheels:
             angles = np.array([drive[2] for drive in drives]).reshape(len(rows), -1)
             actions[:, self._n_wheels :] = np.clip(angles / self._max_steering, -1.0, 1.0)
-        return (actions[0] if given.ndim == 1 else actions), state
+        return actions, state
 
     def steering_angles(self, curvature: float) -> list[float]:
         """The angle of each steering joint, rad, at which all axles meet in the turning centre of a curvature, 1/m.
@@ -292,41 +179,3 @@ def _turn_and_straight(ahead: float, left: float, radius: float) -> float:
     if turn > math.tau - 1e-6:  # a goal straight ahead, within round-off
         turn = 0.0
     return radius * turn + straight
-
-
-def driven_rover(env: Any, policy: str) -> RoverEnv:
-    """The `RoverEnv` that a policy of this name drives, whose observations and actions `env` must have unchanged.
-
-    Raises:
-        OptionError: `env` has others: it is another task, or a wrapper changes them.
-    """
-    rover = find_rover_env(env)
-    for what in ("observation", "action"):
-        space = getattr(env, f"single_{what}_space", None) or getattr(env, f"{what}_space", None)
-        own: gym.spaces.Box = getattr(rover, f"{what}_space")
-        if not isinstance(space, gym.spaces.Box) or space.shape != own.shape:
-            given = f"of shape {space.shape}" if isinstance(space, gym.spaces.Box) else f"a {type(space).__name__}"
-        elif not (np.array_equal(space.low, own.low) and np.array_equal(space.high, own.high)):
-            given = "scaled"
-        else:
-            continue
-        refuse(
-            OptionError,
-            "env",
-            env,
-            f"{policy} needs the {what}s of Rover-v0, of shape {own.shape}; here they are {given}. "
-            "Make the policy with env.unwrapped, and drive that",
-        )
-    return rover
-
-
-def find_rover_env(env: Any) -> RoverEnv:
-    """The `RoverEnv` inside wrappers, or the first one inside a vector environment."""
-    inner = getattr(env, "unwrapped", env)
-    within = getattr(inner, "envs", None)
-    if not isinstance(inner, RoverEnv) and isinstance(within, (list, tuple)) and within:
-        inner = getattr(within[0], "unwrapped", within[0])
-    inner = getattr(inner, "prototype", inner)  # a batched vector environment keeps a prototype
-    if not isinstance(inner, RoverEnv):
-        refuse(OptionError, "env", env, "must be a Rover-v0, wrapped or not, or a vector of them")
-    return inner

@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from rover_gym.core import CommandError, OptionError, sin_cos
 from rover_gym.core.validation import array, refuse
-from rover_gym.drive.command import N_COMMANDS, CommandController, Step
-from rover_gym.drive.features import ground_slope
-from rover_gym.drive.rover_view import LARGEST, N_FEATURES, RoverView
-from rover_gym.drive.scan_policy import SCAN, ScanMemory, ScanPolicy, scan_grid
+from rover_gym.drive.commands.command import N_COMMANDS, CommandController, Step
+from rover_gym.drive.commands.features import ground_slope
+from rover_gym.drive.forecast.rover_view import LARGEST, N_FEATURES, RoverView
+from rover_gym.drive.scan.scan_policy import SCAN, ScanMemory, ScanPolicy, scan_grid
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
 
