@@ -368,7 +368,7 @@ def test_a_slope_beyond_the_friction_angle_is_told(arguments: tuple[str, ...], t
 
 
 def test_a_slope_below_the_friction_angle_is_no_matter() -> None:
-    assert rover("drive", "--slope", "34", *SHORT).stderr == ""
+    assert rover("drive", "--slope", "34", "--no-record", *SHORT).stderr == ""
 
 
 @pytest.mark.parametrize(
