@@ -92,8 +92,10 @@ class Drawing(NamedTuple):
     fits: Callable[[Any], bool] = lambda _run: True
 
 
-def title(figure: Sheet, what: str, run: Run) -> None:
-    """Titles a figure with its subject and its run."""
+def finish(figure: Sheet, what: str, run: Run, *panels: Axes) -> None:
+    """Titles a figure with its subject and its run, and gives panels their legends."""
+    for axes in panels:
+        panel_legend(axes)
     figure.suptitle(f"{what}\n{plain(run.title)}{broken_off(run)}")
 
 
