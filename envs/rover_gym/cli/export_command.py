@@ -13,19 +13,17 @@ from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
     FRICTION,
-    HeightRange,
+    MapFile,
     ModelName,
-    NoData,
     OnMap,
-    Spacing,
     Start,
     TerrainName,
     chosen_terrain,
     driver_title,
     named_driver,
-    named_ground,
     named_model,
     places_on,
+    takes,
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
@@ -87,13 +85,12 @@ def onnx(
 
 @export.command()
 @plain_errors
+@takes(MapFile)
 def fmu(
+    map_file: MapFile,
     *,
     output: Annotated[Path, typer.Option(dir_okay=False, help="File to write, usually .fmu.")],
     terrain: TerrainName = None,
-    spacing: Spacing = None,
-    height_range: HeightRange = None,
-    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
         float | None, typer.Option(help="Difficulty of rocks and hills, from 0 to 2. It implies rocks.")
@@ -120,7 +117,7 @@ def fmu(
     arguments |= {} if heading is None else {"heading_deg": heading}
     if (rover := named_model(model)) is not None:
         arguments["model"] = rover
-    if (ground := named_ground(terrain, spacing, height_range, nodata)) is not None:
+    if (ground := map_file.open(terrain)) is not None:
         arguments["terrain"] = ground
     options = places_on(ground, {"position": start}, map_coordinates=map_coordinates)
     env = gym.make("Rover-v0", **arguments)
