@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import gymnasium as gym
@@ -231,12 +230,7 @@ class ComparedScene:
     def report(self) -> dict[str, Any]:
         """The scene for JSON."""
         seeds = [self.seeds.start, self.seeds.stop - 1]
-        return {
-            "ground": self.ground,
-            "model": self.model,
-            "difficulties": list(self.difficulties),
-            "seeds": seeds,
-        }
+        return {**vars(self), "difficulties": list(self.difficulties), "seeds": seeds}
 
 
 def in_markdown(table: Sequence[Sequence[str]]) -> str:
@@ -312,9 +306,7 @@ class EpisodeFilm:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._writer.close()
 
 
