@@ -27,7 +27,7 @@ from rover_gym.cli.options import (
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.cli.usage import WholeHelp
+from rover_gym.cli.usage import group
 from rover_gym.core import OptionError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
@@ -40,9 +40,7 @@ from rover_gym.exports.minari_data import write_dataset
 from rover_gym.exports.onnx_policy import write_onnx
 from rover_gym.record.rover_run import read_run
 
-export = typer.Typer(
-    cls=WholeHelp, rich_markup_mode=None, help="Runs, policies and rovers in other formats.", no_args_is_help=True
-)
+export = group("Runs, policies and rovers in other formats.")
 
 
 @export.command()

@@ -10,7 +10,7 @@ import typer
 from rover_gym.cli.console import Row, plain_errors, row, status
 from rover_gym.cli.grains_options import MARS, Balls, BallScene, Radius, radii
 from rover_gym.cli.options import ModelName, named_model, takes
-from rover_gym.cli.usage import WholeHelp
+from rover_gym.cli.usage import group
 from rover_gym.core import Motor, OptionError, RoverModel
 from rover_gym.core.validation import number, refuse
 from rover_gym.ground.grains import bed_scenes
@@ -20,12 +20,7 @@ from rover_gym.ground.grains.pit import Pit
 from rover_gym.record.grain_measures import outflow, penetration_depths, run_out, slopes
 from rover_gym.record.grain_run import GrainRun
 
-grains = typer.Typer(
-    cls=WholeHelp,
-    rich_markup_mode=None,
-    help="Balls in space: beds, vessels, tools and rovers.",
-    no_args_is_help=True,
-)
+grains = group("Balls in space: beds, vessels, tools and rovers.")
 
 
 @grains.command()

@@ -13,7 +13,7 @@ from rich.table import Table
 from rover_gym.cli.console import AsJson, Results, figure, plain_errors
 from rover_gym.cli.options import takes
 from rover_gym.cli.paths import check_paths
-from rover_gym.cli.usage import WholeHelp
+from rover_gym.cli.usage import group
 from rover_gym.core import OptionError
 from rover_gym.core.validation import number, refuse
 from rover_gym.drive import PDPolicy, Policy, SandGains, SandPolicy, drive_all
@@ -31,9 +31,7 @@ from rover_gym.ground.sand.convert import convert_runs
 from rover_gym.ground.sand.trials import read_trial
 from rover_gym.models import open_model
 
-sand = typer.Typer(
-    cls=WholeHelp, rich_markup_mode=None, help="Wheels and rovers on sand, and soils by name.", no_args_is_help=True
-)
+sand = group("Wheels and rovers on sand, and soils by name.")
 
 EARTH = 9.81  # m/s^2
 

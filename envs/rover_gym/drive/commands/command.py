@@ -22,8 +22,9 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import OptionError, atan2, sin_cos
-from rover_gym.core.validation import number, refuse
+from rover_gym.core import atan2, sin_cos
+from rover_gym.core.validation import number
+from rover_gym.drive.commands.driven import given_or_usual
 from rover_gym.drive.commands.regulator import YAW, WheelRegulator
 from rover_gym.drive.commands.turning import SCRUB_RATE, WIDENING, Turning
 from rover_gym.envs.observation import Array, Mask, Observations
@@ -72,9 +73,7 @@ class CommandController:
     """
 
     def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None) -> None:
-        if limits is not None and not isinstance(limits, CommandLimits):
-            refuse(OptionError, "limits", limits, "must be CommandLimits")
-        self.limits = CommandLimits() if limits is None else limits
+        self.limits = given_or_usual("limits", limits, CommandLimits)
         layout, model = rover.observation_layout, rover.model
         q, velocity = layout["q"].start, layout["velocity"].start
         self._pitch = q + 5

@@ -1,15 +1,18 @@
 """What drives a rover: policies with stable-baselines3's `predict`, and the environment that they are made for."""
 
-from typing import Any, Protocol, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import OptionError, StateError
-from rover_gym.core.validation import array, refuse
+from rover_gym.core.validation import array, number, refuse
 from rover_gym.envs.observation import Array, Mask
 from rover_gym.envs.rover_env import RoverEnv
+
+T = TypeVar("T")
 
 Actions: TypeAlias = npt.NDArray[np.float32]
 
@@ -24,6 +27,26 @@ class Policy(Protocol):
         self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
     ) -> tuple[npt.NDArray[np.float32], Any]:
         """Returns the action for an observation, and the state for the next call."""
+
+
+def given_or_usual(name: str, given: T | None, kind: type[T]) -> T:
+    """Options of a policy as they are given, or the usual ones.
+
+    Raises:
+        OptionError: They are of another kind.
+    """
+    if given is not None and not isinstance(given, kind):
+        refuse(OptionError, name, given, f"must be {kind.__name__}")
+    return kind() if given is None else given
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Positive numbers to which a policy is tuned."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
 
 
 class ObservingPolicy:

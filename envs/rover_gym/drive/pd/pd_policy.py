@@ -23,9 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.core import OptionError, atan2, sin_cos
-from rover_gym.core.validation import number, refuse
-from rover_gym.drive.commands.driven import Actions, ObservingPolicy, State, driven_rover
+from rover_gym.core import atan2, sin_cos
+from rover_gym.drive.commands.driven import Actions, Gains, ObservingPolicy, State, driven_rover, given_or_usual
 from rover_gym.drive.commands.regulator import YAW, Regulator, WheelRegulator
 from rover_gym.drive.commands.turning import SCRUB_RATE, WIDENING, Turning
 from rover_gym.envs.observation import Array, Mask
@@ -34,7 +33,7 @@ _Row = Sequence[float]
 
 
 @dataclass(frozen=True)
-class PDGains:
+class PDGains(Gains):
     """The policy's gains.
 
     Attributes:
@@ -55,10 +54,6 @@ class PDGains:
     reverse_cost: float = 1.3
     switch_cost: float = 1.0
 
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
-
 
 class PDPolicy(ObservingPolicy):
     """Drives `Rover-v0` to its goal; stateless, with the `predict` of `ObservingPolicy`.
@@ -76,9 +71,7 @@ class PDPolicy(ObservingPolicy):
     def __init__(self, env: Any, gains: PDGains | None = None, regulator: Regulator | None = None) -> None:
         rover = driven_rover(env, type(self).__name__)
         super().__init__(rover)
-        if gains is not None and not isinstance(gains, PDGains):
-            refuse(OptionError, "gains", gains, "must be PDGains")
-        self.gains = PDGains() if gains is None else gains
+        self.gains = given_or_usual("gains", gains, PDGains)
         layout, model = rover.observation_layout, rover.model
         self._scale = layout.scale
         self._roll = layout["q"].start + 3

@@ -27,9 +27,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import OptionError, atan2, sin_cos
-from rover_gym.core.validation import number, refuse
-from rover_gym.drive.commands.driven import Actions, ObservingPolicy, State, driven_rover
+from rover_gym.core import atan2, sin_cos
+from rover_gym.drive.commands.driven import Actions, Gains, ObservingPolicy, State, driven_rover, given_or_usual
 from rover_gym.drive.pd.pd_policy import PDGains, PDPolicy
 from rover_gym.envs.observation import Array, Mask
 from rover_gym.envs.rover_env import RoverEnv
@@ -49,7 +48,7 @@ TURNS_FROM, TURNS_TO = 0.6, 0.15
 
 
 @dataclass(frozen=True)
-class SandGains:
+class SandGains(Gains):
     """The policy's gains.
 
     Attributes:
@@ -77,10 +76,6 @@ class SandGains:
     back: float = 3.0
     aside: float = 4.0
     aside_deg: float = 40.0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
 
 
 class RimServo:
@@ -119,9 +114,7 @@ class SandPolicy(ObservingPolicy):
     def __init__(self, env: Any, gains: SandGains | None = None) -> None:
         rover = driven_rover(env, type(self).__name__)
         super().__init__(rover)
-        if gains is not None and not isinstance(gains, SandGains):
-            refuse(OptionError, "gains", gains, "must be SandGains")
-        self.gains = SandGains() if gains is None else gains
+        self.gains = given_or_usual("gains", gains, SandGains)
         layout, speed = rover.observation_layout, self.gains.speed
         self._scale, self._dt = layout.scale, rover.dt
         self._roll, self._pitch = layout["q"].start + 3, layout["q"].start + 5

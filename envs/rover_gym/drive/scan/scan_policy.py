@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import OptionError, RoverModel, StateError, exp, sin_cos
-from rover_gym.core.validation import number, refuse
+from rover_gym.core.validation import refuse
 from rover_gym.drive.commands.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.drive.commands.driven import Actions, ObservingPolicy, State, driven_rover
+from rover_gym.drive.commands.driven import Actions, Gains, ObservingPolicy, State, driven_rover, given_or_usual
 from rover_gym.drive.commands.features import ground_slope
 from rover_gym.drive.commands.turning import Turning
 from rover_gym.drive.forecast.arc_forecast import FORECAST_FILE, USUAL_WAY, ArcFeatures, ArcForecast, ForesightCosts
@@ -188,7 +188,7 @@ HIGH_PATIENCE = 0.7
 
 
 @dataclass(frozen=True)
-class ScanGains:
+class ScanGains(Gains):
     """The policy's speed and times.
 
     Attributes:
@@ -213,10 +213,6 @@ class ScanGains:
     insistence: float = 10.0
     courage: float = 12.0
     least: float = 0.2
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
 
 
 class ScanPolicy(ObservingPolicy):
@@ -279,12 +275,10 @@ class ScanPolicy(ObservingPolicy):
     ) -> None:
         rover = driven_rover(env, type(self).__name__)
         super().__init__(rover)
-        options = (("gains", gains, ScanGains), ("costs", costs, PathCosts), ("map", map, MapOptions))
-        for name, given, kind in (*options, ("foresight", foresight, ForesightCosts)):
-            if given is not None and not isinstance(given, kind):
-                refuse(OptionError, name, given, f"must be {kind.__name__}")
+        self.gains, costs = given_or_usual("gains", gains, ScanGains), given_or_usual("costs", costs, PathCosts)
+        map_options = None if map is None else given_or_usual("map", map, MapOptions)
+        self._caution, self.foresight = 1.0, given_or_usual("foresight", foresight, ForesightCosts)
         scan = scan_grid(rover)
-        self.gains = ScanGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
         self._layout, self._scale, self._offsets = layout, layout.scale, scan.offsets
         self._heights, self._goal = layout["height_scan"], layout["goal"]
@@ -317,13 +311,12 @@ class ScanPolicy(ObservingPolicy):
             reach=self.reach,
             radius=self.radius,
             arrival=0.6 * rover.task.goal_tolerance,
-            costs=PathCosts() if costs is None else costs,
+            costs=costs,
         )
-        self._ahead = (PathCosts() if costs is None else costs).length * self.reach
+        self._ahead = costs.length * self.reach
         self._ends = first.poses(FOLLOWED * self._ahead, 1)[:, 0, :2]
-        self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self.reach)
-        self._cells = 0 if map is None else map.cells
-        self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
+        self._map = None if map_options is None else GroundMap(scan, map_options, TRAP_AHEAD * self.reach)
+        self._cells = 0 if map_options is None else map_options.cells
         self.forecast: ArcForecast | None = None
         if forecast is not None and forecast is not False:
             folder = FOLDER / FORECAST if forecast is True else Path(forecast)
