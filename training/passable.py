@@ -22,11 +22,11 @@ from rich.console import Console
 from rover_gym.cli.console import plain_errors, plain_table
 from rover_gym.cli.options import BUILT_IN, ModelName, named_model
 from rover_gym.drive import ArcNetworkPolicy, PlannerPolicy
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.arc_network_policy import ARCS_FILE
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE
 from rover_gym.drive.evaluation import drive_all, wilson_interval
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER
 from rover_gym.drive.named_policy import named_policy
-from rover_gym.drive.network_files import ANYWHERE, FOLDER
 from rover_gym.envs.rover_env import RoverEnv
 
 #: Who tries once, before the others.

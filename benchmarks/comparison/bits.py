@@ -17,8 +17,7 @@ import gymnasium as gym
 import numpy as np
 from rich.console import Console
 
-from comparison.exploring import GROUNDS, drives
-from comparison.exploring import scene as exploring_scene
+from comparison.exploring import GROUNDS, drives, scene as exploring_scene
 from comparison.peers.ours import OurRunner
 from comparison.scene import Array, RoverScene, steps_in
 from comparison.scenes import flat_drive, parked, rocks, rug

@@ -25,8 +25,8 @@ from rover_gym import (
 )
 from rover_gym.core import BallSimulation, DiskSimulation, Sine, Snapshot, disk_packing
 from rover_gym.drive import ArcNetworkPolicy, PolicyError, ScanPolicy
-from rover_gym.drive.arc_network_policy import ARCS_FILE
-from rover_gym.drive.network_files import ANYWHERE, FOLDER
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER
 from rover_gym.models import RobotFileWarning
 from rover_gym.record import DiskRun, Recorder, RecordingError, RoverSampler, describe, read_run
 from rover_gym.record.saved_runs import open_run

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym import OptionError, ProblemError
-from rover_gym import solve_friction_contact as solve
+from rover_gym import OptionError, ProblemError, solve_friction_contact as solve
 from torture.audit import Array
 from torture.drives import log_uniform
 from torture.ledger import Bounds, Ledger, Regime

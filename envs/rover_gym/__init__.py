@@ -11,7 +11,14 @@ The package consists of the subpackages below. Each one may import those above i
     derivatives      products with the derivatives of trajectories, also in PyTorch and JAX
     identification   parameters of a recorded run, with their uncertainty
     envs             `Rover-v0` with its sensors and vectors, and what all environments share
-    drive            policies: the PD baseline, the scan planner, networks, planning; their evaluation
+    drive.commands   what policies see, and what turns their commands into actions
+    drive.pd         policies that do without the height scan: the PD baseline, the one for sand
+    drive.search     the cheapest way over a height scan, a map or a field
+    drive.forecast   networks in files; what becomes of a rover on each arc
+    drive.scan       the policy that plans over the height scan
+    drive.arcs       policies that choose among its arcs by a network
+    drive.planning   the policy that plans with the simulator itself
+    drive            policies by name, and their evaluation
     envs.tasks       the environments with other actions or tasks
     learn            training with stable-baselines3
     show.replay      saved runs for the browser, VRML and glTF

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from forged import sealed
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from refusals import refused
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError

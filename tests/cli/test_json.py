@@ -48,7 +48,8 @@ EVERY_TABLE = [pytest.param(one, marks=OTHER_LAB) if LAB in one else one for one
 
 
 @pytest.mark.parametrize("command", EVERY_TABLE)
-def test_a_table_is_one_object_as_json(command: str, tmp_path: Path) -> None:
+def test_a_table_is_one_object_as_json(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # where a command writes that is given no folder
     report = told(command, tmp_path)
     assert set(TABLES[command]) <= report.keys()
     for path in report.get("written", ()):

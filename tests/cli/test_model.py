@@ -6,8 +6,7 @@ from pathlib import Path
 
 import commands
 import pytest
-from models.robot_files import rover as robot_text
-from models.robot_files import write
+from models.robot_files import rover as robot_text, write
 
 from rover_gym import RoverModel
 

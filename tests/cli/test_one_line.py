@@ -22,7 +22,7 @@ from rover_gym import OptionError
 from rover_gym.cli import app, drive_command, evaluate_command
 from rover_gym.cli.console import FIRST_STEPS
 from rover_gym.core.validation import refuse
-from rover_gym.drive.network_files import ANYWHERE, FOLDER
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER
 from rover_gym.record import read_trajectory
 
 NO_FILE = "cannot be written"
@@ -368,7 +368,7 @@ def test_a_slope_beyond_the_friction_angle_is_told(arguments: tuple[str, ...], t
 
 
 def test_a_slope_below_the_friction_angle_is_no_matter() -> None:
-    assert rover("drive", "--slope", "34", *SHORT).stderr == ""
+    assert rover("drive", "--slope", "34", "--no-record", *SHORT).stderr == ""
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,7 @@ from rover_gym import HeightField, RoverModel, Simulation
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.core import ModelError, OptionError
 from rover_gym.core.files import write_whole, written_whole
-from rover_gym.exports import fmu as units
-from rover_gym.exports import write_fmu, write_mcap, write_onnx
+from rover_gym.exports import fmu as units, write_fmu, write_mcap, write_onnx
 from rover_gym.record import RoverRun, read_run
 from rover_gym.record.saved_runs import record_run
 from rover_gym.show.figures.model_drawing import write_model_picture

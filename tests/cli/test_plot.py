@@ -25,8 +25,7 @@ from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_ru
 from rover_gym.scenes import inclined_plane, sphere_rug
 from rover_gym.show.figures import draw_run
 from rover_gym.show.figures.derived_signals import contact_velocities, motor_work, slip_ratios, smooth
-from rover_gym.show.figures.drawing import KINDS as FIGURES
-from rover_gym.show.figures.drawing import drawable
+from rover_gym.show.figures.drawing import KINDS as FIGURES, drawable
 from rover_gym.show.figures.policy_figure import fill
 from rover_gym.show.figures.run_figures import DRAWINGS
 from rover_gym.show.figures.style import COLOURS, STYLE, WHEELS, WheelStyle

@@ -18,7 +18,7 @@ from pages import held
 from rover_gym import Plane, RoverModel, SphereField
 from rover_gym.core.rotations import axis_angles, continuous, quaternions
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
-from rover_gym.record.rover_run import moving_mean
+from rover_gym.record.run import moving_mean
 from rover_gym.show.figures import draw_run
 from rover_gym.show.frames.appearance import rover_parts, sphere_mesh
 from rover_gym.show.replay import write_gltf, write_page, write_vrml
@@ -30,7 +30,7 @@ FIELD = SphereField([[1.0, 0.1, -0.5], [2.0, 0.0, 0.7]], [0.2, 0.3], SLOPE)
 PILE = SphereField([[0.0, -0.5, 0.0], [1.0, -0.5, 0.0]], [0.5, 0.6])
 
 
-def turning_run(terrain: Plane | SphereField = FIELD, n: int = 41) -> RoverRun:
+def turning_run(terrain: Plane | SphereField = FIELD, n: int = 41, title: str = 'a "test" & <more>') -> RoverRun:
     """A rover that turns once about y, through pi exactly, while its wheels turn thrice and it drives a little."""
     model = RoverModel()
     turn = np.linspace(0.0, 1.0, n)
@@ -45,7 +45,7 @@ def turning_run(terrain: Plane | SphereField = FIELD, n: int = 41) -> RoverRun:
         "wheel_forces": np.ones((n, 6, 3)),
         "wheel_gaps": np.full((n, 6), np.inf),
     }
-    return RoverRun(Trajectory(data, {}, {}, terrain), model, terrain, (3.0, -1.0), 'a "test" & <more>')
+    return RoverRun(Trajectory(data, {}, {"title": title}, terrain), model, terrain, (3.0, -1.0))
 
 
 def matrices(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -442,7 +442,7 @@ def renamed_run(title: str) -> RoverRun:
             return [rename(entry) for entry in value]
         return names.get(value, value) if isinstance(value, str) else value
 
-    return replace(turning_run(), model=RoverModel.from_dict(rename(plain)), title=title)
+    return replace(turning_run(title=title), model=RoverModel.from_dict(rename(plain)))
 
 
 def test_names_and_titles_reach_vrml_escaped(tmp_path: Path) -> None:
@@ -458,7 +458,7 @@ def test_names_and_titles_reach_vrml_escaped(tmp_path: Path) -> None:
     }
     assert vrml.named["Clock"].kind == "TimeSensor"
     assert sum(node.kind == "PositionInterpolator" for node in vrml.named.values()) == len(run.model.solid_names)
-    assert 'title "a \\"} Script { url \\"x "' in text
+    assert 'title "a \\"} Script { url \\"x"' in text
 
 
 def test_names_and_titles_reach_the_page_as_text_only(tmp_path: Path) -> None:
@@ -498,8 +498,9 @@ def test_a_run_over_thousands_of_kilometres_has_a_ground_of_few_squares() -> Non
 
 def test_a_title_with_dollars_is_no_formula(tmp_path: Path) -> None:
     """The run also has infinite gaps and a weightless rover; both must give finite axes."""
-    run = replace(turning_run(), title=r"$\frac{")
-    weightless = replace(run.trajectory, attributes={"solver": {"gravity": [0.0, 0.0, 0.0]}})
+    run = turning_run(title=r"$\frac{")
+    gravity = {"solver": {"gravity": [0.0, 0.0, 0.0]}}
+    weightless = replace(run.trajectory, attributes={**run.trajectory.attributes, **gravity})
     assert len(draw_run(replace(run, trajectory=weightless), tmp_path)) >= 2
 
 

@@ -10,7 +10,7 @@ from refusals import refused
 
 from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel, StateError
 from rover_gym.drive import CommandController, ScanPolicy
-from rover_gym.drive.pd_policy import Turning
+from rover_gym.drive.commands.turning import Turning
 from rover_gym.envs.vector import RoverVectorEnv
 
 NAMES = sorted(MACHINES)

@@ -19,11 +19,11 @@ from rover_gym.drive import (
     ScanPolicy,
     named_policy,
 )
-from rover_gym.drive.arc_driver import ARCS, N_ARCS, arc_of
-from rover_gym.drive.arc_network import shapes
+from rover_gym.drive.arcs.arc_driver import ARCS, N_ARCS, arc_of
+from rover_gym.drive.arcs.arc_network import shapes
 from rover_gym.drive.evaluation import drive_all
-from rover_gym.drive.network_files import FOLDER
-from rover_gym.drive.scan_policy import ScanMemory
+from rover_gym.drive.forecast.network_files import FOLDER
+from rover_gym.drive.scan.scan_policy import ScanMemory
 from rover_gym.envs.tasks import RoverArcsEnv, RoverArcsVectorEnv
 
 SHIPPED = FOLDER / "anywhere"

@@ -8,7 +8,7 @@ from refusals import refused
 
 from rover_gym import OptionError, RoverEnv
 from rover_gym.drive import ArcNetwork, GuidedPolicy, ScanPolicy, named_policy
-from rover_gym.drive.arc_driver import ARCS
+from rover_gym.drive.arcs.arc_driver import ARCS
 from rover_gym.models.lookup import open_model
 
 

@@ -13,9 +13,9 @@ from refusals import refused
 from rover_gym import Plane, SphereField, StateError
 from rover_gym.core import OptionError, PathSearch, atan2, exp, sin_cos
 from rover_gym.drive import MapOptions, PathCosts, ScanPolicy
-from rover_gym.drive.arc_search import STEPS, Arcs, ArcSearch, RoverOutline, SearchTask, ways_by_price
-from rover_gym.drive.ground_map import GroundMap
-from rover_gym.drive.scan_policy import ScanMemory
+from rover_gym.drive.scan.scan_policy import ScanMemory
+from rover_gym.drive.search.arc_search import STEPS, Arcs, ArcSearch, RoverOutline, SearchTask, ways_by_price
+from rover_gym.drive.search.ground_map import GroundMap
 from rover_gym.envs import RoverEnv
 from rover_gym.envs.start import HeightScan, scan_points
 

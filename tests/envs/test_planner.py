@@ -7,7 +7,7 @@ from pursuit import pursuit
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
 from rover_gym.drive import CommandController, FieldPlan, PlannerOptions, PlannerPolicy, Rollouts, ScanPolicy
-from rover_gym.drive.planner_policy import ScannedGround
+from rover_gym.drive.planning.planner_policy import ScannedGround
 from rover_gym.envs.rover_env import RoverEnv
 
 ROVER = RoverModel()

@@ -8,12 +8,11 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from rover_gym import HeightField, PDPolicy, RoverEnv
 from rover_gym.drive import CommandController, CommandLimits
-from rover_gym.drive.regulator import SLACK, WheelRegulator
+from rover_gym.drive.commands.regulator import SLACK, WheelRegulator
 from rover_gym.envs import wheel_centres
 from rover_gym.envs.batch import RoverBatch
 

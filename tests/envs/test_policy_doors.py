@@ -21,8 +21,8 @@ from rover_gym.drive import (
     named_policy,
 )
 from rover_gym.drive.evaluation import run_episode
-from rover_gym.drive.network_files import ANYWHERE, FOLDER
-from rover_gym.drive.rollouts import Rollouts
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER
+from rover_gym.drive.planning.rollouts import Rollouts
 from rover_gym.envs.sensors import WheelEncoders
 from rover_gym.scenes import Scene
 

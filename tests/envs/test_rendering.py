@@ -25,8 +25,7 @@ from rover_gym.core import ModelError, SoftGround
 from rover_gym.core.extras import MissingExtraError
 from rover_gym.envs.sand_ground import sand_rover
 from rover_gym.ground.sand import named_soil
-from rover_gym.show.frames import FrameRenderer
-from rover_gym.show.frames import appearance as look
+from rover_gym.show.frames import FrameRenderer, appearance as look
 from rover_gym.show.frames.appearance import Part, part_mesh, rover_parts
 from rover_gym.show.frames.frame_renderer import contact_forces
 from rover_gym.show.frames.rut_actor import rut_mesh

@@ -18,7 +18,8 @@ import numpy._core._multiarray_umath as numpy_core
 import pytest
 
 from rover_gym.core import Plane, SphereField
-from rover_gym.drive.pd_policy import PDPolicy, find_rover_env
+from rover_gym.drive.commands.driven import find_rover_env
+from rover_gym.drive.pd.pd_policy import PDPolicy
 from rover_gym.envs.tasks.command_env import DriveByCommand
 
 SEEDS = (3, 4)

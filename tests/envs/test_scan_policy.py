@@ -13,11 +13,11 @@ from refusals import refused
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverModel, SphereField, StateError
 from rover_gym.drive import FORECAST_FILE, ForesightCosts, Network, PathCosts, PolicyError, ScanGains, ScanPolicy
-from rover_gym.drive.arc_forecast import OUTPUTS, ArcFeatures, ArcForecast, Outcomes, with_speed
-from rover_gym.drive.arc_search import Arcs, RoverOutline
 from rover_gym.drive.evaluation import drive_all
+from rover_gym.drive.forecast.arc_forecast import OUTPUTS, ArcFeatures, ArcForecast, Outcomes, with_speed
 from rover_gym.drive.named_policy import named_policy
-from rover_gym.drive.scan_policy import TRAPS, ScanMemory
+from rover_gym.drive.scan.scan_policy import TRAPS, ScanMemory
+from rover_gym.drive.search.arc_search import Arcs, RoverOutline
 from rover_gym.models import open_model
 
 ARGUMENTS = ScanPolicy.arguments()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rover_gym import PDPolicy, RoverModel
-from rover_gym.drive.features import Features
-from rover_gym.drive.scan_policy import ScanPolicy
+from rover_gym.drive.commands.features import Features
+from rover_gym.drive.scan.scan_policy import ScanPolicy
 from rover_gym.envs.tasks.command_env import DriveByCommand
 
 

@@ -22,8 +22,8 @@ from rover_gym.envs.tasks import (
     RoverCommandVectorEnv,
     RoverGoalEnv,
     RoverTrapEnv,
+    trap_env as trap,
 )
-from rover_gym.envs.tasks import trap_env as trap
 
 
 @pytest.fixture(scope="module")

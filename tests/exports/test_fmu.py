@@ -13,8 +13,7 @@ import pytest
 from commands import error_of, output_of
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, Simulation, SphereField, Terrain, TriangleMesh, Union
-from rover_gym.exports import fmu as units
-from rover_gym.exports import write_fmu
+from rover_gym.exports import fmu as units, write_fmu
 from rover_gym.exports.fmu import unit_variables
 
 pytest.importorskip("fmpy", reason="the extra test is not installed")

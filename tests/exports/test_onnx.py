@@ -8,9 +8,9 @@ import pytest
 from commands import error_of, output_of
 
 from rover_gym.drive import ArcNetwork, Network, PolicyError
-from rover_gym.drive.arc_driver import observation_space
-from rover_gym.drive.arc_forecast import OUTPUTS
-from rover_gym.drive.network_files import FOLDER, FORECAST
+from rover_gym.drive.arcs.arc_driver import observation_space
+from rover_gym.drive.forecast.arc_forecast import OUTPUTS
+from rover_gym.drive.forecast.network_files import FOLDER, FORECAST
 
 pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.drive.arc_driver import SIZES
-from rover_gym.drive.scan_policy import SCAN
+from rover_gym.drive.arcs.arc_driver import SIZES
+from rover_gym.drive.scan.scan_policy import SCAN
 
 
 def test_networks_are_fitted_without_what_is_hidden(ablations: Callable[..., Any], tmp_path: Path) -> None:

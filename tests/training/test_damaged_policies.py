@@ -13,7 +13,7 @@ from refusals import refused
 
 from rover_gym import RoverEnv
 from rover_gym.drive import FORECAST_FILE, Network, PolicyError, ScanPolicy, named_policy
-from rover_gym.drive.network_files import FOLDER
+from rover_gym.drive.forecast.network_files import FOLDER
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym.drive.arc_network_policy import ARCS_FILE
-from rover_gym.drive.network_files import ANYWHERE, FOLDER
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER
 
 
 @pytest.fixture

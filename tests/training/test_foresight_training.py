@@ -11,7 +11,7 @@ from refusals import refused
 
 from rover_gym import OptionError, RoverEnv, RoverModel
 from rover_gym.drive import ScanPolicy
-from rover_gym.drive.arc_forecast import ArcFeatures
+from rover_gym.drive.forecast.arc_forecast import ArcFeatures
 from rover_gym.learn.fit_forecast import ArcOutcomes, fit_forecast, try_arcs
 
 ARGUMENTS = {"terrain": "rocks", "difficulty": 1.0, **ScanPolicy.arguments()}

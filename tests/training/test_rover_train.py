@@ -12,7 +12,7 @@ from commands import error_of, output_of, rover
 from rover_gym import PDPolicy
 from rover_gym.drive import ArcNetwork
 from rover_gym.drive.comparison import ENDING, film_episode
-from rover_gym.drive.network_files import FOLDER
+from rover_gym.drive.forecast.network_files import FOLDER
 
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 

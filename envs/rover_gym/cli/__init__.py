@@ -9,8 +9,7 @@ from rover_gym.cli.console import DEBUG, one_line, say_first_steps
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import evaluate
 from rover_gym.cli.export_command import dataset, export
-from rover_gym.cli.grains_command import grains, pit, track
-from rover_gym.cli.grains_command import rover as rover_on_bed
+from rover_gym.cli.grains_command import grains, pit, rover as rover_on_bed, track
 from rover_gym.cli.grains_lab_commands import plate, shear, wheel
 from rover_gym.cli.live_command import live
 from rover_gym.cli.model_command import model

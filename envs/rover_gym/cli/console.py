@@ -34,7 +34,7 @@ from rover_gym.record.steady_file import ENDING
 P = ParamSpec("P")
 
 if TYPE_CHECKING:
-    from rover_gym.record.rover_run import Run
+    from rover_gym.record.run import Run
 
 
 R = TypeVar("R")

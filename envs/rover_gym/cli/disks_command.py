@@ -2,10 +2,10 @@
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -20,14 +20,14 @@ from rover_gym.cli.console import (
     row,
     status,
 )
+from rover_gym.cli.options import takes
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.core import OptionError
+from rover_gym.core import DiskSimulation, OptionError
 from rover_gym.core.files import write_whole
 from rover_gym.core.validation import refuse
-
-if TYPE_CHECKING:
-    from rover_gym.core import DiskSimulation
-    from rover_gym.ground.grains.disk_trials import Traction
+from rover_gym.ground.grains.disk_bed import bed_width, rover_on_disks, settled_disks
+from rover_gym.ground.grains.disk_trials import Traction, drawbar_pull, drive_on_disks, fit_traction, over_beds
+from rover_gym.record.disk_run import DiskRun
 
 EARTH = 9.81  # m/s^2
 FRAMES = 25.0  # of the film, a second at EARTH
@@ -45,23 +45,24 @@ RIM_SPEED = 0.3
 UNEQUAL = {"radius_min": 0.013, "radius_max": 0.0195}
 
 
-@plain_errors
-def disks(
-    *,
+@dataclass(frozen=True)
+class DiskScene:
+    """A bed of disks and the rover on it, and how they are simulated and recorded."""
+
     disks: Annotated[
         int | None, typer.Option(min=30, max=20_000, help="Number of disks. Default: 222; in a sweep, 444.")
-    ] = None,
-    layers: Annotated[int, typer.Option(min=1, max=100, help="Layers of disks.")] = 3,
-    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
-    gravity: Annotated[
-        float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2; the original run had 0.0981.")
-    ] = EARTH,
-    friction: Annotated[float, typer.Option(help="Friction coefficient between disks.")] = 0.5,
-    wheel_friction: Annotated[float, typer.Option(help="Friction coefficient at the wheels.")] = 0.9,
+    ] = None
+    layers: Annotated[int, typer.Option(min=1, max=100, help="Layers of disks.")] = 3
+    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0
+    gravity: Annotated[float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2; the original run had 0.0981.")] = (
+        EARTH
+    )
+    friction: Annotated[float, typer.Option(help="Friction coefficient between disks.")] = 0.5
+    wheel_friction: Annotated[float, typer.Option(help="Friction coefficient at the wheels.")] = 0.9
     time_step: Annotated[
         float | None,
         typer.Option(help="Time step, s. Default: 1 ms (in a sweep 2 ms) at 9.81 m/s^2, longer under weaker gravity."),
-    ] = None,
+    ] = None
     duration: Annotated[
         float | None,
         typer.Option(
@@ -70,74 +71,63 @@ def disks(
             help="Time to simulate, s. Default: 4 s at 9.81 m/s^2, longer under weaker gravity. "
             "The run ends early where the disks end.",
         ),
-    ] = None,
+    ] = None
     seed: Annotated[
         int,
         typer.Option(min=0, help="Seed of the disks' radii and positions; in a sweep, the first seed."),
-    ] = 0,
-    film: Annotated[bool, typer.Option("--film/--no-film", help="Write a film, disks.mp4.")] = True,
+    ] = 0
+    film: Annotated[bool, typer.Option("--film/--no-film", help="Write a film, disks.mp4.")] = True
     sweep: Annotated[
         bool,
         typer.Option(
             "--sweep",
             help="Instead of a crossing: slip and sinkage against torque, drawbar pull against slip; takes minutes.",
         ),
-    ] = False,
-    seeds: Annotated[int, typer.Option(min=1, max=100, help="Sweep: number of beds for each trial.")] = 4,
+    ] = False
+    seeds: Annotated[int, typer.Option(min=1, max=100, help="Sweep: number of beds for each trial.")] = 4
     pull_disks: Annotated[
         int, typer.Option(min=30, max=20_000, help="Sweep: number of disks under the pulling wheel.")
-    ] = 480,
-    pull_layers: Annotated[int, typer.Option(min=1, max=100, help="Sweep: layers of those disks.")] = 6,
-    output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
-    as_json: AsJson = False,
-) -> None:
+    ] = 480
+    pull_layers: Annotated[int, typer.Option(min=1, max=100, help="Sweep: layers of those disks.")] = 6
+    output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar")
+    as_json: AsJson = False
+
+    @property
+    def slowness(self) -> float:
+        """How much slower everything falls than on Earth."""
+        return float(np.sqrt(EARTH / self.gravity))
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of `DiskSimulation`."""
+        step = (2e-3 if self.sweep else 1e-3) * self.slowness if self.time_step is None else self.time_step
+        return {"gravity": (0.0, -self.gravity), "friction": self.friction, "time_step": step}
+
+
+@plain_errors
+@takes(DiskScene)
+def disks(given: DiskScene) -> None:
     """Drive the two-wheel rover over a bed of disks; record, draw and film it."""
-    names = ("disk-curves.json", "disk-curves.png") if sweep else ("disks.h5", "disks.png", "disks.mp4")
-    check_paths(output=Into(output, names))
-    slowness = float(np.sqrt(EARTH / gravity))
-    options: dict[str, Any] = {
-        "gravity": (0.0, -gravity),
-        "friction": friction,
-        "time_step": (2e-3 if sweep else 1e-3) * slowness if time_step is None else time_step,
-    }
-    with Results(as_json=as_json) as results:
-        if sweep:
-            beds = range(seed, seed + seeds)
-            _sweep(results, disks or 444, layers, pull_disks, pull_layers, beds, wheel_friction, options, output)
-        else:
-            seconds = 4.0 * slowness if duration is None else duration
-            _cross(results, disks or 222, layers, torque, seconds, seed, wheel_friction, options, output, film=film)
+    names = ("disk-curves.json", "disk-curves.png") if given.sweep else ("disks.h5", "disks.png", "disks.mp4")
+    check_paths(output=Into(given.output, names))
+    with Results(as_json=given.as_json) as results:
+        (_sweep if given.sweep else _cross)(results, given)
 
 
-def _cross(
-    results: Results,
-    disks: int,
-    layers: int,
-    torque: float,
-    duration: float,
-    seed: int,
-    wheel_friction: float,
-    options: dict[str, Any],
-    output: Path,
-    *,
-    film: bool,
-) -> None:
-    from rover_gym.ground.grains.disk_bed import (  # noqa: PLC0415
-        rover_on_disks,
-        settled_disks,
-    )
-    from rover_gym.record.disk_run import DiskRun  # noqa: PLC0415 - as above
+def _cross(results: Results, given: DiskScene) -> None:
     from rover_gym.show.figures.grain_frames import draw_disks, film_disks  # noqa: PLC0415 - matplotlib is slow to load
 
-    _check_width("disks", disks, layers, CROSSING)
-    bed = settled_disks(disks, layers, seed=seed, **options)
-    sim = rover_on_disks(bed, wheel_friction=wheel_friction, **options)
-    sim.set_torques([torque, torque])
+    disks, options, output = given.disks or 222, given.options, given.output
+    _check_width("disks", disks, given.layers, CROSSING)
+    bed = settled_disks(disks, given.layers, seed=given.seed, **options)
+    sim = rover_on_disks(bed, wheel_friction=given.wheel_friction, **options)
+    sim.set_torques([given.torque, given.torque])
     title = f"the two-wheel rover on {disks} disks"
     path = output / "disks.h5"
-    rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
+    duration = 4.0 * given.slowness if given.duration is None else given.duration
+    rate = FRAMES / given.slowness
 
-    def is_across(now: "DiskSimulation") -> bool:
+    def is_across(now: DiskSimulation) -> bool:
         return bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END)
 
     run = results.record(sim, duration, path, DiskRun, 2.0 * rate, title=title, until=is_across)
@@ -162,7 +152,7 @@ def _cross(
     )
     results.path("trajectory", path)
     results.path("figure", draw_disks(run, output / "disks.png", row=run.n_frames // 2))
-    if film:
+    if given.film:
         with status("drawing the film"):
             written = film_disks(run.resample(rate), output / "disks.mp4", frames_per_second=round(FRAMES))
         results.path("film", written)
@@ -170,8 +160,6 @@ def _cross(
 
 def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:
     """Refuses a bed that is too narrow (m) before settling it."""
-    from rover_gym.ground.grains.disk_bed import bed_width  # noqa: PLC0415 - h5py is slow to load
-
     width = bed_width(disks, layers, radius_max)
     if width < needed:
         enough = layers * math.ceil(needed / bed_width(1, 1, radius_max))
@@ -179,33 +167,16 @@ def _check_width(option: str, disks: int, layers: int, needed: float, radius_max
         refuse(OptionError, option, disks, f"{reason} take at least {enough}")
 
 
-def _sweep(
-    results: Results,
-    disks: int,
-    layers: int,
-    pull_disks: int,
-    pull_layers: int,
-    seeds: range,
-    wheel_friction: float,
-    options: dict[str, Any],
-    output: Path,
-) -> None:
-    from rover_gym.ground.grains.disk_bed import settled_disks  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.ground.grains.disk_trials import (  # noqa: PLC0415 - as above
-        drawbar_pull,
-        drive_on_disks,
-        fit_traction,
-        over_beds,
-    )
+def _sweep(results: Results, given: DiskScene) -> None:
     from rover_gym.show.figures.disk_run_figures import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
 
-    _check_width("disks", disks, layers, CROSSING)
-    _check_width("pull_disks", pull_disks, pull_layers, PULLING, UNEQUAL["radius_max"])
-    scale = -options["gravity"][1] / EARTH
-    slowness = float(scale**-0.5)
+    disks, options, slowness, output = given.disks or 444, given.options, given.slowness, given.output
+    seeds = range(given.seed, given.seed + given.seeds)
+    _check_width("disks", disks, given.layers, CROSSING)
+    _check_width("pull_disks", given.pull_disks, given.pull_layers, PULLING, UNEQUAL["radius_max"])
     # Means over seconds and beds need no tighter tolerance, and most of a bed is at rest.
     cheap = {"tolerance": 1e-3, "sleep": True, "sleep_speed": 5e-4 / slowness}
-    rest = {**options, **cheap, "wheel_friction": wheel_friction}
+    rest = {**options, **cheap, "wheel_friction": given.wheel_friction}
     drive = partial(drive_on_disks, run_in=0.5 * slowness, duration=2.0 * slowness, **rest)
     with progress_bar() as bar:
         total = len(seeds) * (2 + len(TORQUES) + len(LOADS) * len(SLIPS))
@@ -219,16 +190,16 @@ def _sweep(
 
         beds, pull_beds = [], []
         for seed in seeds:
-            beds.append(settled_disks(disks, layers, seed=seed, **options))
+            beds.append(settled_disks(disks, given.layers, seed=seed, **options))
             advance(1)
-            pull_beds.append(settled_disks(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
+            pull_beds.append(settled_disks(given.pull_disks, given.pull_layers, seed=seed, **UNEQUAL, **options))
             advance(1)
         pulls, drives, interrupted = {}, [], False
         try:
             for load in LOADS:
                 pull = partial(drawbar_pull, load=load, rim_speed=RIM_SPEED / slowness, **rest)
                 pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
-            drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+            drives = over_beds(drive, [torque / slowness**2 for torque in TORQUES], beds, progress=advance)
         except KeyboardInterrupt:
             interrupted = True
     if interrupted and not pulls:
@@ -252,7 +223,7 @@ def _sweep(
     results.path("curves", draw_curves(drives, pulls, fits, output / "disk-curves.png"))
 
 
-def _fits(fits: dict[float, "Traction"]) -> Table:
+def _fits(fits: dict[float, Traction]) -> Table:
     """The parameters of the pull curve for each load."""
     first = next(iter(fits.values())).first
     table = Table(title="pull / load = A (1 - exp(-(s - s₀) / K)) of the slip s", title_justify="left")

@@ -32,11 +32,9 @@ from rover_gym.cli.options import (
     FilmCamera,
     FilmForces,
     FilmSize,
-    HeightRange,
+    MapFile,
     ModelName,
-    NoData,
     OnMap,
-    Spacing,
     Start,
     TerrainName,
     chosen_terrain,
@@ -48,9 +46,9 @@ from rover_gym.cli.options import (
     given_arguments,
     known_environment,
     named_driver,
-    named_ground,
     named_model,
     places_on,
+    takes,
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
@@ -108,12 +106,11 @@ Film = Annotated[
 
 
 @plain_errors
+@takes(MapFile)
 def drive(
+    map_file: MapFile,
     *,
     terrain: TerrainName = None,
-    spacing: Spacing = None,
-    height_range: HeightRange = None,
-    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     difficulty: Difficulty = None,
     slope: Slope = None,
@@ -158,9 +155,9 @@ def drive(
     if is_free:
         del scene["terrain"]
     scene |= _given({"difficulty": difficulty, "slope_deg": slope, "uphill_deg": uphill, "heading_deg": heading})
-    named = _given({"model": None if model == BUILT_IN else model, "spacing": spacing, "height_range": height_range})
-    named |= {} if nodata is None else {"nodata": str(nodata)}
-    rover, ground = named_model(model), named_ground(terrain, spacing, height_range, nodata)
+    named = _given({"model": None if model == BUILT_IN else model, **vars(map_file)})
+    named |= {"nodata": str(named["nodata"])} if "nodata" in named else {}
+    rover, ground = named_model(model), map_file.open(terrain)
     options = places_on(ground, {"position": start, "goal": goal}, map_coordinates=map_coordinates)
     chosen = named_driver(policy, rover)
     as_given = {**scene, **named, **chosen.arguments, **own}

@@ -13,29 +13,26 @@ from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
     FRICTION,
-    HeightRange,
+    MapFile,
     ModelName,
-    NoData,
     OnMap,
-    Spacing,
     Start,
     TerrainName,
     chosen_terrain,
     driver_title,
     named_driver,
-    named_ground,
     named_model,
     places_on,
+    takes,
     warn_of_slope,
 )
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.cli.usage import WholeHelp
+from rover_gym.cli.usage import group
 from rover_gym.core import OptionError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
-from rover_gym.drive.named_policy import Policy
-from rover_gym.drive.pd_policy import find_rover_env
-from rover_gym.drive.random_policy import RandomPolicy
+from rover_gym.drive.commands.driven import Policy, find_rover_env
+from rover_gym.drive.pd.random_policy import RandomPolicy
 from rover_gym.envs.registration import ENVIRONMENTS
 from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_writer import FPS, write_mcap
@@ -43,9 +40,7 @@ from rover_gym.exports.minari_data import write_dataset
 from rover_gym.exports.onnx_policy import write_onnx
 from rover_gym.record.rover_run import read_run
 
-export = typer.Typer(
-    cls=WholeHelp, rich_markup_mode=None, help="Runs, policies and rovers in other formats.", no_args_is_help=True
-)
+export = group("Runs, policies and rovers in other formats.")
 
 
 @export.command()
@@ -88,13 +83,12 @@ def onnx(
 
 @export.command()
 @plain_errors
+@takes(MapFile)
 def fmu(
+    map_file: MapFile,
     *,
     output: Annotated[Path, typer.Option(dir_okay=False, help="File to write, usually .fmu.")],
     terrain: TerrainName = None,
-    spacing: Spacing = None,
-    height_range: HeightRange = None,
-    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
         float | None, typer.Option(help="Difficulty of rocks and hills, from 0 to 2. It implies rocks.")
@@ -121,7 +115,7 @@ def fmu(
     arguments |= {} if heading is None else {"heading_deg": heading}
     if (rover := named_model(model)) is not None:
         arguments["model"] = rover
-    if (ground := named_ground(terrain, spacing, height_range, nodata)) is not None:
+    if (ground := map_file.open(terrain)) is not None:
         arguments["terrain"] = ground
     options = places_on(ground, {"position": start}, map_coordinates=map_coordinates)
     env = gym.make("Rover-v0", **arguments)

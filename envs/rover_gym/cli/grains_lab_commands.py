@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -20,11 +20,18 @@ from rover_gym.cli.grains_options import EARTH, FOLDER, Balls, Friction, Gravity
 from rover_gym.cli.options import takes
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.core.validation import number
-
-if TYPE_CHECKING:
-    from rover_gym.ground.grains.ball_bed import BallBed
-    from rover_gym.ground.grains.lab.fits import ShearLaw
-
+from rover_gym.ground.grains.ball_bed import BallBed, settled_balls
+from rover_gym.ground.grains.lab import (
+    ShearLaw,
+    fit_pressure,
+    fit_pull,
+    fit_shear,
+    fit_strength,
+    plate_test,
+    shear_test,
+    wheel_test,
+    write_table,
+)
 
 Samples = Annotated[int, typer.Option(min=4, max=10_000, help="Rows of the table.")]
 SPREAD = 0.2  # of the radii about their mean
@@ -58,10 +65,8 @@ class Bench:
         names = ("friction", "time_step", "tolerance")
         return {name: getattr(self, name) for name in names} | {"gravity": (0.0, -self.gravity, 0.0)}
 
-    def bed(self) -> "BallBed":
+    def bed(self) -> BallBed:
         """The settled bed."""
-        from rover_gym.ground.grains.ball_bed import settled_balls  # noqa: PLC0415 - h5py is slow to load
-
         with status("settling the bed"):
             return settled_balls(
                 self.balls,
@@ -85,8 +90,6 @@ def plate(
     samples: Samples = 25,
 ) -> None:
     """Push a round plate into a bed of balls; write pressure against depth and fit k zⁿ."""
-    from rover_gym.ground.grains.lab import fit_pressure, plate_test, write_table  # noqa: PLC0415 - h5py is slow to load
-
     options = given.options
     number("sinkage", sinkage, above=0.0)
     bed = given.bed()
@@ -128,8 +131,6 @@ def shear(
     samples: Samples = 25,
 ) -> None:
     """Turn a loaded disc with vanes on a bed of balls; write shear stress against displacement and fit its laws."""
-    from rover_gym.ground.grains.lab import fit_shear, fit_strength, shear_test, write_table  # noqa: PLC0415 - h5py is slow
-
     options = given.options
     bed = given.bed()
     with Results(as_json=given.as_json) as results:
@@ -162,7 +163,7 @@ def shear(
         results.table("shear stress, limit (1 - exp(-j / K))", rows)
 
 
-def _law(law: "ShearLaw") -> Row:
+def _law(law: ShearLaw) -> Row:
     scale = f"K {1e3 * law.scale:.2g} ± {1e3 * law.scale_error:.1g} mm"
     return row(f"{law.normal_stress:.0f} Pa", f"limit {law.limit:.0f} ± {law.limit_error:.0f} Pa, {scale}")
 
@@ -186,8 +187,6 @@ def wheel(
     distance: Annotated[float, typer.Option(help="Travel that is measured, m.")] = 0.1,
 ) -> None:
     """Drive a wheel over a bed of balls; write pull, lateral force, torque and sinkage against slip."""
-    from rover_gym.ground.grains.lab import fit_pull, wheel_test, write_table  # noqa: PLC0415 - h5py is slow to load
-
     options = given.options
     number("slip_angle", slip_angle, at_least=-90.0, at_most=90.0)
     bed = given.bed()

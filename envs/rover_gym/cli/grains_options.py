@@ -9,9 +9,12 @@ import typer
 
 from rover_gym.cli.console import AsJson, Results, Row, row, status
 from rover_gym.cli.paths import Into, check_paths
+from rover_gym.ground.grains.ball_bed import BallBed, settled_balls
+from rover_gym.ground.grains.bed_scenes import SPREAD
+from rover_gym.record.grain_run import GrainRun
 
 if TYPE_CHECKING:
-    from rover_gym.record.grain_run import GrainRun, Recordable
+    from rover_gym.record.grain_run import Recordable
 
 EARTH, MARS = 9.81, 3.71  # m/s^2
 FOLDER = Path("runs/grains")
@@ -56,51 +59,55 @@ class BallScene:
         names = (*frictions, "time_step", "tolerance", "sleep")
         return {name: getattr(self, name) for name in names} | {"gravity": (0.0, -self.gravity, 0.0)}
 
+    def settled(self, balls: int, radius: float, width: float, depth: float) -> BallBed:
+        """A settled bed of balls with this mean radius, m."""
+        with status("settling the bed"):
+            return settled_balls(balls, width, depth, **radii(radius), seed=self.seed, **self.options)
+
+    def report(
+        self,
+        sim: "Recordable",
+        name: str,
+        title: str,
+        rows: Callable[[GrainRun], Sequence[Row]],
+        *,
+        scene: dict[str, Any] | None = None,
+        until: Callable[[Any], bool] = lambda _: False,
+    ) -> None:
+        """Records a run, films it if wanted, says where both are, what came of it, and how well it was solved.
+
+        Args:
+            sim: The simulation.
+            name: Name of the file.
+            title: Title of the run.
+            rows: What came of the run that was recorded.
+            scene: Further facts of the recording.
+            until: Ends the run early.
+        """
+        with Results(as_json=self.as_json) as results:
+            path = self.output / f"{name}.h5"
+            facts = {"title": title, "scene": scene, "seed": self.seed}
+            run = results.record(sim, self.duration, path, GrainRun, self.fps, until=until, **facts)
+            results.path("trajectory", path)
+            if self.film:
+                from rover_gym.show.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
+
+                with status("drawing the film"):
+                    results.path("film", film_run(run, path.with_suffix(".mp4")))
+            results.table(run.title, [*rows(run), *_solved(run)])
+
 
 def radii(radius: float) -> dict[str, float]:
     """The range of radii about a mean radius, m."""
-    from rover_gym.ground.grains.bed_scenes import SPREAD  # noqa: PLC0415 - h5py is slow to load
-
     return {"radius_min": (1.0 - SPREAD) * radius, "radius_max": (1.0 + SPREAD) * radius}
 
 
-def recorded(
-    results: Results,
-    given: BallScene,
-    sim: "Recordable",
-    name: str,
-    title: str,
-    *,
-    scene: dict[str, Any] | None = None,
-    until: Callable[[Any], bool] = lambda _: False,
-) -> "GrainRun":
-    """Records a run, films it if wanted, says where both are, and reads it back."""
-    from rover_gym.record.grain_run import GrainRun  # noqa: PLC0415 - h5py is slow to load
-
-    path = given.output / f"{name}.h5"
-    facts = {"title": title, "scene": scene, "seed": given.seed}
-    run = results.record(sim, given.duration, path, GrainRun, given.fps, until=until, **facts)
-    results.path("trajectory", path)
-    if given.film:
-        from rover_gym.show.figures.grain_frames import film_run  # noqa: PLC0415 - VTK is slow to load
-
-        with status("drawing the film"):
-            results.path("film", film_run(run, path.with_suffix(".mp4")))
-    return run
-
-
-def say(results: Results, run: "GrainRun", rows: Sequence[Row]) -> None:
-    """Says results, and how well the run was solved."""
+def _solved(run: GrainRun) -> list[Row]:
+    """How well a run was solved."""
     data = run.trajectory
     share = float(data["penetration"].max()) / float(run.radius.min())
-    unconverged = int(data.attributes["unconverged_rows"])
-    solved = [
+    unconverged, rows = int(data.attributes["unconverged_rows"]), run.n_frames - 1
+    return [
         row("deepest overlap", f"{100.0 * share:.3f}% of the smallest radius", deepest_overlap_in_radii=share),
-        row(
-            "rows not converged",
-            f"{unconverged} of {run.n_frames - 1}",
-            unconverged_rows=unconverged,
-            rows=run.n_frames - 1,
-        ),
+        row("rows not converged", f"{unconverged} of {rows}", unconverged_rows=unconverged, rows=rows),
     ]
-    results.table(run.title, [*rows, *solved])

@@ -13,17 +13,15 @@ from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
     FRICTION,
-    HeightRange,
+    MapFile,
     ModelName,
-    NoData,
     OpenIt,
-    Spacing,
     TerrainName,
     chosen_terrain,
     complete_policy,
     named_driver,
-    named_ground,
     named_model,
+    takes,
 )
 from rover_gym.cli.paths import Into, check_paths
 from rover_gym.core import Terrain
@@ -37,12 +35,11 @@ LOOK = 0.2
 
 
 @plain_errors
+@takes(MapFile)
 def live(
+    map_file: MapFile,
     *,
     terrain: TerrainName = None,
-    spacing: Spacing = None,
-    height_range: HeightRange = None,
-    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     difficulty: Annotated[
         float | None,
@@ -79,7 +76,7 @@ def live(
     choices, scene = LiveChoices(), LiveScene()
     named = chosen_terrain(terrain, difficulty)
     grounds: dict[str, str | Terrain] = dict(choices.grounds)
-    if (ground := named_ground(named, spacing, height_range, nodata)) is not None:
+    if (ground := map_file.open(named)) is not None:
         named = Path(named).name
         grounds[named] = ground
     models, rover = dict(choices.models), model

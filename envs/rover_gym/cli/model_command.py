@@ -13,7 +13,7 @@ from rich.table import Table
 from rover_gym.cli.console import AsJson, Results, plain_errors, plain_table, tidy
 from rover_gym.cli.options import complete_model
 from rover_gym.cli.paths import check_paths
-from rover_gym.cli.usage import WholeHelp
+from rover_gym.cli.usage import group
 from rover_gym.core import ModelError, OptionError, RoverModel
 from rover_gym.core.extras import MissingExtraError, require
 from rover_gym.core.validation import refuse
@@ -21,7 +21,7 @@ from rover_gym.models import ImportReport, Statics, check_statics, open_model, r
 from rover_gym.show.figures.model_drawing import write_model_picture
 from rover_gym.show.figures.style import check_format
 
-model = typer.Typer(cls=WholeHelp, rich_markup_mode=None, help="Rover models.", no_args_is_help=True)
+model = group("Rover models.")
 
 Named = Annotated[
     str,

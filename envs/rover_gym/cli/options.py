@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
@@ -16,7 +16,7 @@ from rover_gym.core import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
 from rover_gym.drive.named_policy import NAMES_HELP, NamedPolicy, named_policy, policy_title
-from rover_gym.drive.planner_policy import PlannerPolicy
+from rover_gym.drive.planning.planner_policy import PlannerPolicy
 from rover_gym.envs.arguments import ARGUMENTS, TERRAINS, terrain_name
 from rover_gym.envs.episode_scene import map_place
 from rover_gym.envs.registration import ENVIRONMENTS as REGISTERED
@@ -120,17 +120,35 @@ TerrainName = Annotated[
     ),
 ]
 
-Spacing = Annotated[
-    float | None, typer.Option(help="Distance of a map's columns and rows, m, where its file does not give it.")
-]
 
-HeightRange = Annotated[
-    tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Heights of black and white in a PNG, m.")
-]
+@dataclass(frozen=True)
+class MapFile:
+    """How the file of a map is read."""
 
-NoData = Annotated[
-    float | None, typer.Option("--nodata", help="Number that means missing data in a map; nan if none does.")
-]
+    spacing: Annotated[
+        float | None, typer.Option(help="Distance of a map's columns and rows, m, where its file does not give it.")
+    ] = None
+    height_range: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Heights of black and white in a PNG, m.")
+    ] = None
+    nodata: Annotated[
+        float | None, typer.Option("--nodata", help="Number that means missing data in a map; nan if none does.")
+    ] = None
+
+    def open(self, terrain: str) -> HeightField | TriangleMesh | None:
+        """The map or mesh of an option `--terrain`; None if it does not name a file.
+
+        Raises:
+            OptionError: An option is given that only a map's file takes.
+            TerrainError: The file is damaged or does not say enough.
+            OSError: It cannot be read.
+        """
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        if not terrain.lower().endswith(MAP_ENDINGS):
+            for name, value in given.items():
+                refuse(OptionError, name, value, "needs a map's file as terrain")
+        return open_terrain(terrain, **given) if is_terrain_file(terrain) else None
+
 
 OnMap = Annotated[
     bool, typer.Option("--map-coordinates", help="Start and goal are easting and northing of the GeoTIFF.")
@@ -187,27 +205,6 @@ def named_model(name: str) -> RoverModel | None:
         OSError: Its file cannot be read.
     """
     return None if name == BUILT_IN else open_model(name)
-
-
-def named_ground(
-    terrain: str,
-    spacing: float | None,
-    height_range: tuple[float, float] | None,
-    nodata: float | None = None,
-) -> HeightField | TriangleMesh | None:
-    """The map or mesh of an option `--terrain`; None if it does not name a file.
-
-    Raises:
-        OptionError: An option is given that only a map's file takes.
-        TerrainError: The file is damaged or does not say enough.
-        OSError: It cannot be read.
-    """
-    given: dict[str, Any] = {"spacing": spacing, "height_range": height_range, "nodata": nodata}
-    given = {name: value for name, value in given.items() if value is not None}
-    if not terrain.lower().endswith(MAP_ENDINGS):
-        for name, value in given.items():
-            refuse(OptionError, name, value, "needs a map's file as terrain")
-    return open_terrain(terrain, **given) if is_terrain_file(terrain) else None
 
 
 def places_on(

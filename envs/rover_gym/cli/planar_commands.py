@@ -13,7 +13,7 @@ from rover_gym.cli.console import AsJson, Results, plain_errors, row
 from rover_gym.cli.disks_command import disks
 from rover_gym.cli.options import takes, warn_of_slope
 from rover_gym.cli.paths import Into, check_paths
-from rover_gym.cli.usage import WholeHelp
+from rover_gym.cli.usage import group
 from rover_gym.core import (
     BallSimulation,
     Line,
@@ -29,12 +29,7 @@ from rover_gym.core.validation import number, refuse
 from rover_gym.record.planar_run import PlanarRun
 from rover_gym.scenes.incline import Incline, ball_on_slope
 
-planar = typer.Typer(
-    cls=WholeHelp,
-    rich_markup_mode=None,
-    help="Planar systems: a ball, a two-wheel rover, beds of disks.",
-    no_args_is_help=True,
-)
+planar = group("Planar systems: a ball, a two-wheel rover, beds of disks.")
 
 
 STEEPEST = 89.0  # degrees: an upright line is no ground
@@ -90,7 +85,23 @@ class Course:
     @property
     def line(self) -> PlanarGround:
         """The ground."""
-        return _ground(self.ground, self.slope, self.amplitude, self.wavelength, self.height, self.table)
+        kind, table = self.ground, self.table
+        if kind is PlanarGroundKind.line:
+            return Line(float(np.tan(np.radians(number("slope", self.slope, at_least=-STEEPEST, at_most=STEEPEST)))))
+        if kind is PlanarGroundKind.sine:
+            return Sine(self.amplitude, self.wavelength)
+        if kind is PlanarGroundKind.step:
+            return Polyline.step(2.0, self.height)
+        if table is None:
+            refuse(OptionError, "table", None, "the ground 'table' needs a file")
+        if not table.is_file() or table.stat().st_size > LARGEST_TABLE:  # a device has no end
+            refuse(OptionError, "table", str(table), f"must be a regular file of at most {LARGEST_TABLE} bytes")
+        try:
+            points = np.loadtxt(table, ndmin=2)
+            x, y = points[:, 0], points[:, 1]
+        except (ValueError, IndexError):
+            refuse(OptionError, "table", str(table), "does not hold two columns of numbers")
+        return Spline(x, y)
 
 
 @planar.command()
@@ -104,12 +115,7 @@ def ball(
     drop: Annotated[float, typer.Option(min=0.0, help="Height of the start over the ground, m.")] = 1.0,
 ) -> None:
     """Drop a ball on a line, a sine, a step or a table of points; record and draw its path."""
-    sim = BallSimulation(
-        given.line,
-        mass=mass,
-        radius=radius,
-        **given.options,
-    )
+    sim = BallSimulation(given.line, mass=mass, radius=radius, **given.options)
     sim.set_state([0.0, sim.ground.height(0.0) + radius + drop, 0.0], [given.speed, 0.0, 0.0])
     _lift(sim, drop)
     _run(sim, "a ball", given, given.output / "ball.h5")
@@ -190,27 +196,6 @@ def _moment(time: float) -> str:
 
 
 planar.command()(disks)
-
-
-def _ground(
-    kind: PlanarGroundKind, slope: float, amplitude: float, wavelength: float, height: float, table: Path | None
-) -> PlanarGround:
-    if kind is PlanarGroundKind.line:
-        return Line(float(np.tan(np.radians(number("slope", slope, at_least=-STEEPEST, at_most=STEEPEST)))))
-    if kind is PlanarGroundKind.sine:
-        return Sine(amplitude, wavelength)
-    if kind is PlanarGroundKind.step:
-        return Polyline.step(2.0, height)
-    if table is None:
-        refuse(OptionError, "table", None, "the ground 'table' needs a file")
-    if not table.is_file() or table.stat().st_size > LARGEST_TABLE:  # a device has no end
-        refuse(OptionError, "table", str(table), f"must be a regular file of at most {LARGEST_TABLE} bytes")
-    try:
-        points = np.loadtxt(table, ndmin=2)
-        x, y = points[:, 0], points[:, 1]
-    except (ValueError, IndexError):
-        refuse(OptionError, "table", str(table), "does not hold two columns of numbers")
-    return Spline(x, y)
 
 
 def _lift(sim: PlanarSimulation, clearance: float) -> None:

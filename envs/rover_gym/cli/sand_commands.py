@@ -1,8 +1,8 @@
 """`rover sand soils|bed|slope|rovers|climb|convert|trials`: soils, one wheel on a test bed, and rovers on slopes."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,12 +11,13 @@ import typer
 from rich.table import Table
 
 from rover_gym.cli.console import AsJson, Results, figure, plain_errors
+from rover_gym.cli.options import takes
 from rover_gym.cli.paths import check_paths
-from rover_gym.cli.usage import WholeHelp
+from rover_gym.cli.usage import group
 from rover_gym.core import OptionError
 from rover_gym.core.validation import number, refuse
 from rover_gym.drive import PDPolicy, Policy, SandGains, SandPolicy, drive_all
-from rover_gym.drive.dug_in import DugIn
+from rover_gym.drive.pd.dug_in import DugIn
 from rover_gym.ground.sand import (
     SingleWheel,
     Soil,
@@ -30,20 +31,38 @@ from rover_gym.ground.sand.convert import convert_runs
 from rover_gym.ground.sand.trials import read_trial
 from rover_gym.models import open_model
 
-sand = typer.Typer(
-    cls=WholeHelp, rich_markup_mode=None, help="Wheels and rovers on sand, and soils by name.", no_args_is_help=True
-)
+sand = group("Wheels and rovers on sand, and soils by name.")
 
 EARTH = 9.81  # m/s^2
 
 SoilName = Annotated[str, typer.Option("--soil", help="Name of the soil; `rover sand soils` lists them.")]
-Radius = Annotated[float, typer.Option(help="Radius of the wheel without grousers, m.")]
-Width = Annotated[float, typer.Option(help="Width of the wheel, m.")]
-GrouserHeight = Annotated[float, typer.Option(help="Height of its grousers, m.")]
-Grousers = Annotated[int, typer.Option(min=0, help="Number of its grousers.")]
-Mass = Annotated[float, typer.Option(help="Mass that the wheel carries, kg.")]
 Gravity = Annotated[float, typer.Option(help="Gravity, m/s^2.")]
-Slip = Annotated[list[float] | None, typer.Option(help="Slip, from -1 (locked) to below 1; repeat it for several.")]
+
+
+@dataclass(frozen=True)
+class WheelOnSand:
+    """One wheel on sand with its load."""
+
+    soil: SoilName = "cmu-sand"
+    radius: Annotated[float, typer.Option(help="Radius of the wheel without grousers, m.")] = 0.1
+    width: Annotated[float, typer.Option(help="Width of the wheel, m.")] = 0.08
+    grouser_height: Annotated[float, typer.Option(help="Height of its grousers, m.")] = 0.0
+    grousers: Annotated[int, typer.Option(min=0, help="Number of its grousers.")] = 0
+    mass: Annotated[float, typer.Option(help="Mass that the wheel carries, kg.")] = 2.0
+    gravity: Gravity = EARTH
+    slip: Annotated[
+        list[float] | None, typer.Option(help="Slip, from -1 (locked) to below 1; repeat it for several.")
+    ] = None
+    as_json: AsJson = False
+
+    def __post_init__(self) -> None:
+        number("mass", self.mass, above=0.0)
+
+    @property
+    def wheel(self) -> SingleWheel:
+        """The wheel."""
+        return SingleWheel(self.radius, self.width, self.grouser_height, self.grousers)
+
 
 SLIPS = (-0.5, -0.2, 0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 
@@ -81,16 +100,10 @@ def _drive(slip: float, radius: float, angle: float, load: float, gravity: float
 
 @sand.command()
 @plain_errors
+@takes(WheelOnSand)
 def bed(
+    given: WheelOnSand,
     *,
-    soil: SoilName = "cmu-sand",
-    radius: Radius = 0.1,
-    width: Width = 0.08,
-    grouser_height: GrouserHeight = 0.0,
-    grousers: Grousers = 0,
-    mass: Mass = 2.0,
-    gravity: Gravity = EARTH,
-    slip: Slip = None,
     slip_angle: Annotated[float, typer.Option(help="Angle from the wheel's plane to its travel, degrees.")] = 0.0,
     rover: Annotated[
         str | None,
@@ -100,7 +113,6 @@ def bed(
         Path | None,
         typer.Option(dir_okay=False, help="Plot of pull, sinkage and torque over the slip."),
     ] = None,
-    as_json: AsJson = False,
 ) -> None:
     """Drive one wheel over a bed at given slips: sinkage, drawbar pull, side force and torque in steady motion.
 
@@ -111,51 +123,37 @@ def bed(
     if rover is not None:
         model = open_model(rover)
         radius = float(model.wheel_radii[0])
-        wheel_of = with_wide_wheels(model, width / radius).to_dict()["wheels"][0]
-        grouser_height, grousers = wheel_of["grouser_height"], wheel_of["grousers"]
-        mass = float(model.mass) / len(model.wheel_names)
+        wheel_of = with_wide_wheels(model, given.width / radius).to_dict()["wheels"][0]
+        grousers = {name: wheel_of[name] for name in ("grouser_height", "grousers")}
+        given = replace(given, radius=radius, mass=float(model.mass) / len(model.wheel_names), **grousers)
         whose = f"a wheel of {Path(rover).stem}"
-    mass = number("mass", mass, above=0.0)
-    wheel = SingleWheel(radius, width, grouser_height, grousers).on(named_soil(soil))
-    slips = list(slip or SLIPS)
-    found = wheel.steady([_drive(s, radius, slip_angle, mass * gravity, gravity) for s in slips])
+    slips, load = list(given.slip or SLIPS), given.mass * given.gravity
+    drives = [_drive(s, given.radius, slip_angle, load, given.gravity) for s in slips]
+    found = given.wheel.on(named_soil(given.soil)).steady(drives)
     runs = [
         {"slip": s, "sinkage_mm": 1e3 * z, "drawbar_N": pull, "across_N": -side, "torque_Nm": torque}
         for s, (z, pull, side, _, torque) in zip(slips, found.tolist(), strict=True)
     ]
-    with Results(as_json=as_json) as results:
+    with Results(as_json=given.as_json) as results:
         _show(results, "runs", runs)
         if plot is not None:
             from rover_gym.show.figures.sand_figure import draw_wheel_on_sand  # noqa: PLC0415 - matplotlib is slow to load
 
-            size = f"radius {1e3 * radius:.3g} mm, width {1e3 * width:.3g} mm, load {mass * gravity:.3g} N"
-            results.path("figure", draw_wheel_on_sand(runs, f"Drawbar pull of {whose} on {soil} ({size})", plot))
+            size = f"radius {1e3 * given.radius:.3g} mm, width {1e3 * given.width:.3g} mm, load {load:.3g} N"
+            results.path("figure", draw_wheel_on_sand(runs, f"Drawbar pull of {whose} on {given.soil} ({size})", plot))
 
 
 @sand.command()
 @plain_errors
-def slope(
-    *,
-    soil: SoilName = "cmu-sand",
-    radius: Radius = 0.1,
-    width: Width = 0.08,
-    grouser_height: GrouserHeight = 0.0,
-    grousers: Grousers = 0,
-    mass: Mass = 2.0,
-    gravity: Gravity = EARTH,
-    slip: Slip = None,
-    as_json: AsJson = False,
-) -> None:
+@takes(WheelOnSand)
+def slope(given: WheelOnSand) -> None:
     """Find the slope that a wheel with its load climbs at given slips."""
-    mass = number("mass", mass, above=0.0)
-    wheel = SingleWheel(radius, width, grouser_height, grousers)
-    chosen = named_soil(soil)
-    slips = list(slip or [s for s in SLIPS if s > 0.0])
+    wheel, soil = given.wheel, named_soil(given.soil)
     slopes = []
-    for s in slips:
-        angle, sinkage = climbed_slope(wheel, chosen, mass, s, gravity)
-        slopes.append({"slip": s, "slope_deg": math.degrees(angle), "sinkage_mm": 1e3 * sinkage})
-    _say("slopes", slopes, as_json=as_json)
+    for slip in given.slip or [slip for slip in SLIPS if slip > 0.0]:
+        angle, sinkage = climbed_slope(wheel, soil, given.mass, slip, given.gravity)
+        slopes.append({"slip": slip, "slope_deg": math.degrees(angle), "sinkage_mm": 1e3 * sinkage})
+    _say("slopes", slopes, as_json=given.as_json)
 
 
 @sand.command()
@@ -305,4 +303,4 @@ def trials(
     as_json: AsJson = False,
 ) -> None:
     """List slope, speed and slip of measured trials of a rover."""
-    _say("trials", [dataclasses.asdict(read_trial(source, radius)) for source in sources], as_json=as_json)
+    _say("trials", [asdict(read_trial(source, radius)) for source in sources], as_json=as_json)

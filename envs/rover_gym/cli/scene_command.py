@@ -14,14 +14,12 @@ from rich.table import Table
 from rover_gym.cli.console import AsJson, Results, plain_errors, progress_bar
 from rover_gym.cli.options import (
     BUILT_IN,
-    HeightRange,
+    MapFile,
     ModelName,
-    NoData,
-    Spacing,
     Start,
     complete_terrain,
-    named_ground,
     named_model,
+    takes,
     warn_of_slope,
 )
 from rover_gym.core import OptionError, Plane, RoverModel, SphereField, Terrain
@@ -40,7 +38,9 @@ GROUNDS = ("plane", "rocks", "rug")
 
 
 @plain_errors
+@takes(MapFile)
 def scene(
+    map_file: MapFile,
     *,
     terrain: Annotated[
         str,
@@ -49,9 +49,6 @@ def scene(
             autocompletion=complete_terrain,
         ),
     ] = "plane",
-    spacing: Spacing = None,
-    height_range: HeightRange = None,
-    nodata: NoData = None,
     model: ModelName = BUILT_IN,
     start: Start = None,
     slope: Annotated[float, typer.Option(help="Slope of the plane or rocks, degrees, rising along x.")] = 0.0,
@@ -82,7 +79,7 @@ def scene(
     """
     number("torque", torque)
     rover = named_model(model) or RoverModel()
-    ground: Terrain | None = named_ground(terrain, spacing, height_range, nodata)
+    ground: Terrain | None = map_file.open(terrain)
     if slope and (ground is not None or terrain == "rug"):
         refuse(OptionError, "slope", slope, "cannot be chosen: the ground defines its slope")
     if ground is None:

@@ -19,10 +19,10 @@ from rover_gym.cli.paths import Into, check_paths
 from rover_gym.core import OptionError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.arc_network_policy import ARCS_FILE
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE
+from rover_gym.drive.forecast.network_files import PolicyError
 from rover_gym.drive.named_policy import network_folder
-from rover_gym.drive.network_files import PolicyError
 
 LARGEST = 498  # the largest seed: the fields of all seeds stay below the evaluations'
 

@@ -26,6 +26,11 @@ class WholeHelp(TyperGroup):
                 formatter.write_dl(rows)
 
 
+def group(text: str) -> typer.Typer:
+    """A group of commands, whose help begins with this text; alone it prints its help."""
+    return typer.Typer(cls=WholeHelp, rich_markup_mode=None, help=text, no_args_is_help=True)
+
+
 class PlainUsage(WholeHelp):
     """The group of all commands, which ends with one line on standard error where its usage is wrong."""
 

@@ -1,18 +1,24 @@
 """Files that are written whole or not at all."""
 
+from __future__ import annotations
+
 import errno
 import itertools
 import os
 import re
 import shutil
 import stat
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from xml.etree import ElementTree
+from typing import TYPE_CHECKING
 
-from rover_gym.core import RoverGymError
 from rover_gym.core.validation import refuse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from xml.etree import ElementTree
+
+    from rover_gym.core import RoverGymError
 
 _NUMBERS = itertools.count()
 

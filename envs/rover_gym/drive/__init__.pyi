@@ -1,69 +1,30 @@
-from .arc_forecast import FORECAST_FILE, ForesightCosts
-from .arc_network import ArcNetwork
-from .arc_network_policy import ArcNetworkPolicy
-from .arc_search import PathCosts
-from .command import CommandController, CommandLimits
+from .arcs.arc_network import ArcNetwork as ArcNetwork
+from .arcs.arc_network_policy import ArcNetworkPolicy as ArcNetworkPolicy
+from .arcs.guided_policy import GuidedPolicy as GuidedPolicy
+from .commands.command import CommandController as CommandController, CommandLimits as CommandLimits
+from .commands.driven import ObservingPolicy as ObservingPolicy, Policy as Policy
+from .commands.features import Features as Features
 from .evaluation import (
-    ENDS,
-    Episode,
-    EvaluatedEpisode,
-    IntervalEstimate,
-    PolicySummary,
-    drive_all,
-    mean_estimate,
-    ratio_estimate,
-    run_episode,
-    summarise,
-    wilson_interval,
+    ENDS as ENDS,
+    Episode as Episode,
+    EvaluatedEpisode as EvaluatedEpisode,
+    IntervalEstimate as IntervalEstimate,
+    PolicySummary as PolicySummary,
+    drive_all as drive_all,
+    mean_estimate as mean_estimate,
+    ratio_estimate as ratio_estimate,
+    run_episode as run_episode,
+    summarise as summarise,
+    wilson_interval as wilson_interval,
 )
-from .features import Features
-from .field_plan import FieldPlan
-from .ground_map import MapOptions
-from .guided_policy import GuidedPolicy
-from .named_policy import NamedPolicy, Policy, named_policy
-from .network_files import Network, PolicyError
-from .pd_policy import PDGains, PDPolicy
-from .planner_policy import PlannerOptions, PlannerPolicy
-from .rollouts import Ends, Rollouts
-from .sand_policy import SandGains, SandPolicy
-from .scan_policy import ScanGains, ScanPolicy
-
-__all__ = [
-    "ENDS",
-    "FORECAST_FILE",
-    "ArcNetwork",
-    "ArcNetworkPolicy",
-    "CommandController",
-    "CommandLimits",
-    "Ends",
-    "Episode",
-    "EvaluatedEpisode",
-    "Features",
-    "FieldPlan",
-    "ForesightCosts",
-    "GuidedPolicy",
-    "IntervalEstimate",
-    "MapOptions",
-    "NamedPolicy",
-    "Network",
-    "PDGains",
-    "PDPolicy",
-    "PathCosts",
-    "PlannerOptions",
-    "PlannerPolicy",
-    "Policy",
-    "PolicyError",
-    "PolicySummary",
-    "Rollouts",
-    "SandGains",
-    "SandPolicy",
-    "ScanGains",
-    "ScanPolicy",
-    "drive_all",
-    "mean_estimate",
-    "named_policy",
-    "ratio_estimate",
-    "run_episode",
-    "summarise",
-    "wilson_interval",
-]
+from .forecast.arc_forecast import FORECAST_FILE as FORECAST_FILE, ForesightCosts as ForesightCosts
+from .forecast.network_files import Network as Network, PolicyError as PolicyError
+from .named_policy import NamedPolicy as NamedPolicy, named_policy as named_policy
+from .pd.pd_policy import PDGains as PDGains, PDPolicy as PDPolicy
+from .pd.sand_policy import SandGains as SandGains, SandPolicy as SandPolicy
+from .planning.planner_policy import PlannerOptions as PlannerOptions, PlannerPolicy as PlannerPolicy
+from .planning.rollouts import Ends as Ends, Rollouts as Rollouts
+from .scan.scan_policy import ScanGains as ScanGains, ScanPolicy as ScanPolicy
+from .search.arc_search import PathCosts as PathCosts
+from .search.field_plan import FieldPlan as FieldPlan
+from .search.ground_map import MapOptions as MapOptions

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import gymnasium as gym
@@ -14,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core.files import write_whole
-from rover_gym.drive.arc_forecast import FORECAST_FILE
-from rover_gym.drive.arc_network_policy import ARCS_FILE
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE
+from rover_gym.drive.commands.driven import Policy
 from rover_gym.drive.evaluation import (
     SUCCESSES,
     Episode,
@@ -27,7 +26,9 @@ from rover_gym.drive.evaluation import (
     run_episode,
     timed,
 )
-from rover_gym.drive.named_policy import NAMES, Policy, named_policy, network_folder
+from rover_gym.drive.forecast.arc_forecast import FORECAST_FILE
+from rover_gym.drive.forecast.network_files import FOLDER
+from rover_gym.drive.named_policy import NAMES, named_policy, network_folder
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
 from rover_gym.models.lookup import ModelLike
@@ -37,9 +38,6 @@ from rover_gym.show.frames.render_options import VideoWriter
 
 #: Longest episode of a comparison, s.
 EPISODE_SECONDS = MAX_EPISODE_STEPS * 0.05
-
-#: The package's own policies.
-POLICIES = Path(__file__).parents[1] / "data" / "policies"
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ def named_contender(policy: str, model: ModelLike | None = None) -> Contender:
     if network is not None:
         files = [network / ARCS_FILE]
     elif policy == "foresight":
-        files = sorted(POLICIES.glob("foresight*/*"))
+        files = sorted(FOLDER.glob("foresight*/*"))
     elif policy not in NAMES:
         files = [Path(policy) / FORECAST_FILE]
     return Contender(policy if policy in NAMES else Path(policy).name, chosen.make, chosen.arguments, tuple(files))
@@ -138,7 +136,7 @@ def _digest(files: Sequence[Path]) -> str:
     """SHA-256 of a policy's files, the package's policies and the compiled core."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
-    for path in (*files, *sorted(package.glob("policy/*.py")), *sorted(package.glob("_core.*[!i]"))):
+    for path in (*files, *sorted(package.glob("drive/**/*.py")), *sorted(package.glob("_core.*[!i]"))):
         digest.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
@@ -232,12 +230,7 @@ class ComparedScene:
     def report(self) -> dict[str, Any]:
         """The scene for JSON."""
         seeds = [self.seeds.start, self.seeds.stop - 1]
-        return {
-            "ground": self.ground,
-            "model": self.model,
-            "difficulties": list(self.difficulties),
-            "seeds": seeds,
-        }
+        return {**vars(self), "difficulties": list(self.difficulties), "seeds": seeds}
 
 
 def in_markdown(table: Sequence[Sequence[str]]) -> str:
@@ -313,9 +306,7 @@ class EpisodeFilm:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._writer.close()
 
 

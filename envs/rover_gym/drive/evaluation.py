@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from rover_gym.core import OptionError
 from rover_gym.core.validation import number, refuse, whole
-from rover_gym.drive.named_policy import Policy, named_policy
+from rover_gym.drive.commands.driven import Policy
+from rover_gym.drive.named_policy import named_policy
 from rover_gym.envs.batch import RoverBatch
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
@@ -242,18 +243,8 @@ def drive_each(
             episode = run_episode(env, policy, seed)
         finally:
             rover.on_period = None
-        done.append(
-            EvaluatedEpisode(
-                seed=seed,
-                end=episode.end,
-                time=episode.time,
-                distance=episode.distance,
-                energy=episode.energy,
-                slip=episode.slip,
-                tilt=float(np.mean(tilts[1:])),
-                max_tilt=max(tilts[1:]),
-            )
-        )
+        same = {name: getattr(episode, name) for name in ("seed", "end", "time", "distance", "energy", "slip")}
+        done.append(EvaluatedEpisode(**same, tilt=float(np.mean(tilts[1:])), max_tilt=max(tilts[1:])))
         progress(len(done))
     return done
 
@@ -416,7 +407,7 @@ def _places(batch: RoverBatch, observation: npt.NDArray[np.float32]) -> npt.NDAr
     return observation[:, [q, q + 2]].astype(np.float64)
 
 
-def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tuple[float, float]:
+def wilson_interval(successes: int, n: int, z: float = Z95) -> tuple[float, float]:
     """Wilson's score interval of a proportion.
 
     Unlike the normal interval, it stays within [0, 1] and has a positive width at 0 and 1.

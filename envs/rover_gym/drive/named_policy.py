@@ -5,19 +5,17 @@ from dataclasses import dataclass
 from functools import partial
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Protocol
-
-import numpy as np
-import numpy.typing as npt
+from typing import Any
 
 from rover_gym.core.validation import refuse
-from rover_gym.drive.arc_forecast import FORECAST_FILE
-from rover_gym.drive.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
-from rover_gym.drive.guided_policy import GuidedPolicy
-from rover_gym.drive.network_files import ANYWHERE, FOLDER, PolicyError, is_there
-from rover_gym.drive.pd_policy import PDPolicy
-from rover_gym.drive.sand_policy import SandPolicy
-from rover_gym.drive.scan_policy import ScanPolicy
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
+from rover_gym.drive.arcs.guided_policy import GuidedPolicy
+from rover_gym.drive.commands.driven import Policy
+from rover_gym.drive.forecast.arc_forecast import FORECAST_FILE
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER, PolicyError, is_there
+from rover_gym.drive.pd.pd_policy import PDPolicy
+from rover_gym.drive.pd.sand_policy import SandPolicy
+from rover_gym.drive.scan.scan_policy import ScanPolicy
 from rover_gym.models.lookup import ModelLike
 
 #: Help text of the command line about the names.
@@ -50,15 +48,6 @@ _TITLES = {
 def policy_title(policy: str) -> str:
     """Title of a policy, by its name or folder, for headings."""
     return _TITLES.get(policy, "a trained network")
-
-
-class Policy(Protocol):
-    """Any object with stable-baselines3's `predict`."""
-
-    def predict(
-        self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
-    ) -> tuple[npt.NDArray[np.float32], Any]:
-        """Returns the action for an observation, and the state for the next call."""
 
 
 @dataclass(frozen=True)

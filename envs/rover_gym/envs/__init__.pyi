@@ -1,32 +1,16 @@
-from .arguments import ARGUMENTS, Argument, RoverArguments
-from .env_snapshot import EnvSnapshot
-from .grains_env import BedDraw, GrainsEnvSnapshot, RoverGrainsEnv
-from .observation import ObservationField, ObservationLayout
-from .pushes import PushOptions, RandomPushes
-from .reward_terms import RewardTerm
-from .rover_env import RoverEnv
-from .start import Domain, HeightScan, Rocks, Start, drive_signs, wheel_centres
-from .task import Task
-
-__all__ = [
-    "ARGUMENTS",
-    "Argument",
-    "BedDraw",
-    "Domain",
-    "EnvSnapshot",
-    "GrainsEnvSnapshot",
-    "HeightScan",
-    "ObservationField",
-    "ObservationLayout",
-    "PushOptions",
-    "RandomPushes",
-    "RewardTerm",
-    "Rocks",
-    "RoverArguments",
-    "RoverEnv",
-    "RoverGrainsEnv",
-    "Start",
-    "Task",
-    "drive_signs",
-    "wheel_centres",
-]
+from .arguments import ARGUMENTS as ARGUMENTS, Argument as Argument, RoverArguments as RoverArguments
+from .env_snapshot import EnvSnapshot as EnvSnapshot
+from .grains_env import BedDraw as BedDraw, GrainsEnvSnapshot as GrainsEnvSnapshot, RoverGrainsEnv as RoverGrainsEnv
+from .observation import ObservationField as ObservationField, ObservationLayout as ObservationLayout
+from .pushes import PushOptions as PushOptions, RandomPushes as RandomPushes
+from .reward_terms import RewardTerm as RewardTerm
+from .rover_env import RoverEnv as RoverEnv
+from .start import (
+    Domain as Domain,
+    HeightScan as HeightScan,
+    Rocks as Rocks,
+    Start as Start,
+    drive_signs as drive_signs,
+    wheel_centres as wheel_centres,
+)
+from .task import Task as Task

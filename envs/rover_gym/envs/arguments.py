@@ -21,7 +21,6 @@ from rover_gym.envs.observation import info_table, observation_table
 from rover_gym.envs.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_reward_terms
 from rover_gym.envs.spec_json import model_from_json, soil_from_json, terrain_from_json
 from rover_gym.envs.start import MAX_ABUNDANCE, MAX_DIFFICULTY, ROCK_RADII, check_scan
-from rover_gym.ground.maps.map_files import is_terrain_file, open_terrain
 from rover_gym.ground.sand.soils import Soil, named_soil
 from rover_gym.models.lookup import as_model
 from rover_gym.show.frames.render_options import check_render_mode, check_render_options
@@ -136,12 +135,13 @@ def check_terrain(field: str, value: object) -> str | Terrain:
             value,
             f"must be one of {', '.join(TERRAINS)}, the file of a map or a mesh, or a terrain",
         )
-    terrain: Terrain = value
-    return terrain
+    return value
 
 
 def _ground(field: str, value: object) -> Any:
     """The terrain of a file or of a mapping as `as_json` writes it; any other value unchanged."""
+    from rover_gym.ground.maps.map_files import is_terrain_file, open_terrain  # noqa: PLC0415 - most grounds are no files
+
     return open_terrain(value) if is_terrain_file(value) else terrain_from_json(field, value)  # type: ignore[arg-type]
 
 

@@ -19,7 +19,8 @@ from rover_gym.exports import mcap_messages as messages
 from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.exports.mcap_messages import McapFile
 from rover_gym.record.channels import RecordingError, RoverSampler, storable, versions
-from rover_gym.record.rover_run import RoverRun, film_rows
+from rover_gym.record.rover_run import RoverRun
+from rover_gym.record.run import film_rows
 from rover_gym.record.trajectory import Trajectory
 from rover_gym.show.frames.appearance import ROCK_COLOUR
 from rover_gym.show.replay import scenery
@@ -332,7 +333,7 @@ class McapWriter:
             way = q[[0, 2]] + REACH * np.array([[-1.0, -1.0], [1.0, 1.0]])
         rows = np.tile(q, (len(way), 1))
         rows[:, [0, 2]] = way
-        run = RoverRun(Trajectory({"q": rows}, {}, {}), self._model, self._terrain, self._goal, "")
+        run = RoverRun(Trajectory({"q": rows}, {}, {}), self._model, self._terrain, self._goal)
         found = messages.scene(stamp)
         for name, parts in scenery.parts_by_solid(run).items():
             if parts:

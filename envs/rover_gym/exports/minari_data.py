@@ -19,7 +19,7 @@ from rover_gym.core.validation import checked, refuse, whole
 from rover_gym.envs.registration import ENVIRONMENTS
 
 if TYPE_CHECKING:
-    from rover_gym.drive.named_policy import Policy
+    from rover_gym.drive.commands.driven import Policy
 
 #: Allowed names of data sets, which Minari takes as they are: a namespace has two characters or more.
 NAME = re.compile(r"(?![A-Za-z]/[^/]*$)(?:[A-Za-z][A-Za-z0-9_-]*/)*[A-Za-z][A-Za-z0-9_-]*-v(?:0|[1-9]\d{0,5})")

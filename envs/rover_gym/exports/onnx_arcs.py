@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from rover_gym.core.extras import require
-from rover_gym.drive.arc_driver import N_ARCS, SIZES
-from rover_gym.drive.arc_network import CONVOLUTIONS, DENSE, ArcNetwork
-from rover_gym.drive.scan_policy import SCAN
+from rover_gym.drive.arcs.arc_driver import N_ARCS, SIZES
+from rover_gym.drive.arcs.arc_network import CONVOLUTIONS, DENSE, ArcNetwork
+from rover_gym.drive.scan.scan_policy import SCAN
 from rover_gym.exports.onnx_graph import finished_model
 
 #: What the graph's inputs and output are, as metadata.

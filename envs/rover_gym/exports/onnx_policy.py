@@ -11,11 +11,11 @@ import numpy as np
 from rover_gym.core.extras import MissingExtraError, require
 from rover_gym.core.files import write_whole
 from rover_gym.core.validation import checked, refuse
-from rover_gym.drive.arc_forecast import FORECAST_FILE, OUTPUTS
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.arc_network_policy import ARCS_FILE
-from rover_gym.drive.features import LARGEST_FEATURE
-from rover_gym.drive.network_files import ANYWHERE, FOLDER, FORECAST, Network, PolicyError, is_there
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE
+from rover_gym.drive.commands.features import LARGEST_FEATURE
+from rover_gym.drive.forecast.arc_forecast import FORECAST_FILE, OUTPUTS
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER, FORECAST, Network, PolicyError, is_there
 from rover_gym.exports.onnx_arcs import arcs_model
 from rover_gym.exports.onnx_graph import Perceptron, onnx_model
 
@@ -59,7 +59,7 @@ def onnx_policy(policy: str | Path) -> Any:
     if is_there(folder / FORECAST_FILE):
         facts: Mapping[str, Any] = {
             "kind": "forecast",
-            "features": "rover_gym.drive.arc_forecast.ArcFeatures, and whether the arc is driven fast",
+            "features": "rover_gym.drive.forecast.arc_forecast.ArcFeatures, and whether the arc is driven fast",
             "outcomes": "way along the arc over the way at cruising speed; share of the time that ends an episode for"
             " which the trunk has been held; probability that the episode has failed",
         }

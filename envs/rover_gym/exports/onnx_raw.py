@@ -10,7 +10,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.sac.policies import SACPolicy
 
 from rover_gym.core.validation import refuse
-from rover_gym.drive.network_files import PolicyError
+from rover_gym.drive.forecast.network_files import PolicyError
 from rover_gym.exports.onnx_graph import Array, Perceptron
 from rover_gym.learn.raw_policy import RawPolicy
 

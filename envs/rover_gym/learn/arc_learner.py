@@ -14,9 +14,9 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from rover_gym.drive.arc_driver import SIZES, arc_space, observation_space
-from rover_gym.drive.arc_network import CONVOLUTIONS, DENSE, ArcNetwork
-from rover_gym.drive.scan_policy import SCAN
+from rover_gym.drive.arcs.arc_driver import SIZES, arc_space, observation_space
+from rover_gym.drive.arcs.arc_network import CONVOLUTIONS, DENSE, ArcNetwork
+from rover_gym.drive.scan.scan_policy import SCAN
 from rover_gym.learn.arc_config import ArcPPOConfig, ImitationConfig
 from rover_gym.learn.arc_rovers import STEPS, Labels, Rovers
 

@@ -25,8 +25,8 @@ from torch.utils.tensorboard import SummaryWriter
 
 from rover_gym.core import OptionError
 from rover_gym.core.validation import refuse
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.arc_network_policy import ARCS_FILE
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE
 from rover_gym.drive.evaluation import summarise
 from rover_gym.learn.arc_config import ArcConfig, ArcPPOConfig, read_arc_config
 from rover_gym.learn.arc_learner import (

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import RoverModel
-from rover_gym.drive.arc_driver import N_ARCS, ArcObservation
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.arc_network_policy import ArcNetworkPolicy
+from rover_gym.drive.arcs.arc_driver import N_ARCS, ArcObservation
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.arcs.arc_network_policy import ArcNetworkPolicy
 from rover_gym.drive.evaluation import EvaluatedEpisode, drive_all
-from rover_gym.drive.rover_view import LARGEST
-from rover_gym.drive.scan_policy import ScanPolicy
+from rover_gym.drive.forecast.rover_view import LARGEST
+from rover_gym.drive.scan.scan_policy import ScanPolicy
 from rover_gym.envs.tasks.arcs_env import RoverArcsVectorEnv
 from rover_gym.learn.arc_config import ArcConfig, ArcScene
 from rover_gym.learn.configuration import environment_arguments

@@ -10,9 +10,9 @@ from typing import Any
 from rover_gym.core import OptionError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
-from rover_gym.drive.arc_network import ArcNetwork
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.commands.driven import Policy
 from rover_gym.drive.evaluation import EvaluatedEpisode, drive_all
-from rover_gym.drive.named_policy import Policy
 from rover_gym.learn.arc_config import ArcConfig
 from rover_gym.learn.arc_rovers import Group, LabelledGroup, Labels, Rovers, evaluate, join_labels
 

@@ -9,8 +9,8 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 
 from rover_gym.core import StateError
 from rover_gym.core.validation import refuse
-from rover_gym.drive.command import N_COMMANDS, CommandController, command_space
-from rover_gym.drive.features import Features
+from rover_gym.drive.commands.command import N_COMMANDS, CommandController, command_space
+from rover_gym.drive.commands.features import Features
 from rover_gym.envs.vector.sb3 import RoverVecEnv, VecEnvSnapshot
 
 

@@ -15,12 +15,12 @@ import torch
 
 from rover_gym.core import OptionError, sin_cos
 from rover_gym.core.validation import refuse, whole
-from rover_gym.drive.arc_forecast import HORIZON, OUTPUTS, ArcFeatures, with_speed
-from rover_gym.drive.features import LARGEST_FEATURE
+from rover_gym.drive.commands.features import LARGEST_FEATURE
+from rover_gym.drive.forecast.arc_forecast import HORIZON, OUTPUTS, ArcFeatures, with_speed
+from rover_gym.drive.forecast.network_files import Network
 from rover_gym.drive.named_policy import named_policy
-from rover_gym.drive.network_files import Network
-from rover_gym.drive.rollouts import Rollouts
-from rover_gym.drive.scan_policy import ScanPolicy
+from rover_gym.drive.planning.rollouts import Rollouts
+from rover_gym.drive.scan.scan_policy import ScanPolicy
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
 

@@ -12,8 +12,8 @@ import gymnasium as gym
 from stable_baselines3.common.vec_env import VecNormalize
 
 from rover_gym.core.validation import refuse
+from rover_gym.drive.forecast.network_files import PolicyError
 from rover_gym.drive.named_policy import NamedPolicy
-from rover_gym.drive.network_files import PolicyError
 from rover_gym.learn.configuration import environment_arguments
 
 #: Algorithms by an entry that only their files have; the first that fits.

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from rover_gym.core import OptionError
 from rover_gym.core.validation import refuse
-from rover_gym.drive.features import check_observed
+from rover_gym.drive.commands.driven import check_observed
 from rover_gym.envs.vector.sb3 import RoverVecEnv
 from rover_gym.learn.configuration import environment_arguments
 from rover_gym.learn.provenance import provenance

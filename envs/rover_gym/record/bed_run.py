@@ -4,8 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.record.channels import RESIDUAL, Channel, energy_channels
-
-Array = npt.NDArray[np.float64]
+from rover_gym.record.run import Array
 
 
 def bed_channels(chains: tuple[int, int], strongest: str, counted: str, *, packed: bool = False) -> tuple[Channel, ...]:

@@ -119,10 +119,14 @@ class Sampler:
         iterations: Iterations since the last row.
         energy: Kinetic and potential energy in the row.
         rows_per_flush: Largest number of rows lost if the process is killed.
+        title: Title of a recording that is given none.
+        without_seed: What a recording without a seed says of it.
     """
 
     channels: tuple[Channel, ...]
     rows_per_flush = 200
+    title = "a rover"
+    without_seed = "none"
 
     def __init__(self, sim: Any) -> None:
         self.sim = sim
@@ -130,8 +134,23 @@ class Sampler:
         self.clear()
 
     def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
-        """The attributes of a recording, taken from the simulation at its start; None for those of `describe`."""
-        return describe(self.sim, title or "a rover", scene, seed="none" if seed is None else seed)
+        """The attributes of a recording, taken from the simulation at its start; None for those of the kind."""
+        return {
+            "title": title or self.title,
+            "scene": {**scene, **self.scene()},
+            "seed": self.without_seed if seed is None else seed,
+            "solver": self.settings,
+        }
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of the solver."""
+        settings: dict[str, Any] = self.sim.settings
+        return settings
+
+    def scene(self) -> dict[str, Any]:
+        """What is simulated, from the simulation at its start."""
+        raise NotImplementedError
 
     @property
     def terrain(self) -> Terrain | None:
@@ -251,33 +270,29 @@ class RoverSampler(Sampler):
             ITERATIONS,
         )
 
+    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
+        """The attributes of a recording, taken from the simulation at its start; None for those of `describe`."""
+        return describe(self.sim, title or self.title, scene, seed=self.without_seed if seed is None else seed)
+
     def clear(self) -> None:
         """Resets what is gathered from row to row."""
         super().clear()
-        self._forces: npt.NDArray[np.float64] | None = None
-        self._torques: npt.NDArray[np.float64] | None = None
+        self._forces = self._torques = np.zeros(())
 
     def gather(self, report: Any) -> None:  # noqa: ARG002 - the forces are the simulation's
         """Adds the forces and torques of the last step."""
-        forces, torques = self.sim.wheel_forces, self.sim.motor_torques
-        self._forces = forces if self._forces is None else self._forces + forces
-        self._torques = torques if self._torques is None else self._torques + torques
+        self._forces = self._forces + self.sim.wheel_forces
+        self._torques = self._torques + self.sim.motor_torques
 
     @property
     def wheel_forces(self) -> npt.NDArray[np.float64]:
         """(n_wheels, 3) mean since the last row, N; of the last step if the sampler took none."""
-        if self._forces is not None:
-            return self._forces / self.steps
-        forces: npt.NDArray[np.float64] = self.sim.wheel_forces
-        return forces
+        return self._forces / self.steps if self.steps else self.rover.wheel_forces
 
     @property
     def motor_torques(self) -> npt.NDArray[np.float64]:
         """(n_wheels,) mean since the last row, N m; of the last step if the sampler took none."""
-        torques: npt.NDArray[np.float64] = (
-            self.sim.motor_torques if self._torques is None else self._torques / self.steps
-        )
-        return torques
+        return self._torques / self.steps if self.steps else self.rover.motor_torques
 
     @property
     def rover(self) -> Simulation:

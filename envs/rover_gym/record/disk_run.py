@@ -6,10 +6,8 @@ run.wheels[-1, 0, :2]
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +15,15 @@ import numpy.typing as npt
 from rover_gym.core import DiskSimulation
 from rover_gym.core.validation import checked, refuse
 from rover_gym.ground.grains.disk_bed import surface_height
-from rover_gym.record.bed_run import Array, bed_channels, strongest_contacts
+from rover_gym.record.bed_run import bed_channels, strongest_contacts
 from rover_gym.record.channels import TIME, Channel, RecordingError, Sampler, sound
-from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
-from rover_gym.record.trajectory import Trajectory
+from rover_gym.record.run import Array, Run, are_sizes, check_rows, is_moderate, rim_slip, width_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from rover_gym.record.trajectory import Trajectory
 
 MOST_CHAINS = 2000  # strongest contacts kept per row
 
@@ -53,6 +56,9 @@ class DiskSampler(Sampler):
     Args:
         sim: The disks.
     """
+
+    title = "disks in the plane"
+    without_seed = "the start's positions are the first row"
 
     @checked(sim="DiskSimulation")
     def __init__(self, sim: DiskSimulation) -> None:
@@ -102,16 +108,10 @@ class DiskSampler(Sampler):
         """Contacts of the last step."""
         return len(self.sim.contacts)
 
-    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
-        """The attributes of a recording, taken from the simulation at its start."""
+    def scene(self) -> dict[str, Any]:
+        """The disks, the walls and the torques at the start."""
         sim = self.sim
-        facts = {"radius": sim.radius, "mass": sim.mass, "walls": sim.walls, "torques": sim.torques}
-        return {
-            "title": title or "disks in the plane",
-            "scene": {**scene, "kind": KINDS[0], **facts},
-            "seed": "the start's positions are the first row" if seed is None else seed,
-            "solver": sim.settings,
-        }
+        return {"kind": KINDS[0], "radius": sim.radius, "mass": sim.mass, "walls": sim.walls, "torques": sim.torques}
 
 
 @dataclass(frozen=True)
@@ -123,14 +123,37 @@ class DiskRun(Run):
         radius: (n_disks,) m.
         walls: (n_walls, 4) a point on each wall and the normal towards its free side.
         surface: Mean height of the surface of the disks at the start, m.
-        title: Title of the run.
     """
 
-    trajectory: Trajectory
+    MISSING = "contains no disks; `rover planar disks` records such runs"
+    NEEDED = ("force_chains",)
+
     radius: Array
     walls: Array
     surface: float
-    title: str
+
+    @classmethod
+    def is_scene(cls, scene: Mapping[str, Any]) -> bool:
+        """Whether a file with this scene is a run of disks."""
+        return scene.get("kind") in KINDS
+
+    @classmethod
+    def _checked(cls, trajectory: Trajectory, path: str | Path) -> Self:
+        with sound(path, "scene"):
+            radius = np.array(trajectory.scene["radius"], dtype=np.float64).reshape(-1)
+            walls = np.array(trajectory.scene["walls"], dtype=np.float64).reshape(-1, 4)
+        if not are_sizes(radius):
+            reason = "must be a positive radius for each of the disks"
+            refuse(RecordingError, f"{path}: scene.radius", len(radius), reason)
+        if not is_moderate(walls) or not np.hypot(*walls[:, 2:].T).all():
+            refuse(RecordingError, f"{path}: scene.walls", len(walls), "must be a point and a normal for each wall")
+        wheels, machine = width_of(trajectory, "wheels", 3), width_of(trajectory, "machine", 2)
+        if wheels > 2 or machine < 3 * bool(wheels) + wheels:
+            reason = "must be at most two, with the coordinates of their machine"
+            refuse(RecordingError, f"{path}: wheels", wheels, reason)
+        channels = disk_channels(len(radius), machine, wheels, width_of(trajectory, "force_chains", 3))
+        check_rows(trajectory, path, channels, bounded=("position", "wheels", "machine"), needed=True)
+        return cls(trajectory, radius, walls, surface_height(radius, trajectory["position"][0]))
 
     @property
     def positions(self) -> Array:
@@ -165,51 +188,10 @@ class DiskRun(Run):
     @property
     def sinkage(self) -> Array:
         """(n, n_wheels) depth of the wheels' lowest points below the surface, m."""
-        result: Array = self.surface - (self.wheels[..., 1] - self.wheels[..., 2])
-        return result
+        return self.surface - (self.wheels[..., 1] - self.wheels[..., 2])
 
     @property
     def slip_speeds(self) -> Array:
         """(n, n_wheels) rim speed minus travel speed, m/s."""
-        rates = self.trajectory["machine_rate"]
-        rims = -rates[:, 3 : 3 + self.wheels.shape[1]] * self.wheels[..., 2]
-        result: Array = rims - rates[:, :1]
-        return result
-
-
-def is_disks(trajectory: Trajectory) -> bool:
-    """Whether a trajectory is a run of disks."""
-    scene = trajectory.attributes.get("scene")
-    return isinstance(scene, dict) and scene.get("kind") in KINDS
-
-
-def disk_run_of(trajectory: Trajectory, path: str | Path) -> DiskRun:
-    """The run of disks of a trajectory read from `path`.
-
-    Raises:
-        RecordingError: It is not a run of disks, or holds no samples.
-    """
-    if not is_disks(trajectory) or "force_chains" not in trajectory.data:
-        refuse(RecordingError, "path", str(path), "contains no disks; `rover planar disks` records such runs")
-    check_time(trajectory, path)
-    scene = trajectory.attributes["scene"]
-    with sound(path, "scene"):
-        radius = np.array(scene["radius"], dtype=np.float64).reshape(-1)
-        walls = np.array(scene["walls"], dtype=np.float64).reshape(-1, 4)
-    if not len(radius) or not ((radius > 0.0) & (radius <= LARGEST)).all():
-        refuse(RecordingError, f"{path}: scene.radius", len(radius), "must be a positive radius for each of the disks")
-    if not (np.abs(walls) <= LARGEST).all() or not np.hypot(*walls[:, 2:].T).all():
-        refuse(RecordingError, f"{path}: scene.walls", len(walls), "must be a point and a normal for each wall")
-    wheels, machine = (trajectory[name].shape[1] if trajectory[name].ndim > 1 else 0 for name in ("wheels", "machine"))
-    if wheels > 2 or machine < 3 * bool(wheels) + wheels:
-        refuse(RecordingError, f"{path}: wheels", wheels, "must be at most two, with the coordinates of their machine")
-    chains = trajectory["force_chains"].shape[1] if trajectory["force_chains"].ndim == 3 else 0
-    channels = disk_channels(len(radius), machine, wheels, chains)
-    check_rows(trajectory, path, channels, bounded=("position", "wheels", "machine"), needed=True)
-    return DiskRun(
-        trajectory=trajectory,
-        radius=radius,
-        walls=walls,
-        surface=surface_height(radius, trajectory["position"][0]),
-        title=title_of(trajectory),
-    )
+        wheels = self.wheels
+        return rim_slip(self.trajectory["machine_rate"], slice(3, 3 + wheels.shape[1]), wheels[..., 2])

@@ -58,8 +58,7 @@ def outflow(run: GrainRun) -> Array:
         run: Of a `silo`.
     """
     below = run.positions[..., 1] < 0.0
-    result: Array = below @ run.mass
-    return result
+    return below @ run.mass
 
 
 @checked(run="GrainRun")

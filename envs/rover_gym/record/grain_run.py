@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,7 @@ from rover_gym.core import (
 from rover_gym.core.validation import refuse
 from rover_gym.ground.grains.grain_surface import SurfaceMap, surface_map
 from rover_gym.ground.grains.moving_window import MovingWindow
-from rover_gym.record.bed_run import Array, bed_channels, strongest_contacts
+from rover_gym.record.bed_run import bed_channels, strongest_contacts
 from rover_gym.record.channels import (
     ITERATIONS,
     TIME,
@@ -45,27 +45,27 @@ from rover_gym.record.channels import (
     sound,
     wheel_solids,
 )
-from rover_gym.record.rover_run import LARGEST, RoverRun, Run, check_rows, check_time, title_of
+from rover_gym.record.rover_run import RoverRun
+from rover_gym.record.run import LARGEST, Array, Run, are_sizes, check_rows, is_moderate, width_of
 from rover_gym.record.trajectory import Trajectory, read_frames
 
 if TYPE_CHECKING:
     from rover_gym.core import Terrain
 
 
+#: What may stand around the balls: the classes, and the properties that a recording stores.
+VESSELS = {
+    "drum": (Drum, ("radius", "length", "rate", "centre")),
+    "silo": (Silo, ("radius", "floor", "hole", "axis")),
+}
+
+
 def stored_vessel(vessel: Drum | Silo | None) -> dict[str, Any] | None:
     """A vessel as JSON holds it; None for none."""
-    if vessel is None:
-        return None
-    if isinstance(vessel, Drum):
-        sizes = {"radius": vessel.radius, "length": vessel.length, "rate": vessel.rate}
-        return {"kind": "drum", **sizes, "centre": list(vessel.centre)}
-    return {
-        "kind": "silo",
-        "radius": vessel.radius,
-        "floor": vessel.floor,
-        "hole": vessel.hole,
-        "axis": list(vessel.axis),
-    }
+    for kind, (cls, names) in VESSELS.items():
+        if isinstance(vessel, cls):
+            return {"kind": kind, **{name: getattr(vessel, name) for name in names}}
+    return None
 
 
 def checked_vessel(vessel: Any) -> dict[str, Any] | None:
@@ -76,16 +76,13 @@ def checked_vessel(vessel: Any) -> dict[str, Any] | None:
     """
     if vessel is None:
         return None
-    numbers = {"drum": ("radius", "length", "rate"), "silo": ("radius", "hole")}[vessel["kind"]]
-    result: dict[str, Any] = {"kind": str(vessel["kind"]), **{name: float(vessel[name]) for name in numbers}}
-    if result["kind"] == "drum":
-        result["centre"] = [float(value) for value in vessel["centre"]]
-    else:
-        result["axis"] = [float(value) for value in vessel["axis"]]
-        result["floor"] = None if vessel["floor"] is None else float(vessel["floor"])
-    sizes = [value for value in result.values() if isinstance(value, float)]
-    if not all(abs(value) <= LARGEST for value in sizes):
-        raise ValueError("a number is not finite or too large")
+    result = {"kind": vessel["kind"]}
+    for name in VESSELS[vessel["kind"]][1]:
+        value = np.array(vessel[name], dtype=np.float64)
+        is_place, is_open = name in ("centre", "axis"), name == "floor" and vessel[name] is None
+        if not is_open and (value.ndim != is_place or not is_moderate(value)):
+            raise ValueError(f"{name} is not finite, too large or of a wrong shape")
+        result[name] = None if is_open else value.tolist()
     return result
 
 
@@ -155,6 +152,7 @@ class GrainSampler(Sampler):
     """
 
     rows_per_flush = 16  # 0.6 s at 25 frames a second
+    title = "balls in space"
 
     def __init__(self, sim: Recordable) -> None:
         self.grains, self.rover = _both(sim)
@@ -204,8 +202,7 @@ class GrainSampler(Sampler):
 
     def wheel_forces(self) -> Array:
         """(n_wheels, 3) mean force on each wheel since the last row, N."""
-        mean: Array = self._impulses / (max(self.steps, 1) * self.grains.time_step)
-        return mean
+        return self._impulses / (max(self.steps, 1) * self.grains.time_step)
 
     def wheel_centres(self) -> Array:
         """(n_wheels, 3) m, world."""
@@ -216,25 +213,29 @@ class GrainSampler(Sampler):
         """The ground of rover and balls, or of the balls."""
         return self.grains.terrain if self.rover is None else self.rover.terrain
 
-    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
-        """The attributes of a recording, taken from the simulation at its start."""
-        grains = self.grains
+    def scene(self) -> dict[str, Any]:
+        """How the balls are stored, the vessel and the rover."""
         return {
-            "title": title or "balls in space",
-            "scene": {
-                **scene,
-                "kind": KIND,
-                "resolution": self._stored.resolution,
-                "chains": self._n_chains,
-                "vessel": stored_vessel(grains.vessel),
-                **({} if self.rover is None else {"model": self.rover.model.to_dict()}),
-            },
+            "kind": KIND,
+            "resolution": self._stored.resolution,
+            "chains": self._n_chains,
+            "vessel": stored_vessel(self.grains.vessel),
+            **({} if self.rover is None else {"model": self.rover.model.to_dict()}),
+        }
+
+    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
+        """The attributes of a recording, taken from the simulation at its start; None for those of the kind."""
+        grains = self.grains
+        return super().describe(title, scene, seed) | {
             "grain_radius": np.asarray(grains.radius, dtype=np.float64),
             "grain_mass": np.asarray(grains.mass, dtype=np.float64),
             "grain_kinematic": np.asarray(grains.kinematic, dtype=np.uint8),
-            "seed": "none" if seed is None else seed,
-            "solver": grains.settings,
         }
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of the solver, which are the balls'."""
+        return self.grains.settings
 
 
 def wheel_impulses(rover: Simulation) -> Array:
@@ -253,28 +254,51 @@ class GrainRun(Run):
     """A recorded run of balls, alone or under a rover.
 
     Attributes:
+        trajectory: The data sets and attributes of the file, but for the balls' places.
         path: The file; the balls' places are read from it when they are first asked for.
-        trajectory: The other data sets, and the attributes of the file.
-        rows: (n,) indices of the samples in the file.
         radius: (n_balls,) m.
         mass: (n_balls,) kg.
         kinematic: (n_balls,) whether no force moves the ball.
         terrain: The fixed ground; None if there is none but the walls.
         model: The rover; None without one.
         vessel: The drum or silo around the balls, by the names of its properties, with its `kind`; None without one.
-        title: Title of the run.
     """
 
+    MISSING = "contains no balls in space; `rover grains` records such runs"
+
     path: Path
-    trajectory: Trajectory
-    rows: npt.NDArray[np.int64]
     radius: Array
     mass: Array
     kinematic: npt.NDArray[np.bool_]
     terrain: Terrain | None
     model: RoverModel | None
     vessel: Mapping[str, Any] | None
-    title: str
+
+    @classmethod
+    def is_scene(cls, scene: Mapping[str, Any]) -> bool:
+        """Whether a file with this scene is a run of balls in space."""
+        return scene.get("kind") == KIND
+
+    @classmethod
+    def _checked(cls, trajectory: Trajectory, path: str | Path) -> Self:
+        scene = trajectory.scene
+        radius, mass, kinematic = (_of_balls(trajectory, path, name) for name in ("radius", "mass", "kinematic"))
+        if not are_sizes(radius) or len(radius) != len(mass):
+            reason = "must be a positive radius for each of the balls"
+            refuse(RecordingError, f"{path}: grain_radius", len(radius), reason)
+        if len(kinematic) != len(radius):
+            reason = "must have an entry for each of the balls"
+            refuse(RecordingError, f"{path}: grain_kinematic", len(kinematic), reason)
+        model = None
+        if "model" in scene:
+            with sound(path, "scene.model"):
+                model = RoverModel.from_dict(scene["model"])
+        with sound(path, "scene.vessel"):
+            vessel = checked_vessel(scene.get("vessel"))
+        channels = grain_channels(len(radius), width_of(trajectory, "walls", 3), model, 0)
+        check_rows(trajectory, path, channels, bounded=("walls", "q", "v", "wheel_centres"), needed=True)
+        terrain = Plane() if model is not None and trajectory.terrain is None else trajectory.terrain
+        return cls(trajectory, Path(path), radius, mass, kinematic > 0.0, terrain, model, vessel)
 
     @cached_property
     def positions(self) -> npt.NDArray[np.float32]:
@@ -298,7 +322,7 @@ class GrainRun(Run):
         if places.shape[1:] != (len(self.radius), 3):
             reason = f"must have rows of shape {(len(self.radius), 3)}"
             refuse(RecordingError, f"{self.path}: frames/position", places.shape[1:], reason)
-        if not (np.abs(places) <= LARGEST).all():
+        if not is_moderate(places):
             refuse(RecordingError, f"{self.path}: frames/position", "a place", f"must be finite and within {LARGEST:g}")
         return places
 
@@ -312,7 +336,7 @@ class GrainRun(Run):
         """The rover's part of the run, with the poses of its solids; None without one."""
         if self.model is None or self.terrain is None:
             return None
-        return RoverRun(self.trajectory, self.model, self.terrain, None, self.title)
+        return RoverRun(self.trajectory, self.model, self.terrain, None)
 
     @property
     def wheel_centres(self) -> Array:
@@ -339,10 +363,10 @@ class GrainRun(Run):
         Raises:
             RecordingError: The file is damaged or has changed.
         """
-        if "chains" not in self.trajectory.attributes["scene"]:
+        if "chains" not in self.trajectory.scene:
             return np.zeros((len(self.rows), 0, 7))
         chains = read_frames(self.path, "force_chains", self.rows).astype(np.float64)
-        if chains.ndim != 3 or chains.shape[2] != 7 or not (np.abs(chains) <= LARGEST).all():
+        if chains.ndim != 3 or chains.shape[2] != 7 or not is_moderate(chains):
             reason = f"must have 7 finite numbers for each contact, within {LARGEST:g}"
             refuse(RecordingError, f"{self.path}: frames/force_chains", chains.shape, reason)
         return chains
@@ -363,69 +387,11 @@ class GrainRun(Run):
         radii = np.zeros(0) if self.model is None else np.asarray(self.model.wheel_radii)
         width = max(4.0 * float(self.radius.mean()), float(radii.max(initial=0.0)))
         surface = self.first_surface.at(centres[..., [0, 2]], width=width)
-        result: Array = surface - (centres[..., 1] - radii)
-        return result
-
-    def at(self, rows: npt.NDArray[np.int64]) -> GrainRun:
-        """Some samples of the run, by their indices `(n,)`."""
-        return replace(self, trajectory=self.trajectory.at(rows), rows=self.rows[rows])
-
-    @property
-    def whole(self) -> GrainRun:
-        """The run with all samples of its file, of which `resample` and `at` have kept some."""
-        if self.trajectory.original is None:
-            return self
-        whole = self.trajectory.original[0]
-        return replace(self, trajectory=whole, rows=np.arange(len(whole["time"])))
-
-
-def is_grains(trajectory: Trajectory) -> bool:
-    """Whether a trajectory is a run of balls in space."""
-    scene = trajectory.attributes.get("scene")
-    return isinstance(scene, dict) and scene.get("kind") == KIND
-
-
-def grain_run_of(trajectory: Trajectory, path: str | Path) -> GrainRun:
-    """The run of balls of a trajectory read from `path`.
-
-    Raises:
-        RecordingError: It is not a run of balls, or holds no samples.
-    """
-    if not is_grains(trajectory):
-        refuse(RecordingError, "path", str(path), "contains no balls in space; `rover grains` records such runs")
-    check_time(trajectory, path)
-    scene = trajectory.attributes["scene"]
-    radius, mass, kinematic = (_of_balls(trajectory, path, name) for name in ("radius", "mass", "kinematic"))
-    if not len(radius) or not ((radius > 0.0) & (radius <= LARGEST)).all() or len(radius) != len(mass):
-        refuse(RecordingError, f"{path}: grain_radius", len(radius), "must be a positive radius for each of the balls")
-    if len(kinematic) != len(radius):
-        refuse(RecordingError, f"{path}: grain_kinematic", len(kinematic), "must have an entry for each of the balls")
-    model = None
-    if "model" in scene:
-        with sound(path, "scene.model"):
-            model = RoverModel.from_dict(scene["model"])
-    with sound(path, "scene.vessel"):
-        vessel = checked_vessel(scene.get("vessel"))
-    walls = trajectory["walls"].shape[1] if trajectory["walls"].ndim == 3 else 0
-    channels = grain_channels(len(radius), walls, model, 0)
-    check_rows(trajectory, path, channels, bounded=("walls", "q", "v", "wheel_centres"), needed=True)
-    return GrainRun(
-        path=Path(path),
-        trajectory=trajectory,
-        rows=np.arange(len(trajectory["time"])),
-        radius=radius,
-        mass=mass,
-        kinematic=kinematic > 0.0,
-        terrain=Plane() if model is not None and trajectory.terrain is None else trajectory.terrain,
-        model=model,
-        vessel=vessel,
-        title=title_of(trajectory),
-    )
+        return surface - (centres[..., 1] - radii)
 
 
 def _of_balls(trajectory: Trajectory, path: str | Path, name: str) -> Array:
     value = trajectory.attributes.get(f"grain_{name}")
     if not isinstance(value, np.ndarray) or value.ndim != 1:
         refuse(RecordingError, f"{path}: grain_{name}", value, "must be an array with an entry for each of the balls")
-    result: Array = value.astype(np.float64)
-    return result
+    return value.astype(np.float64)

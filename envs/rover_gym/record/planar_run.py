@@ -6,13 +6,10 @@ run.discs[-1, 0, :2]
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from rover_gym.core import (
     Line,
@@ -33,15 +30,26 @@ from rover_gym.record.channels import (
     energy_channels,
     sound,
 )
-from rover_gym.record.rover_run import LARGEST, Run, check_rows, check_time, title_of
-from rover_gym.record.trajectory import Trajectory
+from rover_gym.record.run import LARGEST, Array, Run, are_sizes, check_rows, rim_slip, width_of
 
-Array = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from rover_gym.record.trajectory import Trajectory
 
 COORDINATES = {
     3: ("x", "y", "theta"),
     5: ("x", "y", "theta", "theta_a", "theta_b"),
     7: ("x", "y", "theta", "front_wheels", "bogies", "middle_wheels", "back_wheels"),
+}
+
+#: The grounds and the properties that make them.
+GROUNDS: dict[str, tuple[type[PlanarGround], tuple[str, ...]]] = {
+    "line": (Line, ("slope", "offset")),
+    "sine": (Sine, ("amplitude", "wavelength", "phase", "offset")),
+    "spline": (Spline, ("x", "y")),
+    "polyline": (Polyline, ("x", "y")),
 }
 
 DISCS = {1: ("ball",), 2: ("wheel A", "wheel B"), 3: ("front wheels", "middle wheels", "back wheels")}
@@ -86,7 +94,14 @@ class PlanarSampler(Sampler):
 
     Args:
         sim: The simulation.
+
+    Attributes:
+        impulses: (n_discs, 2) impulses of a step along normal and tangent, mean since the last row, N s.
+        world_impulses: (n_discs, 2) along x and y.
     """
+
+    title = "a machine in the plane"
+    without_seed = "none: the scene has no randomness"
 
     @checked(sim="PlanarSimulation")
     def __init__(self, sim: PlanarSimulation) -> None:
@@ -106,45 +121,28 @@ class PlanarSampler(Sampler):
         np.add.at(self._impulses, contacts.discs, impulses)
         np.add.at(self._in_world, contacts.discs, impulses[:, :1] * normals + impulses[:, 1:] * tangents)
 
-    @property
-    def impulses(self) -> Array:
-        """(n_discs, 2) impulses of a step, mean since the last row, N s."""
-        return self._impulses / max(1, self.steps)
+    def measure(self) -> None:
+        """Measures what several channels read."""
+        super().measure()
+        steps = max(1, self.steps)
+        self.impulses, self.world_impulses = self._impulses / steps, self._in_world / steps
 
-    @property
-    def world_impulses(self) -> Array:
-        """(n_discs, 2) impulses of a step along x and y, mean since the last row, N s."""
-        return self._in_world / max(1, self.steps)
-
-    def describe(self, title: str | None, scene: Mapping[str, Any], seed: int | str | None) -> dict[str, Any]:
-        """The attributes of a recording, taken from the simulation at its start."""
+    def scene(self) -> dict[str, Any]:
+        """The ground, the machine and the start."""
         sim, ground = self.sim, self.sim.ground
-        names = {
-            Line: ("slope", "offset"),
-            Sine: ("amplitude", "wavelength", "phase", "offset"),
-            Spline: ("x", "y"),
-            Polyline: ("x", "y"),
-        }[type(ground)]
+        kind = type(ground).__name__.lower()
         machine = {
             name: value.to_dict() if isinstance(value, RoverModel) else value for name, value in sim.parameters.items()
         }
         return {
-            "title": title or "a machine in the plane",
-            "scene": {
-                **scene,
-                "kind": type(sim).__name__,
-                "ground": {"kind": type(ground).__name__.lower(), **{name: getattr(ground, name) for name in names}},
-                "machine": machine,
-                "q": sim.q,
-                "v": sim.v,
-                "torques": sim.torques,
-            },
-            "seed": "none: the scene has no randomness" if seed is None else seed,
-            "solver": sim.settings,
+            "kind": type(sim).__name__,
+            "ground": {"kind": kind, **{name: getattr(ground, name) for name in GROUNDS[kind][1]}},
+            "machine": machine,
+            "q": sim.q,
+            "v": sim.v,
+            "torques": sim.torques,
         }
 
-
-GROUNDS = {"line": Line, "sine": Sine, "spline": Spline, "polyline": Polyline}
 
 #: Coordinates that are the discs' angles, by the number of coordinates.
 ANGLES = {3: (2,), 5: (3, 4), 7: (3, 5, 6)}
@@ -158,13 +156,38 @@ class PlanarRun(Run):
         trajectory: The data sets and attributes of the file.
         ground: The line that the machine moved on.
         radius: (n_discs,) m.
-        title: Title of the run.
     """
 
-    trajectory: Trajectory
+    MISSING = "contains no planar machine; `rover planar` records such runs"
+    NEEDED = ("centres", "q")
+
     ground: PlanarGround
     radius: Array
-    title: str
+
+    @classmethod
+    def is_scene(cls, scene: Mapping[str, Any]) -> bool:
+        """Whether a file with this scene is a planar run on a line."""
+        return isinstance(scene.get("ground"), dict) and isinstance(scene.get("machine"), dict)
+
+    @classmethod
+    def _checked(cls, trajectory: Trajectory, path: str | Path) -> Self:
+        discs, coordinates = width_of(trajectory, "centres", 3), width_of(trajectory, "q", 2)
+        if discs not in DISCS or coordinates not in COORDINATES or len(ANGLES[coordinates]) != discs:
+            refuse(RecordingError, f"{path}: centres", discs, "must be one, two or three discs with their coordinates")
+        channels = [
+            one for one in planar_channels(coordinates, discs) if one.name != IN_WORLD or IN_WORLD in trajectory.data
+        ]
+        check_rows(trajectory, path, channels, bounded=("q", "v", "centres"), needed=True)
+        with sound(path, "scene"):
+            plain = dict(trajectory.scene["ground"])
+            ground = GROUNDS[plain.pop("kind")][0](**plain)
+            radius = _radii(trajectory.scene["machine"], discs)
+            step = float(trajectory.attributes["solver"]["time_step"])
+        if not are_sizes(radius) or not 0.0 < step <= LARGEST:
+            refuse(
+                RecordingError, f"{path}: scene.machine", radius.tolist(), "must have radii above 0, and a time step"
+            )
+        return cls(trajectory, ground, radius)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -177,14 +200,12 @@ class PlanarRun(Run):
         """(n, n_discs, 3) x and y of the discs' centres, m, and their angles, rad, counter-clockwise positive."""
         q = self.trajectory["q"]
         angles = q[:, ANGLES[q.shape[1]]]
-        result: Array = np.concatenate((self.trajectory["centres"], angles[..., None]), axis=2)
-        return result
+        return np.concatenate((self.trajectory["centres"], angles[..., None]), axis=2)
 
     @property
     def loads(self) -> Array:
         """(n, n_discs) force of the ground on each disc along its normal, mean since the previous sample, N."""
-        result: Array = self.trajectory["impulses"][..., 0] / self.time_step
-        return result
+        return self.trajectory["impulses"][..., 0] / self.time_step
 
     @property
     def time_step(self) -> float:
@@ -210,48 +231,7 @@ class PlanarRun(Run):
     def slip_speeds(self) -> Array:
         """(n, n_discs) rim speed minus travel speed, m/s."""
         v = self.trajectory["v"]
-        rims = -v[:, ANGLES[v.shape[1]]] * self.radius
-        result: Array = rims - v[:, :1]
-        return result
-
-
-def is_planar(trajectory: Trajectory) -> bool:
-    """Whether a trajectory is a planar run on a line."""
-    scene = trajectory.attributes.get("scene")
-    return isinstance(scene, dict) and isinstance(scene.get("ground"), dict) and isinstance(scene.get("machine"), dict)
-
-
-def planar_run_of(trajectory: Trajectory, path: str | Path) -> PlanarRun:
-    """The planar run of a trajectory read from `path`.
-
-    Raises:
-        RecordingError: It is not a planar run, or holds no samples.
-    """
-    if not is_planar(trajectory) or "centres" not in trajectory.data or "q" not in trajectory.data:
-        refuse(RecordingError, "path", str(path), "contains no planar machine; `rover planar` records such runs")
-    check_time(trajectory, path)
-    scene = trajectory.attributes["scene"]
-    discs = trajectory["centres"].shape[1] if trajectory["centres"].ndim == 3 else 0
-    coordinates = trajectory["q"].shape[1] if trajectory["q"].ndim == 2 else 0
-    if discs not in DISCS or coordinates not in COORDINATES or len(ANGLES[coordinates]) != discs:
-        refuse(RecordingError, f"{path}: centres", discs, "must be one, two or three discs with their coordinates")
-    channels = [
-        one for one in planar_channels(coordinates, discs) if one.name != IN_WORLD or IN_WORLD in trajectory.data
-    ]
-    check_rows(trajectory, path, channels, bounded=("q", "v", "centres"), needed=True)
-    with sound(path, "scene"):
-        ground = _ground(scene["ground"])
-        radius = _radii(scene["machine"], discs)
-        step = float(trajectory.attributes["solver"]["time_step"])
-    if not ((radius > 0.0) & (radius <= LARGEST)).all() or not 0.0 < step <= LARGEST:
-        refuse(RecordingError, f"{path}: scene.machine", radius.tolist(), "must have radii above 0, and a time step")
-    return PlanarRun(trajectory, ground, radius, title_of(trajectory))
-
-
-def _ground(plain: dict[str, Any]) -> PlanarGround:
-    arguments = {name: value for name, value in plain.items() if name != "kind"}
-    ground: PlanarGround = GROUNDS[plain["kind"]](**arguments)
-    return ground
+        return rim_slip(v, ANGLES[v.shape[1]], self.radius)
 
 
 def _radii(machine: dict[str, Any], discs: int) -> Array:

@@ -13,11 +13,12 @@ import numpy as np
 from rover_gym.core import DiskSimulation, OptionError, PlanarSimulation, Simulation
 from rover_gym.core.validation import checked, number, refuse
 from rover_gym.record.channels import RecordingError, RoverSampler, Sampler, row_count
-from rover_gym.record.disk_run import DiskRun, DiskSampler, disk_run_of, is_disks
-from rover_gym.record.grain_run import GrainRun, GrainSampler, Recordable, grain_run_of, is_grains
-from rover_gym.record.planar_run import PlanarRun, PlanarSampler, is_planar, planar_run_of
+from rover_gym.record.disk_run import DiskRun, DiskSampler
+from rover_gym.record.grain_run import GrainRun, GrainSampler, Recordable
+from rover_gym.record.planar_run import PlanarRun, PlanarSampler
 from rover_gym.record.recorder import Recorder
-from rover_gym.record.rover_run import RoverRun, Run, run_of
+from rover_gym.record.rover_run import RoverRun
+from rover_gym.record.run import Run
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 
 __all__ = ["SavedRun", "open_run", "record_run", "saved_run_of"]
@@ -25,6 +26,9 @@ __all__ = ["SavedRun", "open_run", "record_run", "saved_run_of"]
 #: A rover, a planar machine, disks, or balls in space.
 SavedRun: TypeAlias = RoverRun | PlanarRun | DiskRun | GrainRun
 R = TypeVar("R", bound=Run)
+
+#: Kinds that a scene tells; a run of a rover is none of these.
+KINDS: tuple[type[SavedRun], ...] = (DiskRun, GrainRun, PlanarRun)
 
 
 def sampler_of(sim: Simulation | PlanarSimulation | DiskSimulation | Recordable) -> Sampler:
@@ -133,8 +137,5 @@ def saved_run_of(trajectory: Trajectory, path: str | Path) -> SavedRun:
     Raises:
         RecordingError: It holds no samples, or its parts are inconsistent.
     """
-    if is_disks(trajectory):
-        return disk_run_of(trajectory, path)
-    if is_grains(trajectory):
-        return grain_run_of(trajectory, path)
-    return planar_run_of(trajectory, path) if is_planar(trajectory) else run_of(trajectory, path)
+    kind: type[SavedRun] = next((one for one in KINDS if one.is_scene(trajectory.scene)), RoverRun)
+    return kind.of(trajectory, path)

@@ -74,6 +74,12 @@ class Trajectory:
             refuse(RecordingError, name, sorted(self.data), "there is no such data set in the run; it contains")
         return self.data[name]
 
+    @property
+    def scene(self) -> Mapping[str, Any]:
+        """What was simulated, as the attribute `scene` says it; empty if it says nothing."""
+        scene = self.attributes.get("scene")
+        return scene if isinstance(scene, dict) else {}
+
     def at(self, rows: npt.NDArray[np.int64]) -> Trajectory:
         """Some samples of the run, by their indices `(n,)`; `original` keeps all of them."""
         whole, kept = (self, rows) if self.original is None else (self.original[0], self.original[1][rows])

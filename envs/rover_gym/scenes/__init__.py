@@ -18,26 +18,6 @@ A scene states what will never happen in it, and the plan leaves out only what t
 left out is refused. `docs/economy.md` gives the error and the cost of each economy, and the command that measures them.
 """
 
-from rover_gym.scenes.economies import Economy, measure_economies
-from rover_gym.scenes.incline import Incline, ball_on_slope
-from rover_gym.scenes.planner import plan
-from rover_gym.scenes.report_scenes import ReportScene, SceneResult, inclined_plane, report_model, sphere_rug
-from rover_gym.scenes.scene_plan import Accuracy, Decision, PlannedRover, Scene, ScenePlan
+import lazy_loader
 
-__all__ = [
-    "Accuracy",
-    "Decision",
-    "Economy",
-    "Incline",
-    "PlannedRover",
-    "ReportScene",
-    "Scene",
-    "ScenePlan",
-    "SceneResult",
-    "ball_on_slope",
-    "inclined_plane",
-    "measure_economies",
-    "plan",
-    "report_model",
-    "sphere_rug",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -196,26 +196,24 @@ def _widths(model: RoverModel) -> list[float]:
 
 def _steering(scene: Scene, terrain: Terrain, start: Array) -> tuple[bool, Decision]:
     joints = steering_joints(scene.model)
-    held = f"{len(joints)} joints held by the PD"
     if not joints:
         return False, Decision("steering", "none", "the model has no free steering joint")
     angles = start[[i for i in scene.model.steering_joint_indices if i >= 0]]
-    if scene.steered:
-        return False, Decision("steering", held, "steering may be commanded")
-    if np.any(angles):
+    if not scene.steered and np.any(angles):
         refuse(OptionError, "steered", scene.steered, "is False, but the wheels are turned at the start")
-    if not isinstance(terrain, Plane):
+    if scene.steered:
+        why = "steering may be commanded"
+    elif not isinstance(terrain, Plane):
         climbed = "sphere" if isinstance(terrain, SphereField) else "face"
         why = f"not commanded, but on {climbed}s the PD gives way enough to change which {climbed} a wheel climbs"
-        return False, Decision("steering", held, why)
-    if not _rests(scene, terrain, start):
+    elif not _rests(scene, terrain, start):
         why = "not commanded, but in a landing wheels strike at an angle and turn"
-        return False, Decision("steering", held, why)
-    if _steering_offset(scene.model) > _STRAIGHT:
+    elif _steering_offset(scene.model) > _STRAIGHT:
         why = "not commanded, but the wheels touch beside their steering axes and turn"
-        return False, Decision("steering", held, why)
-    why = "never commanded, and every wheel touches on its steering axis, so contact forces do not turn it"
-    return True, Decision("steering", f"{len(joints)} joints welded at zero", why, WELD_ERROR)
+    else:
+        why = "never commanded, and every wheel touches on its steering axis, so contact forces do not turn it"
+        return True, Decision("steering", f"{len(joints)} joints welded at zero", why, WELD_ERROR)
+    return False, Decision("steering", f"{len(joints)} joints held by the PD", why)
 
 
 def _rests(scene: Scene, terrain: Plane, start: Array) -> bool:

@@ -1,24 +1,12 @@
-from .camera import Camera
-from .colour_camera import ColourCamera
-from .depth_camera import DepthCamera, LaserScanner
-from .inertial_unit import InertialUnit
-from .sensor import Mount, Sensor
-from .sensor_suite import SensorObservation, SensorSuite, make_grains_rover, make_rover
-from .wheel_encoders import HeadingSensor, MotorSensors, WheelEncoders
-
-__all__ = [
-    "Camera",
-    "ColourCamera",
-    "DepthCamera",
-    "HeadingSensor",
-    "InertialUnit",
-    "LaserScanner",
-    "MotorSensors",
-    "Mount",
-    "Sensor",
-    "SensorObservation",
-    "SensorSuite",
-    "WheelEncoders",
-    "make_grains_rover",
-    "make_rover",
-]
+from .camera import Camera as Camera
+from .colour_camera import ColourCamera as ColourCamera
+from .depth_camera import DepthCamera as DepthCamera, LaserScanner as LaserScanner
+from .inertial_unit import InertialUnit as InertialUnit
+from .sensor import Mount as Mount, Sensor as Sensor
+from .sensor_suite import (
+    SensorObservation as SensorObservation,
+    SensorSuite as SensorSuite,
+    make_grains_rover as make_grains_rover,
+    make_rover as make_rover,
+)
+from .wheel_encoders import HeadingSensor as HeadingSensor, MotorSensors as MotorSensors, WheelEncoders as WheelEncoders

@@ -16,7 +16,6 @@ from rover_gym.core import OptionError, RoverModel, StateError
 from rover_gym.core.validation import refuse
 from rover_gym.envs.batch import BatchSnapshot
 from rover_gym.envs.env_snapshot import EnvSnapshot
-from rover_gym.envs.grains_env import RoverGrainsEnv
 from rover_gym.envs.observation import Mask
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.sensors.named_sensor import sensor_of
@@ -361,6 +360,8 @@ def make_rover(
 
 def make_grains_rover(**arguments: Any) -> gym.Env[Any, Any]:
     """Makes a `RoverGrainsEnv`, wrapped in `SensorObservation` if there are sensors, which then see the grains."""
+    from rover_gym.envs.grains_env import RoverGrainsEnv  # noqa: PLC0415 - other environments need no grains
+
     return make_rover(make=RoverGrainsEnv, **arguments)
 
 

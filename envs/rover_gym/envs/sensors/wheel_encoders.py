@@ -65,8 +65,7 @@ class WheelEncoders(Sensor):
         if self.ticks is None:
             return angle
         tick = 2.0 * math.pi / self.ticks
-        counted: Array = np.floor(angle / tick) * tick
-        return counted
+        return np.floor(angle / tick) * tick
 
 
 @dataclass(frozen=True, kw_only=True)

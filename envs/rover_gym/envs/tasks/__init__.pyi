@@ -1,19 +1,13 @@
-from .arcs_env import RoverArcsEnv, RoverArcsVectorEnv
-from .command_env import CommandVectorEnv, DriveByCommand, RoverCommandEnv, RoverCommandVectorEnv
-from .goal_env import GoalObservation, RoverGoalEnv, RoverGoalVectorEnv
-from .trap_env import RoverTrapEnv, RoverTrapVectorEnv, TrapBatch
-
-__all__ = [
-    "CommandVectorEnv",
-    "DriveByCommand",
-    "GoalObservation",
-    "RoverArcsEnv",
-    "RoverArcsVectorEnv",
-    "RoverCommandEnv",
-    "RoverCommandVectorEnv",
-    "RoverGoalEnv",
-    "RoverGoalVectorEnv",
-    "RoverTrapEnv",
-    "RoverTrapVectorEnv",
-    "TrapBatch",
-]
+from .arcs_env import RoverArcsEnv as RoverArcsEnv, RoverArcsVectorEnv as RoverArcsVectorEnv
+from .command_env import (
+    CommandVectorEnv as CommandVectorEnv,
+    DriveByCommand as DriveByCommand,
+    RoverCommandEnv as RoverCommandEnv,
+    RoverCommandVectorEnv as RoverCommandVectorEnv,
+)
+from .goal_env import (
+    GoalObservation as GoalObservation,
+    RoverGoalEnv as RoverGoalEnv,
+    RoverGoalVectorEnv as RoverGoalVectorEnv,
+)
+from .trap_env import RoverTrapEnv as RoverTrapEnv, RoverTrapVectorEnv as RoverTrapVectorEnv, TrapBatch as TrapBatch

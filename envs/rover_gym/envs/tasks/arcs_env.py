@@ -6,12 +6,11 @@ from typing import Any, Protocol, SupportsFloat, Unpack
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium.vector import AutoresetMode, VectorWrapper
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import AutoresetMode
 
-from rover_gym.core import OptionError, TerrainError
+from rover_gym.core import OptionError
 from rover_gym.core.validation import refuse
-from rover_gym.drive.arc_driver import (
+from rover_gym.drive.arcs.arc_driver import (
     ArcDriver,
     ArcObservation,
     arc_of,
@@ -19,11 +18,12 @@ from rover_gym.drive.arc_driver import (
     check_arcs,
     observation_space,
 )
-from rover_gym.drive.scan_policy import ScanGains, ScanPolicy, hold_periods
+from rover_gym.drive.scan.scan_policy import ScanGains, ScanPolicy, hold_periods
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.play_keys import keys_to_action
 from rover_gym.envs.rover_env import RoverEnv
+from rover_gym.envs.tasks.held_actions import HeldVectorEnv, step_one
 from rover_gym.envs.time_limits import MAX_ARCS
 from rover_gym.envs.vector.vector_env import RoverVectorEnv, episode_limit
 from rover_gym.models.lookup import open_model
@@ -63,7 +63,7 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
     ## Action
 
     `Discrete(64)`, held for 0.2 s, or until the episode ends. Actions 0 to 31 are the arcs of
-    `rover_gym.drive.arc_driver.ARCS` at cruising speed: 25 forward, 7 backward. Actions 32 to 63 are the same arcs
+    `rover_gym.drive.arcs.arc_driver.ARCS` at cruising speed: 25 forward, 7 backward. Actions 32 to 63 are the same arcs
     while pushing, as the planner does where a rock stops the rover. Curvature and sideways motion are relative to what
     the rover can steer; a rover that does not steer all wheels drives an arc without its sideways motion.
 
@@ -160,16 +160,9 @@ class RoverArcsEnv(gym.Wrapper[Any, Any, Observations, Observations]):
     def _observe(self) -> ArcObservation:
         return {name: part[0] for name, part in self.driver.observe(self._seen).items()}
 
-    def _step(self, actions: Observations, _moved: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
-        self.rover.has_scan = has_scan
-        try:
-            seen, reward, terminated, _, self._info = self.rover.step(actions[0])
-        finally:
-            self.rover.has_scan = True
-        if terminated and not has_scan:
-            seen = self.rover.complete_observation()
-        ended: Mask = np.full(1, terminated, np.bool_)
-        return seen[None], np.array([reward]), ended, np.zeros_like(ended)
+    def _step(self, actions: Observations, _: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
+        stepped, self._info = step_one(self.rover, self.rover, actions, has_scan=has_scan)
+        return stepped
 
 
 def planned_arc(teacher: CommandPlanner, seen: Observations, driver: ArcDriver) -> int:
@@ -182,7 +175,7 @@ def planned_arc(teacher: CommandPlanner, seen: Observations, driver: ArcDriver) 
     return arc_of((direction, curvature / limits.curvature, sideways / side), pushes=pushes)
 
 
-class RoverArcsVectorEnv(VectorWrapper):
+class RoverArcsVectorEnv(HeldVectorEnv):
     """A vector of `RoverArcsEnv` environments that the compiled core steps on several threads.
 
     Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of them with a `TimeLimit` and the
@@ -211,29 +204,32 @@ class RoverArcsVectorEnv(VectorWrapper):
     ) -> None:
         given, limit = arc_arguments(arguments), episode_limit(max_episode_steps, MAX_ARCS)
         periods = -1 if limit is None else hold_periods(ScanGains().period, RoverEnv(**given).dt) * limit
-        self.rovers = RoverVectorEnv(
+        rovers = RoverVectorEnv(
             num_envs, threads=threads, max_episode_steps=periods, autoreset_mode=autoreset_mode, **given
         )
-        if self.rovers.autoreset_mode == AutoresetMode.DISABLED:
-            refuse(OptionError, "autoreset_mode", autoreset_mode, "must be NextStep or SameStep")
-        super().__init__(self.rovers)
-        self.driver = ArcDriver(self.rovers.prototype, num_envs)
+        super().__init__(rovers, rovers, arc_space())
+        self.driver = ArcDriver(rovers.prototype, num_envs)
         self.repeat = self.driver.hold
-        self.single_observation_space, self.single_action_space = observation_space(), arc_space()
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self._over: Mask = np.zeros(num_envs, np.bool_)
-        self._seen = np.zeros((num_envs, self.rovers.prototype.observation_layout.size), np.float32)
+        self.show(observation_space())
 
-    def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[ArcObservation, dict[str, Any]]:
-        """Starts episodes, as `RoverVectorEnv.reset`."""
-        self._seen, infos = self.rovers.reset(seed=seed, options=options)
-        begun = np.broadcast_to((options or {}).get("reset_mask", np.True_), (self.num_envs,)).copy()
-        self._over &= ~begun
-        self._begin(begun)
-        return self.driver.observe(self._seen), infos
+    def observe(self) -> ArcObservation:
+        """What a policy observes of each rover now."""
+        return self.driver.observe(self.seen)
+
+    def begin(self, rovers: Mask) -> None:
+        """Rovers `(num_envs,)` begin an episode; nothing is remembered of the last one."""
+        self.driver.begin(rovers)
+        self.driver.notice(self.seen, rovers)
+
+    def hold(self, actions: npt.NDArray[np.int64], moved: Mask) -> tuple[Array, Mask, Mask]:
+        """Holds the arcs of the rovers that move, as `HeldVectorEnv.hold`."""
+        self.driver.choose(self.seen, actions, moved)
+        self.seen, rewards, terminated, truncated = self.driver.drive(self.seen, moved, self._step)
+        self.driver.notice(self.seen, moved)
+        return rewards, terminated, truncated
+
+    def _step(self, actions: Observations, active: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
+        return self.rovers.batch.step(actions, active, has_scan=has_scan)[:4]
 
     def step(self, actions: npt.ArrayLike) -> tuple[ArcObservation, Array, Mask, Mask, dict[str, Any]]:
         """Drives along arcs `(num_envs,)` for 0.2 s or until a rover's episode ends.
@@ -243,44 +239,7 @@ class RoverArcsVectorEnv(VectorWrapper):
             TerrainError: A rover's next episode cannot begin; nothing has changed.
             ResetNeeded: A rover has not been reset.
         """
-        arcs, batch = check_arcs(actions, self.num_envs), self.rovers.batch
-        begun = self._over
-        if begun.any():
-            self._seen, _ = self.rovers.reset(options={"reset_mask": begun})
-            self._begin(begun)
-        moved = ~begun
-        self.driver.choose(self._seen, arcs, moved)
-        self._seen, rewards, terminated, truncated = self.driver.drive(
-            self._seen, moved, lambda actions, active, has_scan: batch.step(actions, active, has_scan=has_scan)[:4]
-        )
-        self.driver.notice(self._seen, moved)
-        self._over = terminated | truncated
-        finals: dict[int, dict[str, Any]] = {}
-        seen = self.driver.observe(self._seen)
-        if self.rovers.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
-            seen, finals = self._begin_next(seen)
-        infos = batch.infos()
-        for i, final in finals.items():
-            infos = self._add_info(infos, final, i)
-        return seen, rewards, terminated, truncated, infos
-
-    def _begin_next(self, last: ArcObservation) -> tuple[ArcObservation, dict[int, dict[str, Any]]]:
-        """Starts the next episodes; returns the observations, and what the last ones ended with.
-
-        If one cannot begin, none does, and the next step refuses it.
-        """
-        over, batch = self._over, self.rovers.batch
-        finals: dict[int, dict[str, Any]] = {
-            i: {"final_obs": {name: part[i].copy() for name, part in last.items()}, "final_info": batch.info(i)}
-            for i in np.flatnonzero(over).tolist()
-        }
-        try:
-            self._seen, _ = self.rovers.reset(options={"reset_mask": over})
-        except TerrainError:
-            return last, finals
-        self._over = np.zeros(self.num_envs, np.bool_)
-        self._begin(over)
-        return self.driver.observe(self._seen), finals
+        return self.drive(check_arcs(actions, self.num_envs))
 
     def expert_actions(self, teacher: ScanPolicy | None = None, of: Mask | None = None) -> npt.NDArray[np.int64]:
         """`(num_envs,)` the arcs that a planner would choose now, 0 for rovers not in `of`.
@@ -290,8 +249,4 @@ class RoverArcsVectorEnv(VectorWrapper):
             of: `(num_envs,)` the rovers to choose for; None for all.
         """
         chosen = np.ones(self.num_envs, np.bool_) if of is None else of
-        return self.driver.expert(self._seen, chosen, teacher)
-
-    def _begin(self, rovers: Mask) -> None:
-        self.driver.begin(rovers)
-        self.driver.notice(self._seen, rovers)
+        return self.driver.expert(self.seen, chosen, teacher)

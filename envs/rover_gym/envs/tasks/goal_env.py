@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from rover_gym.core import OptionError, StateError, sin_cos
 from rover_gym.core.validation import array, refuse
-from rover_gym.drive.pd_policy import find_rover_env
+from rover_gym.drive.commands.driven import find_rover_env
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.tasks.command_env import (
@@ -104,8 +104,7 @@ class GoalRewards:
             StateError: A goal has a wrong shape.
         """
         away = _distances(achieved_goal, desired_goal)
-        reward: Array = np.exp(-away) if self.reward_type == "dense" else (away <= self.goal_tolerance).astype(float)
-        return reward
+        return np.exp(-away) if self.reward_type == "dense" else (away <= self.goal_tolerance).astype(float)
 
     def compute_terminated(self, achieved_goal: npt.ArrayLike, desired_goal: npt.ArrayLike, info: Any) -> Mask:
         """Whether an episode ends `(...)` with achieved and desired goals `(..., 2)`: at the goal, or in failure.
@@ -212,8 +211,7 @@ def _distances(achieved: npt.ArrayLike, desired: npt.ArrayLike) -> Array:
             refuse(StateError, field, place.shape, "must have x and z on its last axis")
         places.append(place)
     away = places[0] - places[1]
-    distance: Array = np.hypot(away[..., 0], away[..., 1])
-    return distance
+    return np.hypot(away[..., 0], away[..., 1])
 
 
 class RoverGoalEnv(GoalObservation):
@@ -279,15 +277,15 @@ class RoverGoalVectorEnv(GoalRewards, RoverCommandVectorEnv):
 
     def __init__(self, num_envs: int = 1, *, reward_type: RewardType = "sparse", **arguments: Any) -> None:
         RoverCommandVectorEnv.__init__(self, num_envs, **arguments)
-        held, features = self.held, self.held.features
-        self.set_goals(self.rovers.prototype, self.num_envs, reward_type, held.observation_space, features.goal_entries)
+        features = self.held.features
+        self.set_goals(self.rovers.prototype, self.num_envs, reward_type, features.space, features.goal_entries)
         self.show(self.goal_space)
 
     def observe(self) -> GoalDict:
         """The dictionaries of all rovers."""
         rovers = self.rovers.envs
         places, goals = np.array([rover.simulation.q for rover in rovers]), np.array([rover.goal for rover in rovers])
-        return self.observe_goals(self.held.observe(), self.held.seen, places, goals)
+        return self.observe_goals(super().observe(), self.seen, places, goals)
 
     def reward(self, rewards: Array, observations: GoalDict, moved: Mask) -> Array:
         """The rewards of the goals; 0 where a rover's next episode has only begun."""

@@ -18,7 +18,7 @@ from rover_gym.core import (
     standard_normals,
 )
 from rover_gym.core.validation import Range, number, refuse
-from rover_gym.drive.pd_policy import PDPolicy
+from rover_gym.drive.pd.pd_policy import PDPolicy
 from rover_gym.envs.arguments import RoverArguments, takes_arguments
 from rover_gym.envs.batch import Drawn, RoverBatch
 from rover_gym.envs.episode_scene import ResetOptions, origin_of

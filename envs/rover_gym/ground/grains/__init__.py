@@ -12,65 +12,6 @@ True
 100
 """
 
-from rover_gym.ground.grains.ball_bed import (
-    BallBed,
-    box_walls,
-    even_radii,
-    lognormal_radii,
-    settle,
-    settled_balls,
-    settled_track,
-    sieved_radii,
-    tiled,
-)
-from rover_gym.ground.grains.bed_scenes import column, drum, rover_on_bed, silo, striking_sphere, with_wheel_width
-from rover_gym.ground.grains.disk_bed import DiskBed, rover_on_disks, settled_disks
-from rover_gym.ground.grains.disk_trials import (
-    BedEstimate,
-    DiskDrive,
-    Pull,
-    Traction,
-    drawbar_pull,
-    drive_on_disks,
-    fit_traction,
-    over_beds,
-)
-from rover_gym.ground.grains.grain_surface import SurfaceMap, surface_map
-from rover_gym.ground.grains.moving_window import BedEnergy, MovingWindow, WindowSnapshot
-from rover_gym.ground.grains.pit import Pit, PitFill
+import lazy_loader
 
-__all__ = [
-    "BallBed",
-    "BedEnergy",
-    "BedEstimate",
-    "DiskBed",
-    "DiskDrive",
-    "MovingWindow",
-    "Pit",
-    "PitFill",
-    "Pull",
-    "SurfaceMap",
-    "Traction",
-    "WindowSnapshot",
-    "box_walls",
-    "column",
-    "drawbar_pull",
-    "drive_on_disks",
-    "drum",
-    "even_radii",
-    "fit_traction",
-    "lognormal_radii",
-    "over_beds",
-    "rover_on_bed",
-    "rover_on_disks",
-    "settle",
-    "settled_balls",
-    "settled_disks",
-    "settled_track",
-    "sieved_radii",
-    "silo",
-    "striking_sphere",
-    "surface_map",
-    "tiled",
-    "with_wheel_width",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

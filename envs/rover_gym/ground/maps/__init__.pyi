@@ -1,8 +1,2 @@
-from .fractal import fractal_map
-from .map_files import read_map, read_mesh
-
-__all__ = [
-    "fractal_map",
-    "read_map",
-    "read_mesh",
-]
+from .fractal import fractal_map as fractal_map
+from .map_files import read_map as read_map, read_mesh as read_mesh

@@ -1,10 +1,9 @@
 """Soils by name, each with its numbers and their source."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from rover_gym.core import OptionError
@@ -94,7 +93,9 @@ class Soil:
 
 @cache
 def _catalogue() -> dict[str, Any]:
-    return tomllib.loads((files(__package__) / "soils.toml").read_text(encoding="utf-8"))
+    import tomllib  # noqa: PLC0415 - only sand needs it
+
+    return tomllib.loads(Path(__file__).with_name("soils.toml").read_text(encoding="utf-8"))
 
 
 def soil_names() -> list[str]:

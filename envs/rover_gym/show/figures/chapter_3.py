@@ -104,7 +104,7 @@ def _sine_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
     _outlines(axes, rim)
     axes.set(xlabel="x (m)", ylabel="y (m)", xlim=(-5.0, 2.0))
     axes.set_aspect("equal", adjustable="box")
-    axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="circles: the ball at start and end")
+    figure.legend(loc="outside lower center", ncols=2, title="circles: the ball at start and end", title_fontsize=9.0)
     figure.suptitle("Figure 3.4: a ball on a sine over 10 s, from (-2.5, 1)")
 
 

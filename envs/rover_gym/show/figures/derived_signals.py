@@ -8,11 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.envs.start import SLIP_SPEED, drive_signs
+from rover_gym.show.figures.style import QUANTITY_COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from rover_gym.record.disk_run import DiskRun
+    from rover_gym.record.grain_run import GrainRun
     from rover_gym.record.rover_run import RoverRun
+    from rover_gym.record.run import Run
     from rover_gym.show.figures.style import WheelStyle
 
 
@@ -98,6 +102,33 @@ def plot_raw_and_smooth(axes: Axes, style: WheelStyle, time: Array, values: Arra
         i = style.names.index(wheel)
         axes.plot(time, values[:, i], color=style.colours[wheel], linewidth=0.5, alpha=0.35, label=f"_{wheel} samples")
     style.plot(axes, time, smoothed, wheels)
+
+
+def raw_and_smooth(axes: Axes, time: Array, values: Array, colour: str, label: str | None = None) -> None:
+    """Draws every sample as a light line, and the smoothed curve; values (n,)."""
+    axes.plot(time, values, color=colour, linewidth=0.5, alpha=0.35, label=f"_{label} samples")
+    axes.plot(time, smooth(time, values, WINDOW), color=colour, label=label)
+
+
+def plot_energy(axes: Axes, run: Run) -> tuple[Array, Array]:
+    """Draws kinetic and potential energy and returns them, J; the potential one is zero at the start."""
+    kinetic, potential = run.trajectory["kinetic_energy"], run.trajectory["potential_energy"]
+    potential = potential - potential[0]
+    axes.plot(run.time, kinetic, color=QUANTITY_COLOURS[0], label="kinetic")
+    axes.plot(run.time, potential, color=QUANTITY_COLOURS[1], label="potential, from the start")
+    axes.set(ylabel="energy (J)")
+    return kinetic, potential
+
+
+def plot_contacts(contacts: Axes, overlap: Axes, run: DiskRun | GrainRun, counted: str) -> None:
+    """Draws the number of contacts, which `counted` explains, and the deepest overlap of a run of grains."""
+    number = np.array(run.trajectory["n_contacts"])
+    number[0] = np.nan  # no step had been taken
+    contacts.plot(run.time, number, color=QUANTITY_COLOURS[2], label=f"contacts{counted}")
+    share = 100.0 * run.trajectory["penetration"] / float(run.radius.min())
+    overlap.plot(run.time, share, color=QUANTITY_COLOURS[3], label="deepest overlap, share of the smallest radius")
+    overlap.set(ylabel="overlap (%)")
+    overlap.set_ylim(bottom=0.0)
 
 
 def finite(values: Array) -> Array:

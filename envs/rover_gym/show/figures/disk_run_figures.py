@@ -16,14 +16,8 @@ from rover_gym.core.extras import MissingExtraError
 from rover_gym.core.files import written_whole
 from rover_gym.envs.start import SLIP_SPEED
 from rover_gym.ground.grains.disk_trials import DiskDrive, Pull
-from rover_gym.show.figures.derived_signals import WINDOW, Array, smooth
-from rover_gym.show.figures.style import (
-    DARK,
-    QUANTITY_COLOURS,
-    Drawing,
-    panel_legend,
-    title,
-)
+from rover_gym.show.figures.derived_signals import WINDOW, plot_contacts, plot_energy, raw_and_smooth, smooth
+from rover_gym.show.figures.style import DARK, Drawing, finish
 from rover_gym.show.frames.appearance import PLANAR_WHEEL_COLOURS
 
 if TYPE_CHECKING:
@@ -41,18 +35,19 @@ def driving(figure: Sheet, run: DiskRun) -> None:
     forward = rates[:, 0]
     rims = run.slip_speeds + forward[:, None]
     smoothed_forward, smoothed_rims = smooth(run.time, forward, WINDOW), smooth(run.time, rims, WINDOW)
-    _raw_and_smooth(speed, run, forward, DARK, "rover")
+    mean = f"mean over {WINDOW:g} s"
+    raw_and_smooth(speed, run.time, forward, DARK, f"rover, {mean}")
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = 100.0 * np.where(smoothed_rims > SLIP_SPEED, 1.0 - smoothed_forward[:, None] / smoothed_rims, np.nan)
     for i, (name, colour) in enumerate(_wheels(run)):
-        _raw_and_smooth(speed, run, rims[:, i], colour, f"rim, {name}")
+        raw_and_smooth(speed, run.time, rims[:, i], colour, f"rim, {name}, {mean}")
         slip.plot(run.time, ratios[:, i], color=colour, label=name)
         depth.plot(run.time, 1e3 * run.sinkage[:, i], color=colour, label=name)
     speed.set(ylabel="speed (m/s)")
     slip.set(ylabel="slip (%)", ylim=(-10.0, 110.0))
     depth.axhline(0.0, color=DARK, linewidth=0.6)
     depth.set(ylabel="sinkage (mm)", xlabel="time (s)")
-    _finish(figure, (speed, slip, depth), "Speed, slip and sinkage", run)
+    finish(figure, "Speed, slip and sinkage", run, speed, slip, depth)
 
 
 def wheel_forces(figure: Sheet, run: DiskRun) -> None:
@@ -61,31 +56,23 @@ def wheel_forces(figure: Sheet, run: DiskRun) -> None:
     forces = np.array(run.wheel_forces)
     forces[0] = np.nan  # no step had been taken
     for i, (name, colour) in enumerate(_wheels(run)):
-        _raw_and_smooth(load, run, forces[:, i, 1], colour, name)
-        _raw_and_smooth(thrust, run, forces[:, i, 0], colour, name)
+        label = f"{name}, mean over {WINDOW:g} s"
+        raw_and_smooth(load, run.time, forces[:, i, 1], colour, label)
+        raw_and_smooth(thrust, run.time, forces[:, i, 0], colour, label)
     load.set(ylabel="vertical force (N)")
     thrust.axhline(0.0, color=DARK, linewidth=0.6)
     thrust.set(ylabel="horizontal force,\npositive forward (N)", xlabel="time (s)")
-    _finish(figure, (load, thrust), "Force of the disks on the wheels, mean since the row before", run)
+    finish(figure, "Force of the disks on the wheels, mean since the row before", run, load, thrust)
 
 
 def disks_and_contacts(figure: Sheet, run: DiskRun) -> None:
     """Energy of disks and rover, number of contacts, deepest overlap."""
     energy, contacts, overlap = figure.subplots(3, 1, sharex=True)
-    data = run.trajectory
-    potential = data["potential_energy"] - data["potential_energy"][0]
-    energy.plot(run.time, data["kinetic_energy"], color=QUANTITY_COLOURS[0], label="kinetic")
-    energy.plot(run.time, potential, color=QUANTITY_COLOURS[1], label="potential, from the start")
-    energy.set(ylabel="energy (J)")
-    number = np.array(data["n_contacts"])
-    number[0] = np.nan  # no step had been taken
-    contacts.plot(run.time, number, color=QUANTITY_COLOURS[2], label="contacts of the row's last step")
+    plot_energy(energy, run)
+    plot_contacts(contacts, overlap, run, " of the row's last step")
     contacts.set(ylabel="contacts (1)")
-    share = 100.0 * data["penetration"] / float(run.radius.min())
-    overlap.plot(run.time, share, color=QUANTITY_COLOURS[3], label="deepest overlap, share of the smallest radius")
-    overlap.set(ylabel="overlap (%)", xlabel="time (s)")
-    overlap.set_ylim(bottom=0.0)
-    _finish(figure, (energy, contacts, overlap), "Disks and contacts", run)
+    overlap.set(xlabel="time (s)")
+    finish(figure, "Disks and contacts", run, energy, contacts, overlap)
 
 
 #: By file name.
@@ -101,19 +88,6 @@ def _wheels(run: DiskRun) -> list[tuple[str, str]]:
     n = run.wheels.shape[1]
     names = ("back wheel", "front wheel") if n == 2 else tuple(f"wheel {i + 1}" for i in range(n))
     return [(name, PLANAR_WHEEL_COLOURS[i % len(PLANAR_WHEEL_COLOURS)]) for i, name in enumerate(names)]
-
-
-def _raw_and_smooth(axes: Axes, run: DiskRun, values: Array, colour: str, name: str) -> None:
-    """Draws every sample as a light line, and the smoothed curve; values (n,)."""
-    axes.plot(run.time, values, color=colour, linewidth=0.5, alpha=0.35, label=f"_{name} samples")
-    axes.plot(run.time, smooth(run.time, values, WINDOW), color=colour, label=f"{name}, mean over {WINDOW:g} s")
-
-
-def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: DiskRun) -> None:
-    """Adds legends, and a title naming the figure and the run."""
-    for axes in panels:
-        panel_legend(axes)
-    title(figure, what, run)
 
 
 #: Load colours (Okabe and Ito's palette).

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ from rover_gym.core import Plane
 from rover_gym.core.extras import MissingExtraError, require
 from rover_gym.core.files import written_whole
 from rover_gym.record.rover_run import RoverRun
-from rover_gym.show.figures.rover_film import RoverFilm, ShownSample
+from rover_gym.show.figures.rover_film import Film, RoverFilm, ShownSample
 from rover_gym.show.frames import FrameRenderer, VideoWriter
 from rover_gym.show.frames.appearance import GROUND_COLOUR, ROCK_COLOUR
 from rover_gym.show.frames.render_options import whole_film
@@ -36,8 +36,8 @@ SIZE = 960, 540  # pixels
 Array = npt.NDArray[np.float64]
 
 
-class GrainFilm:
-    """Draws the samples of a run; a context manager.
+class GrainFilm(Film):
+    """Draws the samples of a run of balls.
 
     Args:
         run: The run.
@@ -75,7 +75,7 @@ class GrainFilm:
             if floor is not None:
                 point, normal = floor
                 actors.append(GroundActors(Plane(normal.tolist(), -float(point @ normal)), soil).actor)
-            self._renderer: Any = BedRenderer(actors, soil, width=width, height=height)
+            self._renderer = BedRenderer(actors, soil, width=width, height=height)
             return
         self._renderer = FrameRenderer(run.rover.model, run.rover.terrain, width=width, height=height)
         self._renderer.shade(self._balls)
@@ -92,12 +92,6 @@ class GrainFilm:
             eye, target = (np.array(place) + self._path[row] for place in self._view[:2])
             return np.asarray(self._renderer.render(eye, target, self._view.angle))
         return np.asarray(self._renderer.render(ShownSample.of(run.rover, row)))
-
-    def __enter__(self) -> GrainFilm:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._renderer.close()
 
 
 def draw_grains(run: GrainRun, path: str | Path, *, row: int = -1, size: tuple[int, int] = SIZE) -> Path:
@@ -144,7 +138,7 @@ def film_run(
     # A run that was sampled more coarsely plays at the rate of its samples.
     lasts = float(shown.time[-1] - shown.time[0])
     rate = min(fps, (shown.n_frames - 1) / lasts) if lasts > 0.0 else fps
-    drawn = RoverFilm(shown, size) if isinstance(shown, RoverRun) else GrainFilm(shown, size)
+    drawn: Film = RoverFilm(shown, size) if isinstance(shown, RoverRun) else GrainFilm(shown, size)
     with VideoWriter(path, rate) as video, drawn as film:
         for row in range(shown.n_frames):
             video.append(film.frame(row))

@@ -9,14 +9,24 @@ import numpy as np
 from rover_gym.core import RoverModel
 from rover_gym.envs.start import SLIP_SPEED
 from rover_gym.ground.grains.grain_surface import SurfaceMap, surface_map
-from rover_gym.show.figures.derived_signals import SMOOTHED, WINDOW, Array, of_wheels, plot_raw_and_smooth, smooth
+from rover_gym.show.figures.derived_signals import (
+    SMOOTHED,
+    WINDOW,
+    Array,
+    of_wheels,
+    plot_contacts,
+    plot_energy,
+    plot_raw_and_smooth,
+    raw_and_smooth,
+    smooth,
+)
 from rover_gym.show.figures.style import (
     DARK,
     QUANTITY_COLOURS,
     Drawing,
     WheelStyle,
+    finish,
     panel_legend,
-    title,
 )
 
 if TYPE_CHECKING:
@@ -157,7 +167,7 @@ def wheel_forces(figure: Sheet, run: GrainRun) -> None:
         axes.set(ylabel=f"{name} (N)")
     panels[-1].set(xlabel="time (s)")
     style.legend(figure, note=SMOOTHED)
-    title(figure, "Force of balls and ground on the wheels, mean since the row before", run)
+    finish(figure, "Force of balls and ground on the wheels, mean since the row before", run)
 
 
 def sinkage_and_slip(figure: Sheet, run: GrainRun) -> None:
@@ -170,11 +180,10 @@ def sinkage_and_slip(figure: Sheet, run: GrainRun) -> None:
     style.plot(slip, run.time, 100.0 * slip_of_wheels(run))
     slip.set(ylabel="slip (%)", ylim=(-20.0, 110.0))
     rate = np.hypot(*run.trajectory["v"][:, [0, 2]].T)
-    speed.plot(run.time, rate, color=DARK, linewidth=0.5, alpha=0.35)
-    speed.plot(run.time, smooth(run.time, rate, WINDOW), color=DARK)
+    raw_and_smooth(speed, run.time, rate, DARK)
     speed.set(ylabel="speed of the trunk (m/s)", xlabel="time (s)")
     style.legend(figure, note=f"slip and speed: smoothed over {WINDOW:g} s")
-    title(figure, "Sinkage and slip of the wheels, speed", run)
+    finish(figure, "Sinkage and slip of the wheels, speed", run)
 
 
 def slip_of_wheels(run: GrainRun) -> Array:
@@ -201,41 +210,30 @@ def balls_and_contacts(figure: Sheet, run: GrainRun) -> None:
     """Energy, number of contacts, deepest overlap and the solver's residual."""
     energy, contacts, overlap, residual = figure.subplots(4, 1, sharex=True)
     data = run.trajectory
-    potential = data["potential_energy"] - data["potential_energy"][0]
-    energy.plot(run.time, data["kinetic_energy"], color=QUANTITY_COLOURS[0], label="kinetic")
-    energy.plot(run.time, potential, color=QUANTITY_COLOURS[1], label="potential, from the start")
-    energy.set(ylabel="energy (J)")
-    number = np.array(data["n_contacts"])
-    number[0] = np.nan  # no step had been taken
-    contacts.plot(run.time, number, color=QUANTITY_COLOURS[2], label="contacts, most of a row's steps")
+    plot_energy(energy, run)
+    plot_contacts(contacts, overlap, run, ", most of a row's steps")
     contacts.plot(run.time, data["n_asleep"], color=QUANTITY_COLOURS[4], label="balls asleep")
     contacts.set(ylabel="number (1)")
     contacts.set_ylim(bottom=0.0)
-    share = 100.0 * data["penetration"] / float(run.radius.min())
-    overlap.plot(run.time, share, color=QUANTITY_COLOURS[3], label="deepest overlap, share of the smallest radius")
-    overlap.set(ylabel="overlap (%)")
-    overlap.set_ylim(bottom=0.0)
     worst = np.where(data["solver_residual"] > 0.0, data["solver_residual"], np.nan)
     residual.plot(run.time, worst, color=QUANTITY_COLOURS[0], label="largest residual of a row's steps")
     residual.set(ylabel="residual (1)", xlabel="time (s)", yscale="log")
     tolerance = data.attributes.get("solver", {}).get("tolerance")
     if isinstance(tolerance, float) and tolerance > 0.0:
         residual.axhline(tolerance, color=DARK, linewidth=0.8, linestyle="--", label="tolerance")
-    for axes in (energy, contacts, overlap, residual):
-        panel_legend(axes)
-    title(figure, "Balls and contacts", run)
+    finish(figure, "Balls and contacts", run, energy, contacts, overlap, residual)
 
 
 def ruts(figure: Sheet, run: GrainRun) -> None:
     """The surface at the first and the last sample, and what changed."""
     rut_maps(figure, run)
-    title(figure, "Surface of the balls", run)
+    finish(figure, "Surface of the balls", run)
 
 
 def sections(figure: Sheet, run: GrainRun) -> None:
     """Sections along and across a track, or through the middle of the bed."""
     rut_sections(figure, run)
-    title(figure, "Sections through the surface of the balls", run)
+    finish(figure, "Sections through the surface of the balls", run)
 
 
 #: By file name.

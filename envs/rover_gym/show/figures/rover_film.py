@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -41,8 +42,24 @@ class ShownSample(NamedTuple):
         """A recording holds no ruts."""
 
 
-class RoverFilm:
-    """Draws the samples of a recorded drive, in order; a context manager.
+class Film(ABC):
+    """Draws the samples of a run; a context manager."""
+
+    _renderer: Any
+
+    @abstractmethod
+    def frame(self, row: int) -> npt.NDArray[np.uint8]:
+        """An image (height, width, 3) uint8 of a sample."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renderer.close()
+
+
+class RoverFilm(Film):
+    """Draws the samples of a recorded drive, in order.
 
     Args:
         run: The run.
@@ -67,10 +84,4 @@ class RoverFilm:
 
     def frame(self, row: int) -> npt.NDArray[np.uint8]:
         """An image (height, width, 3) uint8 of a sample."""
-        return np.asarray(self._renderer.render(ShownSample.of(self._run, row)))  # type: ignore[arg-type]
-
-    def __enter__(self) -> RoverFilm:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._renderer.close()
+        return np.asarray(self._renderer.render(ShownSample.of(self._run, row)))

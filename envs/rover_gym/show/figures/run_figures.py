@@ -19,19 +19,14 @@ from rover_gym.show.figures.derived_signals import (
     finite,
     linear_then_log,
     motor_work,
+    plot_energy,
     plot_raw_and_smooth,
+    raw_and_smooth,
     round_up,
     slip_ratios,
     smooth,
 )
-from rover_gym.show.figures.style import (
-    DARK,
-    QUANTITY_COLOURS,
-    Drawing,
-    WheelStyle,
-    panel_legend,
-    title,
-)
+from rover_gym.show.figures.style import DARK, QUANTITY_COLOURS, Drawing, WheelStyle, finish
 from rover_gym.show.figures.wheel_paths import path_from_above
 
 if TYPE_CHECKING:
@@ -52,13 +47,13 @@ SET_POINT: dict[str, Any] = {"linestyle": (0, (1, 1.5)), "linewidth": 1.0}
 def wheel_gaps(figure: Sheet, run: RoverRun) -> None:
     """Gap between each wheel and the ground, left and right wheels in separate panels."""
     _wheel_heights(figure, run, "gap", 1e3 * finite(run.trajectory["wheel_gaps"]))
-    title(figure, "Gaps between wheels and ground, negative where they overlap", run)
+    finish(figure, "Gaps between wheels and ground, negative where they overlap", run)
 
 
 def sinkage(figure: Sheet, run: RoverRun) -> None:
     """Depth of each wheel in sand, left and right wheels in separate panels."""
     _wheel_heights(figure, run, "sinkage", -1e3 * finite(run.trajectory["wheel_gaps"]))
-    title(figure, "Sinkage of the wheels", run)
+    finish(figure, "Sinkage of the wheels", run)
 
 
 def _wheel_heights(figure: Sheet, run: RoverRun, what: str, heights: Array) -> None:
@@ -88,7 +83,7 @@ def wheel_loads(figure: Sheet, run: RoverRun) -> None:
     _, largest = extremes(forces, 0.0, 0.0)
     linear_then_log(panels[0], round_up(max(1.8 * share, LEAST_LOAD)), 0.0, largest)
     panels[1].set(xlabel="time (s)")
-    title(figure, f"Normal force on the wheels, mean over {_averaged(run)}", run)
+    finish(figure, f"Normal force on the wheels, mean over {_averaged(run)}", run)
     style.legend(
         figure,
         {f"{style.share} of the weight, {share:.4g} N": {"color": DARK, "linestyle": (0, (4, 3))}},
@@ -113,11 +108,9 @@ def slip(figure: Sheet, run: RoverRun) -> None:
     recorded = "slip_ratio" in run.trajectory.data
     ratios = 100.0 * (run.trajectory["slip_ratio"] if recorded else _mean_over_wheels(slip_ratios(run)))
     label = "mean slip ratio, recorded" if recorded else "mean slip ratio, computed from q and v"
-    below.plot(run.time, ratios, color=DARK, linewidth=0.6, alpha=0.35)
-    below.plot(run.time, smooth(run.time, ratios, WINDOW), color=DARK, label=label)
+    raw_and_smooth(below, run.time, ratios, DARK, label)
     below.set(xlabel="time (s)", ylabel="slip ratio (%)", ylim=(-0.05, 1.05 * max(float(ratios.max()), 1.0)))
-    panel_legend(below)
-    title(figure, "Sliding of loaded wheels at the ground", run)
+    finish(figure, "Sliding of loaded wheels at the ground", run, below)
     style.legend(figure, note=SMOOTHED)
 
 
@@ -136,9 +129,8 @@ def attitude(figure: Sheet, run: RoverRun) -> None:
     speed.plot(run.time, forward, color=DARK, linestyle=(0, (4, 2)), label="its part along the trunk's x axis")
     speed.set(ylabel="speed (m/s)", xlabel="time (s)")
     for axes in (tilt, heading, speed):
-        panel_legend(axes)
         _at_least(axes, 0.2)
-    title(figure, "Attitude and speed of the trunk", run)
+    finish(figure, "Attitude and speed of the trunk", run, tilt, heading, speed)
 
 
 def torques(figure: Sheet, run: RoverRun) -> None:
@@ -165,35 +157,24 @@ def torques(figure: Sheet, run: RoverRun) -> None:
     margin = 0.05 * max(high, -low)
     panels[0, 0].set_ylim(min(low, -margin), max(high, margin))  # include zero, as a reference for a constant torque
     _at_least(panels[1, 0], 1.0)
-    title(figure, "Driving torques and steering", run)
+    finish(figure, "Driving torques and steering", run)
     style.legend(figure, {"steering set-point": {"color": DARK, **SET_POINT}})
 
 
 def energy(figure: Sheet, run: RoverRun) -> None:
     """Kinetic and potential energy, motor work, and dissipation."""
     above, below = figure.subplots(2, 1, sharex=True)
-    kinetic = run.trajectory["kinetic_energy"]
-    potential = run.trajectory["potential_energy"] - run.trajectory["potential_energy"][0]
-    above.plot(run.time, kinetic, color=QUANTITY_COLOURS[0], label="kinetic")
-    above.plot(run.time, potential, color=QUANTITY_COLOURS[1], label="potential, from the start")
+    kinetic, potential = plot_energy(above, run)
     above.plot(run.time, kinetic + potential, color=DARK, linestyle=(0, (4, 2)), label="their sum")
-    above.set(ylabel="energy (J)")
     work = motor_work(run).sum(axis=1)
     gained = kinetic + potential - kinetic[0]
     below.plot(run.time, work, color=QUANTITY_COLOURS[2], label="net work of the wheel motors")
     if "motor_energy" in run.trajectory.data:
         spent = run.trajectory["motor_energy"]
         below.plot(run.time, spent, color=QUANTITY_COLOURS[4], label="braking counted as spent")
-    below.plot(
-        run.time,
-        work - gained,
-        color=QUANTITY_COLOURS[3],
-        label="net work less energy gained",
-    )
+    below.plot(run.time, work - gained, color=QUANTITY_COLOURS[3], label="net work less energy gained")
     below.set(xlabel="time (s)", ylabel="work (J)")
-    for axes in (above, below):
-        panel_legend(axes)
-    title(figure, "Energy, and the work of the wheel motors", run)
+    finish(figure, "Energy, and the work of the wheel motors", run, above, below)
 
 
 def contact_solver(figure: Sheet, run: RoverRun) -> None:
@@ -228,9 +209,7 @@ def contact_solver(figure: Sheet, run: RoverRun) -> None:
         linear_then_log(below, round_up(typical), 0.0, largest)
     else:
         below.set_ylim(0.0, max(1.05 * largest, 1.0))
-    for axes in (above, below):
-        panel_legend(axes)
-    title(figure, "Contact solver", run)
+    finish(figure, "Contact solver", run, above, below)
 
 
 def _mean_over_wheels(values: Array) -> Array:

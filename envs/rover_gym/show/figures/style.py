@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from rover_gym.record.rover_run import Run
+    from rover_gym.record.run import Run
 
     Sheet: TypeAlias = Figure | SubFigure
     from matplotlib.figure import Figure
@@ -92,8 +92,10 @@ class Drawing(NamedTuple):
     fits: Callable[[Any], bool] = lambda _run: True
 
 
-def title(figure: Sheet, what: str, run: Run) -> None:
-    """Titles a figure with its subject and its run."""
+def finish(figure: Sheet, what: str, run: Run, *panels: Axes) -> None:
+    """Titles a figure with its subject and its run, and gives panels their legends."""
+    for axes in panels:
+        panel_legend(axes)
     figure.suptitle(f"{what}\n{plain(run.title)}{broken_off(run)}")
 
 

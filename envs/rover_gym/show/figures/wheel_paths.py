@@ -10,7 +10,7 @@ from rover_gym.core import SphereField, Terrain
 from rover_gym.core.extras import require
 from rover_gym.ground.terrain_parts import parts_of, plane_of, spheres_of, surface_heights, surfaces_of
 from rover_gym.show.figures.derived_signals import Array
-from rover_gym.show.figures.style import WheelStyle, title
+from rover_gym.show.figures.style import WheelStyle, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,7 +74,7 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
     _draw_headings(axes, trajectory["q"])
     others["heading"] = {"marker": "$\u2192$", "color": "black", "linestyle": "none", "markersize": 9}
     axes.set(xlabel="to the right, z (m)", ylabel="forward, x (m)")
-    title(figure, f"The way from above, {run.time[-1] - run.time[0]:.3g} s{_slope(run.terrain)}", run)
+    finish(figure, f"The way from above, {run.time[-1] - run.time[0]:.3g} s{_slope(run.terrain)}", run)
     wheels.legend(figure, others)
 
 

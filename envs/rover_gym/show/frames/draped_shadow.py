@@ -71,8 +71,7 @@ class DrapedShadow:
     @staticmethod
     def _along_the_light(points: Array, height: float) -> Array:
         """(n, 2) x and z at which the light through points (n, 3) meets a height, m."""
-        flat: Array = points[:, [0, 2]] - np.outer((points[:, 1] - height) / SUN[1], SUN[[0, 2]])
-        return flat
+        return points[:, [0, 2]] - np.outer((points[:, 1] - height) / SUN[1], SUN[[0, 2]])
 
     def brightness(self, points: Array) -> Array:
         """(n,) how bright what lies at points (n, 3), m, is: 1 in the Sun, less in the shadow."""

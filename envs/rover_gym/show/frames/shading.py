@@ -106,8 +106,7 @@ def _grain() -> vtkTexture:
             return look.scatter((column % n) + 57.0 * (row % n) + 131.0 * seed)
 
         low, high = (((1.0 - a) * lattice(i, row) + a * lattice(i + 1.0, row)) for row in (k, k + 1.0))
-        blended: Array = (1.0 - b) * low + b * high
-        return blended
+        return (1.0 - b) * low + b * high
 
     values = 0.3 * smooth(4, 1) + 0.3 * smooth(16, 2) + 0.4 * smooth(64, 3)
     image = vtkImageData()

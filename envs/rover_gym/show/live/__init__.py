@@ -1,25 +1,5 @@
 """A rover that drives in real time behind a page in the browser; the loop runs without one, too."""
 
-from rover_gym.show.live.live_commands import Change, Drive, Pause, Record, Restart, Rewind, SingleStep, ThrowRock
-from rover_gym.show.live.live_loop import LiveLoop
-from rover_gym.show.live.live_rover import LiveRover
-from rover_gym.show.live.live_scene import LiveChoices, LiveScene
-from rover_gym.show.live.live_server import LiveServer
-from rover_gym.show.live.live_state import LiveState
+import lazy_loader
 
-__all__ = [
-    "Change",
-    "Drive",
-    "LiveChoices",
-    "LiveLoop",
-    "LiveRover",
-    "LiveScene",
-    "LiveServer",
-    "LiveState",
-    "Pause",
-    "Record",
-    "Restart",
-    "Rewind",
-    "SingleStep",
-    "ThrowRock",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from rover_gym.core import EpisodeRun, OptionError, SphereField, TerrainError, Union, sin_cos
 from rover_gym.core.validation import checked, number, refuse
-from rover_gym.drive.command import CommandController
+from rover_gym.drive.commands.command import CommandController
 from rover_gym.envs.env_snapshot import EnvSnapshot
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.task import TRUNK_LOAD
@@ -20,7 +20,8 @@ from rover_gym.ground.terrain_parts import heights_of, plane_of
 from rover_gym.show.live.live_scene import LiveChoices, LiveScene
 
 if TYPE_CHECKING:
-    from rover_gym.drive.named_policy import NamedPolicy, Policy
+    from rover_gym.drive.commands.driven import Policy
+    from rover_gym.drive.named_policy import NamedPolicy
     from rover_gym.envs.episode_scene import EpisodeScene
 
 #: Radii of rocks that may be thrown, m, and how many lie at most.

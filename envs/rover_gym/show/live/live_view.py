@@ -28,6 +28,7 @@ SCENE, FRAME = 1, 2
 #: A cell that a wheel presses down, after the frame's channels: its number and its level.
 RUT = np.dtype([("cell", "<u4"), ("level", "<u4")])
 DEEPEST = 0.25  # m, of a rut
+TITLE = {"title": "a live drive"}
 
 Array = npt.NDArray[np.float64]
 
@@ -100,9 +101,7 @@ class _Moment(RoverRun):
 
     def __init__(self, state: LiveState) -> None:
         data = {"time": np.zeros(1), "wheel_forces": state.wheel_forces[None]}
-        super().__init__(
-            Trajectory(data, {}, {}, state.terrain), state.model, state.terrain, state.goal, "a live drive"
-        )
+        super().__init__(Trajectory(data, {}, TITLE, state.terrain), state.model, state.terrain, state.goal)
         self.__dict__["_poses"] = state.positions[None], state.rotations[None]
 
 
@@ -114,5 +113,5 @@ def _standing(state: LiveState) -> RoverRun:
     q = np.zeros((len(corners), state.model.nq))
     q[:, 0], q[:, 2] = np.array(corners).T
     q[:, 1], q[:, 4] = state.positions[0][1], state.heading
-    trajectory = Trajectory({"q": q, "time": np.zeros(len(q))}, {}, {}, state.terrain)
-    return RoverRun(trajectory, state.model, state.terrain, state.goal, "a live drive")
+    trajectory = Trajectory({"q": q, "time": np.zeros(len(q))}, {}, TITLE, state.terrain)
+    return RoverRun(trajectory, state.model, state.terrain, state.goal)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.record.rover_run import Run
+from rover_gym.record.run import Run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import PlanarGround, Polyline, RoverModel
-from rover_gym.record.rover_run import moving_mean
+from rover_gym.record.run import moving_mean
 from rover_gym.show.frames.appearance import (
     AXLE_COLOUR,
     GROUND_COLOUR,
@@ -344,8 +344,7 @@ def _impulse_charts(run: PlanarRun, discs: list[tuple[str, str]]) -> list[Chart]
     whole = run.whole
     steps = np.diff(whole.time, prepend=whole.time[0])[:, None, None] / run.time_step
     sums = np.cumsum(whole.trajectory["impulses"] * steps, axis=0)
-    rows = slice(None) if run.trajectory.original is None else run.trajectory.original[1]
-    impulses = np.diff(sums[rows], axis=0, prepend=np.nan)
+    impulses = np.diff(sums[run.rows], axis=0, prepend=np.nan)
     every = float(np.median(np.diff(run.time))) if run.n_frames > 1 else 0.0
     title = "{} impulse" + f" in {1e3 * every:.3g} ms"
     return [

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rover_gym.core.rotations import continuous, quaternions
 from rover_gym.ground.terrain_parts import plane_of, spheres_of
-from rover_gym.record.rover_run import moving_mean
+from rover_gym.record.run import moving_mean
 from rover_gym.show.frames.appearance import (
     FIXED_BALL_COLOUR,
     GROUND_COLOUR,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.drive.scan_policy import PLAN_POINTS
+from rover_gym.drive.scan.scan_policy import PLAN_POINTS
 from rover_gym.envs.sensors import DepthCamera, LaserScanner, Mount
 from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.envs.start import check_scan, scan_points
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rover_gym.core import RoverModel, Simulation, Terrain
-    from rover_gym.drive.named_policy import Policy
+    from rover_gym.drive.commands.driven import Policy
     from rover_gym.envs.rover_env import RoverEnv
     from rover_gym.show.replay.page_scene import PageScene
 

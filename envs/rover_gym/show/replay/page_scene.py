@@ -95,8 +95,7 @@ class FrameChannel(NamedTuple):
         steps = np.diff(levels, axis=0, prepend=np.zeros_like(levels[:1])).transpose(0, 2, 1)
         steps[1:] += steps.dtype.type(128)
         planes = [(steps >> steps.dtype.type(8 * plane)) & steps.dtype.type(255) for plane in range(self.bytes)]
-        result: npt.NDArray[np.uint8] = np.stack(planes, axis=2).astype(np.uint8).reshape(len(steps), -1)
-        return result
+        return np.stack(planes, axis=2).astype(np.uint8).reshape(len(steps), -1)
 
 
 @dataclass

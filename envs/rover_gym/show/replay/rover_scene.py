@@ -12,7 +12,7 @@ from rover_gym.core import HeightField
 from rover_gym.core.rotations import continuous, quaternions
 from rover_gym.ground.terrain_parts import map_of, surfaces_of
 from rover_gym.record.channels import outcome_words
-from rover_gym.record.rover_run import moving_mean
+from rover_gym.record.run import moving_mean
 from rover_gym.show.frames.appearance import GROUND_COLOUR_2, HAZE, SAND_GROUND, WHEEL_COLOURS
 from rover_gym.show.replay.charts import FOLLOW_TIME, Chart, load_chart, panel_contents, with_ghost
 from rover_gym.show.replay.overlays import recorded_overlays

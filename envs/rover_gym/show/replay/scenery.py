@@ -95,8 +95,7 @@ def identifiers(names: Iterable[str], taken: Iterable[str] = (), endings: Iterab
 
 def trunk_path(run: RoverRun) -> Array:
     """(n, 3) trunk origin in the world frame, m."""
-    path: Array = run.trajectory["q"][:, :3]
-    return path
+    return run.trajectory["q"][:, :3]
 
 
 def ground_plane(run: RoverRun) -> Plane | None:
@@ -315,8 +314,7 @@ def _turn(start: Array, end: Array) -> Array:
     if cosine < -1.0 + 1e-12:
         side = np.cross(start, np.eye(3)[int(np.argmin(np.abs(start)))])
         side /= np.linalg.norm(side)
-        half: Array = 2.0 * np.outer(side, side) - np.eye(3)
-        return half
+        return 2.0 * np.outer(side, side) - np.eye(3)
     K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
     turned: Array = np.eye(3) + K + K @ K / (1.0 + cosine)
     return turned

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from rover_gym.drive.named_policy import Policy
+    from rover_gym.drive.commands.driven import Policy
     from rover_gym.envs.rover_env import RoverEnv
 
 

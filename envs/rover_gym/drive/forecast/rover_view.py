@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import Plane, RoverModel, exp
-from rover_gym.drive.command import CommandController
+from rover_gym.drive.commands.command import CommandController
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.start import drive_signs, wheel_centres
 
@@ -75,8 +75,7 @@ class RoverView:
             np.broadcast_to(self._rover, (n, len(self._rover))),
             self._wheels(rows),
         ]
-        features: npt.NDArray[np.float32] = np.concatenate(parts, axis=1).clip(-LARGEST, LARGEST).astype(np.float32)
-        return features
+        return np.concatenate(parts, axis=1).clip(-LARGEST, LARGEST).astype(np.float32)
 
     def at_places(self, of_wheels: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         """`(..., PLACES)` means over the wheels at each place, of values `(..., n_wheels)`; 0 where there is none."""

@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core.validation import number
-from rover_gym.drive.arc_driver import ARCS, arc_of
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
-from rover_gym.drive.features import ground_slope
-from rover_gym.drive.network_files import ANYWHERE, FOLDER
-from rover_gym.drive.pd_policy import find_rover_env
-from rover_gym.drive.scan_policy import ScanPolicy
+from rover_gym.drive.arcs.arc_driver import ARCS, arc_of
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.arcs.arc_network_policy import ARCS_FILE, ArcNetworkPolicy
+from rover_gym.drive.commands.driven import find_rover_env
+from rover_gym.drive.commands.features import ground_slope
+from rover_gym.drive.forecast.network_files import ANYWHERE, FOLDER
+from rover_gym.drive.scan.scan_policy import ScanPolicy
 
 #: Cost of an arc, over the rover's reach, by which the network finds it e times less probable.
 WEIGHT = 0.1

@@ -9,19 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import OptionError, RoverModel, StateError, exp, sin_cos
-from rover_gym.core.validation import array, number, refuse
-from rover_gym.drive.arc_forecast import FORECAST_FILE, USUAL_WAY, ArcFeatures, ArcForecast, ForesightCosts
-from rover_gym.drive.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline, SearchTask
-from rover_gym.drive.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.drive.features import check_observed, ground_slope
-from rover_gym.drive.ground_map import GroundMap, MapOptions
-from rover_gym.drive.network_files import FOLDER, FORECAST, Network, PolicyError, is_there
-from rover_gym.drive.pd_policy import Turning, driven_rover
+from rover_gym.core.validation import refuse
+from rover_gym.drive.commands.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.drive.commands.driven import Actions, Gains, ObservingPolicy, State, driven_rover, given_or_usual
+from rover_gym.drive.commands.features import ground_slope
+from rover_gym.drive.commands.turning import Turning
+from rover_gym.drive.forecast.arc_forecast import FORECAST_FILE, USUAL_WAY, ArcFeatures, ArcForecast, ForesightCosts
+from rover_gym.drive.forecast.network_files import FOLDER, FORECAST, Network, PolicyError, is_there
+from rover_gym.drive.search.arc_search import Arcs, ArcSearch, PathCosts, RoverOutline, SearchTask
+from rover_gym.drive.search.ground_map import GroundMap, MapOptions
+from rover_gym.envs.observation import Array, Mask
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.start import HeightScan, wheel_centres
 from rover_gym.models.lookup import ModelLike, as_model
-
-Array = npt.NDArray[np.float64]
 
 Counts = npt.NDArray[np.int64]
 
@@ -188,7 +188,7 @@ HIGH_PATIENCE = 0.7
 
 
 @dataclass(frozen=True)
-class ScanGains:
+class ScanGains(Gains):
     """The policy's speed and times.
 
     Attributes:
@@ -214,17 +214,14 @@ class ScanGains:
     courage: float = 12.0
     least: float = 0.2
 
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
 
+class ScanPolicy(ObservingPolicy):
+    """Drives a rover to its goal by planning over the height scan, with the `predict` of `ObservingPolicy`.
 
-class ScanPolicy:
-    """Drives a rover to its goal by planning over the height scan; `predict` is that of Stable-Baselines3.
-
-    Every 0.2 s it compares paths of four arcs, each 0.6 of the rover's reach long (`rover_gym.drive.arc_search`). The
-    model defines the wheels and the underside of all collision shapes, which moves with the plane through the ground
-    under the wheels. The first arc of the cheapest path becomes the command of `CommandController`.
+    Every 0.2 s it compares paths of four arcs, each 0.6 of the rover's reach long, see
+    `rover_gym.drive.search.arc_search`. The model defines the wheels and the underside of all collision shapes, which
+    moves with the plane through the ground under the wheels. The first arc of the cheapest path becomes the command of
+    `CommandController`.
 
     The policy backs off for a second or so
 
@@ -246,9 +243,9 @@ class ScanPolicy:
         gains: Speed and times.
         costs: Costs of a path.
         map: Options of a map of all scans, which gives the cost-to-go; None for the straight distance.
-        forecast: A learned one-second prediction of each arc (`rover_gym.drive.arc_forecast`): the folder of a trained
-            one, or True for the package's. The policy adds the costs of the predicted outcomes, and drives an arc fast
-            if that is cheaper.
+        forecast: A learned one-second prediction of each arc, see `rover_gym.drive.forecast.arc_forecast`: the folder
+            of a trained one, or True for the package's. The policy adds the costs of the predicted outcomes, and drives
+            an arc fast if that is cheaper.
         foresight: Costs of predicted outcomes.
 
     Attributes:
@@ -277,12 +274,11 @@ class ScanPolicy:
         foresight: ForesightCosts | None = None,
     ) -> None:
         rover = driven_rover(env, type(self).__name__)
-        options = (("gains", gains, ScanGains), ("costs", costs, PathCosts), ("map", map, MapOptions))
-        for name, given, kind in (*options, ("foresight", foresight, ForesightCosts)):
-            if given is not None and not isinstance(given, kind):
-                refuse(OptionError, name, given, f"must be {kind.__name__}")
+        super().__init__(rover)
+        self.gains, costs = given_or_usual("gains", gains, ScanGains), given_or_usual("costs", costs, PathCosts)
+        map_options = None if map is None else given_or_usual("map", map, MapOptions)
+        self._caution, self.foresight = 1.0, given_or_usual("foresight", foresight, ForesightCosts)
         scan = scan_grid(rover)
-        self.gains = ScanGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
         self._layout, self._scale, self._offsets = layout, layout.scale, scan.offsets
         self._heights, self._goal = layout["height_scan"], layout["goal"]
@@ -315,13 +311,12 @@ class ScanPolicy:
             reach=self.reach,
             radius=self.radius,
             arrival=0.6 * rover.task.goal_tolerance,
-            costs=PathCosts() if costs is None else costs,
+            costs=costs,
         )
-        self._ahead = (PathCosts() if costs is None else costs).length * self.reach
+        self._ahead = costs.length * self.reach
         self._ends = first.poses(FOLLOWED * self._ahead, 1)[:, 0, :2]
-        self._map = None if map is None else GroundMap(scan, map, TRAP_AHEAD * self.reach)
-        self._cells = 0 if map is None else map.cells
-        self._caution, self.foresight = 1.0, ForesightCosts() if foresight is None else foresight
+        self._map = None if map_options is None else GroundMap(scan, map_options, TRAP_AHEAD * self.reach)
+        self._cells = 0 if map_options is None else map_options.cells
         self.forecast: ArcForecast | None = None
         if forecast is not None and forecast is not False:
             folder = FOLDER / FORECAST if forecast is True else Path(forecast)
@@ -348,28 +343,10 @@ class ScanPolicy:
         rover = RoverModel() if model is None else as_model("model", model)
         return {"height_scan": (rows, columns, round(spacing * _reach(rover), 2))}
 
-    def predict(
-        self,
-        observation: npt.NDArray[np.float32],
-        state: tuple[npt.NDArray[Any], ...] | None = None,
-        episode_start: npt.NDArray[np.bool_] | None = None,
-        deterministic: bool = True,  # noqa: ARG002 - the signature is stable-baselines3's
-    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...]]:
-        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
-
-        A command is held for `gains.period` seconds. The returned state contains it and the policy's memory: pass it
-        with the next observation, and mark the start of episodes by `episode_start` `(n,)`. Without a state every
-        observation counts as a start.
-
-        Raises:
-            StateError: The observation has a wrong shape or an entry that is not finite.
-        """
-        given = array("observation", observation, error=StateError)
-        check_observed(given, self._layout.size)
-        rows = np.atleast_2d(given)
+    def act(self, rows: Array, state: State, starts: Mask, _deterministic: bool) -> tuple[Actions, State]:
+        """Actions along the commands, each held for `gains.period` seconds, and the memory with the commands."""
         memory = ScanMemory.of(state, len(rows), self._cells)
-        if episode_start is not None:
-            memory.forget(np.broadcast_to(episode_start, (len(rows),)))
+        memory.forget(starts)
         due = np.flatnonzero(memory.age % self.hold_periods == 0)
         if len(due):
             slopes = ground_slope(self._layout, rows[due])
@@ -377,7 +354,7 @@ class ScanPolicy:
                 memory.command[i] = self._decide(rows[i], slope, memory, i)
         actions = self.controller.act(rows, memory.command)
         memory.age += 1
-        return (actions[0] if given.ndim == 1 else actions), memory.state
+        return actions, memory.state
 
     def choices(self) -> Array:
         """`(n, points, 2)` the first arcs that it chooses from, ahead and to the right of the trunk, m."""
@@ -544,8 +521,7 @@ class ScanPolicy:
     def _over_plane(self, row: Array, slope: list[float]) -> Array:
         """The scan's heights above the ground plane, m, so that a slope alone has no cost."""
         rise = slope[0] * self._offsets[:, 0] + slope[1] * self._offsets[:, 1]
-        heights: Array = row[self._heights] * self._scale[self._heights] - rise
-        return heights
+        return row[self._heights] * self._scale[self._heights] - rise
 
     def _boldness(self, fruitless: float) -> float:
         """Factor on the cost of risks after a time without progress, s."""

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from rover_gym.core import OptionError, RoverGymError
 from rover_gym.core.files import written_whole
 from rover_gym.core.validation import refuse
-from rover_gym.drive.features import LARGEST_FEATURE
+from rover_gym.drive.commands.features import LARGEST_FEATURE
 
 
 class PolicyError(OptionError):
@@ -192,4 +192,4 @@ FORECAST = "foresight"
 #: The shipped network for any rover: its name, and its folder's.
 ANYWHERE = "anywhere"
 
-FOLDER = Path(__file__).parents[1] / "data" / "policies"
+FOLDER = Path(__file__).parents[2] / "data" / "policies"

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from rover_gym.core.files import written_whole
 from rover_gym.core.validation import refuse
-from rover_gym.drive.arc_driver import N_ARCS, SIZES, ArcObservation
-from rover_gym.drive.network_files import LARGEST_WEIGHT, PolicyError, read_arrays
-from rover_gym.drive.scan_policy import SCAN
+from rover_gym.drive.arcs.arc_driver import N_ARCS, SIZES, ArcObservation
+from rover_gym.drive.forecast.network_files import LARGEST_WEIGHT, PolicyError, read_arrays
+from rover_gym.drive.scan.scan_policy import SCAN
 
 Single = npt.NDArray[np.float32]
 
@@ -60,8 +60,7 @@ class ArcNetwork:
         for i in range(len(DENSE)):
             y = np.maximum(y @ arrays[f"dense_{i}"].T + arrays[f"dense_bias_{i}"], np.float32(0.0))
         last = len(DENSE)
-        logits: Single = y @ arrays[f"dense_{last}"].T + arrays[f"dense_bias_{last}"]
-        return logits
+        return y @ arrays[f"dense_{last}"].T + arrays[f"dense_bias_{last}"]
 
     def save(self, path: Path) -> None:
         """Writes the arrays in half precision as a compressed `.npz` file."""

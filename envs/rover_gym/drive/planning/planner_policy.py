@@ -16,13 +16,12 @@ import numpy.typing as npt
 from rover_gym.core import HeightField, OptionError, StateError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import array, number, refuse, vector, whole
-from rover_gym.drive.command import N_COMMANDS, CommandController, CommandLimits
-from rover_gym.drive.features import check_observed
-from rover_gym.drive.field_plan import FieldPlan
-from rover_gym.drive.ground_map import MOST_CELLS, GroundMap, MapOptions
-from rover_gym.drive.pd_policy import driven_rover
-from rover_gym.drive.rollouts import Ends, Rollouts
-from rover_gym.drive.scan_policy import PLAN_POINTS, scan_grid
+from rover_gym.drive.commands.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.drive.commands.driven import check_observed, driven_rover, given_or_usual
+from rover_gym.drive.planning.rollouts import Ends, Rollouts
+from rover_gym.drive.scan.scan_policy import PLAN_POINTS, scan_grid
+from rover_gym.drive.search.field_plan import FieldPlan
+from rover_gym.drive.search.ground_map import MOST_CELLS, GroundMap, MapOptions
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.start import Point, Start
 from rover_gym.ground.maps.ground_lookup import TerrainLike, as_terrain
@@ -212,7 +211,7 @@ class PlannerPolicy:
             refuse(OptionError, "sees", sees, "must be 'field' or 'scan'")
         if sees == "scan" and terrain is not None:
             refuse(OptionError, "terrain", terrain, "must not be given with sees='scan'")
-        self.options = PlannerOptions() if options is None else options
+        self.options = given_or_usual("options", options, PlannerOptions)
         self._env: RoverEnv = driven_rover(env, type(self).__name__)
         if self._env.batch.n > 1:
             refuse(OptionError, "env", env, "must be a single environment: PlannerPolicy reads its simulation")

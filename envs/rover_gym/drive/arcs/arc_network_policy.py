@@ -6,21 +6,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import StateError
-from rover_gym.core.validation import array, refuse
-from rover_gym.drive.arc_driver import ArcDriver
-from rover_gym.drive.arc_network import ArcNetwork
-from rover_gym.drive.features import check_observed
-from rover_gym.drive.network_files import PolicyError, is_there
-from rover_gym.drive.pd_policy import driven_rover
-from rover_gym.drive.scan_policy import ScanMemory, ScanPolicy
+from rover_gym.core.validation import refuse
+from rover_gym.drive.arcs.arc_driver import ArcDriver
+from rover_gym.drive.arcs.arc_network import ArcNetwork
+from rover_gym.drive.commands.driven import Actions, ObservingPolicy, State, driven_rover
+from rover_gym.drive.forecast.network_files import PolicyError, is_there
+from rover_gym.drive.scan.scan_policy import ScanMemory, ScanPolicy
+from rover_gym.envs.observation import Array, Mask
 
 #: The file of a network in its folder.
 ARCS_FILE = "arcs.npz"
 
 
-class ArcNetworkPolicy:
-    """Drives a rover by a network of `rover train anywhere`; it has stable-baselines3's `predict`.
+class ArcNetworkPolicy(ObservingPolicy):
+    """Drives a rover by a network of `rover train anywhere`, with the `predict` of `ObservingPolicy`.
 
     Args:
         env: A rover environment made with `ScanPolicy.arguments(model)`, wrapped or not, or a vector of them. It is
@@ -35,7 +34,7 @@ class ArcNetworkPolicy:
 
     def __init__(self, env: Any, network: ArcNetwork, *, planner: ScanPolicy | None = None, seed: int = 0) -> None:
         rover = driven_rover(env, type(self).__name__)
-        self._size = rover.observation_layout.size
+        super().__init__(rover)
         self._driver = ArcDriver(rover, 1, planner)
         self._network = network
         self._random = np.random.default_rng(seed)
@@ -58,43 +57,26 @@ class ArcNetworkPolicy:
             refuse(PolicyError, "policy", str(path), "is not there")
         return cls(env, ArcNetwork.read(path))
 
-    def predict(
-        self,
-        observation: npt.NDArray[np.float32],
-        state: tuple[npt.NDArray[Any], ...] | None = None,
-        episode_start: npt.NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
-    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...]]:
-        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
-
-        An arc is held for 0.2 s. The returned state contains it and the memory: pass it with the next observation, and
-        mark the start of episodes by `episode_start` `(n,)`. Without a state every observation counts as a start.
-
-        Raises:
-            StateError: The observation has a wrong shape or an entry that is not finite.
-        """
-        given = array("observation", observation, error=StateError)
-        check_observed(given, self._size)
-        rows = np.atleast_2d(given).astype(np.float32)
+    def act(self, rows: Array, state: State, starts: Mask, deterministic: bool) -> tuple[Actions, State]:
+        """Actions along the arcs, each held for 0.2 s, and the memory with the arcs."""
+        seen = rows.astype(np.float32)
         kept, since = (None, np.zeros(len(rows), np.int64)) if state is None else (state[:-1], state[-1].copy())
         driver = self._driver
         driver.memory = memory = ScanMemory.of(kept, len(rows))
-        if episode_start is not None:
-            begins = np.broadcast_to(episode_start, (len(rows),))
-            memory.forget(begins)
-            since[begins] = 0
+        memory.forget(starts)
+        since[starts] = 0
         due = since % driver.hold == 0
         if due.any():
-            driver.notice(rows, due)
-            observed = {name: part[due] for name, part in driver.observe(rows).items()}
+            driver.notice(seen, due)
+            observed = {name: part[due] for name, part in driver.observe(seen).items()}
             logits: npt.NDArray[Any] = self._network(observed)
             if not deterministic:
                 logits = logits + self._random.gumbel(size=logits.shape)
             arcs = np.zeros(len(rows), np.int64)
-            arcs[due] = self._choice(logits, rows, np.flatnonzero(due))
-            driver.choose(rows, arcs, due)
-        actions = driver.controller.act(rows, memory.command)
-        return (actions[0] if given.ndim == 1 else actions), (*memory.state, since + 1)
+            arcs[due] = self._choice(logits, seen, np.flatnonzero(due))
+            driver.choose(seen, arcs, due)
+        actions = driver.controller.act(seen, memory.command)
+        return actions, (*memory.state, since + 1)
 
     def _choice(
         self,

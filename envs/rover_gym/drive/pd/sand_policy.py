@@ -27,15 +27,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import OptionError, StateError, atan2, sin_cos
-from rover_gym.core.validation import array, number, refuse
-from rover_gym.drive.features import check_observed
-from rover_gym.drive.pd_policy import PDGains, PDPolicy, driven_rover
+from rover_gym.core import atan2, sin_cos
+from rover_gym.drive.commands.driven import Actions, Gains, ObservingPolicy, State, driven_rover, given_or_usual
+from rover_gym.drive.pd.pd_policy import PDGains, PDPolicy
+from rover_gym.envs.observation import Array, Mask
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.start import drive_signs
-
-Array = npt.NDArray[np.float64]
-
 
 #: Distance of the point that the rover heads for, m.
 LOOK_AHEAD = 0.7
@@ -51,7 +48,7 @@ TURNS_FROM, TURNS_TO = 0.6, 0.15
 
 
 @dataclass(frozen=True)
-class SandGains:
+class SandGains(Gains):
     """The policy's gains.
 
     Attributes:
@@ -80,10 +77,6 @@ class SandGains:
     aside: float = 4.0
     aside_deg: float = 40.0
 
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
-
 
 class RimServo:
     """Controls rim speeds in place of `WheelRegulator`.
@@ -110,8 +103,8 @@ class RimServo:
         return entries
 
 
-class SandPolicy:
-    """Drives `RoverSand-v0` to its goal, with stable-baselines3's `predict`; its state is the rovers' memory.
+class SandPolicy(ObservingPolicy):
+    """Drives `RoverSand-v0` to its goal, with the `predict` of `ObservingPolicy`; its state is the rovers' memory.
 
     Args:
         env: A `Rover-v0`, wrapped or not, or a vector of them. It is read once, for layout and rover constants.
@@ -120,48 +113,30 @@ class SandPolicy:
 
     def __init__(self, env: Any, gains: SandGains | None = None) -> None:
         rover = driven_rover(env, type(self).__name__)
-        if gains is not None and not isinstance(gains, SandGains):
-            refuse(OptionError, "gains", gains, "must be SandGains")
-        self.gains = SandGains() if gains is None else gains
+        super().__init__(rover)
+        self.gains = given_or_usual("gains", gains, SandGains)
         layout, speed = rover.observation_layout, self.gains.speed
-        self._size, self._scale, self._dt = layout.size, layout.scale, rover.dt
+        self._scale, self._dt = layout.scale, rover.dt
         self._roll, self._pitch = layout["q"].start + 3, layout["q"].start + 5
         self._ahead = layout["velocity"].start
         self._goal = layout["goal"].start
         drive = PDGains(speed=speed, final_speed=speed, lateral_acceleration=1e3)
         self._path = PDPolicy(env, drive, RimServo(rover))
 
-    def predict(
-        self,
-        observation: npt.NDArray[np.float32],
-        state: tuple[npt.NDArray[Any], ...] | None = None,
-        episode_start: npt.NDArray[np.bool_] | None = None,
-        deterministic: bool = True,  # noqa: ARG002 - the signature is stable-baselines3's
-    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...]]:
-        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
-
-        The signature is stable-baselines3's. `state` is the memory that the last call returned, None at first;
-        `episode_start` marks the rovers whose episode begins. `deterministic` is ignored.
-
-        Raises:
-            StateError: The observation has a wrong shape or an entry that is not finite.
-        """
-        given = array("observation", observation, error=StateError)
-        check_observed(given, self._size)
-        rows = np.atleast_2d(given).astype(np.float32)
+    def act(self, rows: Array, state: State, starts: Mask, _deterministic: bool) -> tuple[Actions, State]:
+        """Actions that lead to the points that the manoeuvres of each rover aim at, and its memory."""
+        seen = rows.astype(np.float32)
         # Mean speed, time left of a manoeuvre, side of the last one, side of the zigzag, whether it turns backward, and
         # steepest way, degrees.
         fresh = np.tile([self.gains.speed, 0.0, 1.0, 0.0, 0.0, self.gains.steepest], (len(rows), 1))
         memory = fresh if state is None else state[0].copy()
-        if episode_start is not None:
-            starts = np.broadcast_to(episode_start, len(rows))
-            memory[starts] = fresh[starts]
+        memory[starts] = fresh[starts]
         scale = self._scale[self._goal : self._goal + 2]
-        for row, own in zip(rows, memory, strict=True):
+        for row, own in zip(seen, memory, strict=True):
             ahead, left = self._aim((row * self._scale).tolist(), own)
             row[self._goal : self._goal + 2] = np.array([ahead, -left]) / scale
-        actions, _ = self._path.predict(rows)
-        return (actions[0] if given.ndim == 1 else actions), (memory,)
+        actions, _ = self._path.predict(seen)
+        return actions, (memory,)
 
     def _aim(self, row: list[float], memory: Array) -> tuple[float, float]:
         """The point to head for, m ahead and to the left, for an observation in SI units; changes the memory."""

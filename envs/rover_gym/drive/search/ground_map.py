@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rover_gym.core import exp, sin_cos
 from rover_gym.core.validation import number, whole
-from rover_gym.drive.arc_search import ArcSearch
+from rover_gym.drive.search.arc_search import ArcSearch
 from rover_gym.envs.start import HeightScan, Point, scan_points
 
 Array = npt.NDArray[np.float64]

@@ -4,7 +4,7 @@ For each arc, at cruising speed and fast, a network predicts the rover's state a
 
 - what lies under wheels and underside on the way, from the height scan;
 - the command;
-- the rover in its own measure (`rover_gym.drive.rover_view`), without the goal.
+- the rover in its own measure (`rover_gym.drive.forecast.rover_view`), without the goal.
 
 These inputs have the same entries for every rover, so that one network serves all of them.
 `rover_gym.learn.fit_forecast` trains it on copies of rovers in the simulator.
@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core.validation import number, refuse
-from rover_gym.drive.arc_search import Arcs, ArcSearch
-from rover_gym.drive.command import N_COMMANDS
-from rover_gym.drive.network_files import Network, PolicyError
-from rover_gym.drive.rover_view import GOAL, N_FEATURES, PLACES, Planner, RoverView
+from rover_gym.drive.commands.command import N_COMMANDS
+from rover_gym.drive.forecast.network_files import Network, PolicyError
+from rover_gym.drive.forecast.rover_view import GOAL, N_FEATURES, PLACES, Planner, RoverView
+from rover_gym.drive.search.arc_search import Arcs, ArcSearch
 from rover_gym.envs.rover_env import RoverEnv
 
 Array = npt.NDArray[np.float64]
@@ -94,10 +94,9 @@ class ArcFeatures:
         rover = self._view(row[None], np.array([slope]))[0]
         shared = np.concatenate((seen[0], rover[: GOAL.start], rover[GOAL.stop :]))
         along = seen[1:].reshape(n, -1)
-        features: Features = np.concatenate(
+        return np.concatenate(
             (along, self._commands, np.broadcast_to(shared, (n, len(shared)))), axis=1, dtype=np.float32
         )
-        return features
 
 
 class ArcForecast:

@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core.validation import number
-from rover_gym.drive.named_policy import Policy
-from rover_gym.drive.pd_policy import driven_rover
+from rover_gym.drive.commands.driven import Policy, driven_rover
 
 
 class DugIn:

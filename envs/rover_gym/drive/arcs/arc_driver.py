@@ -5,7 +5,6 @@ rover can steer, so that the same table serves every rover. Lengths in the obser
 reach, heights to its wheel radius: a policy sees every rover in its own measure.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
@@ -14,10 +13,10 @@ import numpy.typing as npt
 
 from rover_gym.core import CommandError, OptionError, sin_cos
 from rover_gym.core.validation import array, refuse
-from rover_gym.drive.command import N_COMMANDS, CommandController
-from rover_gym.drive.features import ground_slope
-from rover_gym.drive.rover_view import LARGEST, N_FEATURES, RoverView
-from rover_gym.drive.scan_policy import SCAN, ScanMemory, ScanPolicy, scan_grid
+from rover_gym.drive.commands.command import N_COMMANDS, CommandController, Step
+from rover_gym.drive.commands.features import ground_slope
+from rover_gym.drive.forecast.rover_view import LARGEST, N_FEATURES, RoverView
+from rover_gym.drive.scan.scan_policy import SCAN, ScanMemory, ScanPolicy, scan_grid
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
 
@@ -42,10 +41,6 @@ N_ARCS = 2 * len(ARCS)
 
 #: Traps that are observed, the last ones, and the farthest, in reaches.
 SEEN_TRAPS, FARTHEST_TRAP = 3, 4.0
-
-#: Steps of the rover: applies actions to the active rovers, with or without the height scan. Returns observations,
-#: rewards, and which episodes have ended or reached their time limit.
-Step = Callable[[Observations, Mask, bool], tuple[Observations, Array, Mask, Mask]]
 
 ArcObservation = dict[str, npt.NDArray[np.float32]]
 
@@ -127,24 +122,8 @@ class ArcDriver:
     # -- actions
 
     def drive(self, seen: Observations, moved: Mask, step: Step) -> tuple[Observations, Array, Mask, Mask]:
-        """Holds the arcs of rovers `(n,)`, or until an episode ends.
-
-        Returns:
-            The last observations `(n, size)`, sums of the rewards, and which episodes have ended or reached their time
-            limit.
-        """
-        active, rewards = moved.copy(), np.zeros(len(moved))
-        terminated, truncated = np.zeros_like(moved), np.zeros_like(moved)
-        for left in reversed(range(self.hold)):
-            if not active.any():
-                break
-            actions = self.controller.act(seen, self.memory.command)
-            seen, earned, ended, timed_out = step(actions, active, left == 0)
-            rewards[active] += earned[active]
-            terminated |= ended & active
-            truncated |= timed_out & active
-            active &= ~(terminated | truncated)
-        return seen, rewards, terminated, truncated
+        """Holds the arcs of rovers `(n,)`, or until an episode ends; as `CommandController.hold`."""
+        return self.controller.hold(seen, self.memory.command, self.hold, moved, step)
 
     def expert(self, seen: Observations, rovers: Mask, teacher: ScanPolicy | None = None) -> npt.NDArray[np.int64]:
         """`(n,)` the arcs that a planner would choose for rovers `(n,)`, 0 for the others. By default its own."""

@@ -6,13 +6,11 @@ fine scan is max-pooled: the highest point of each cell gives the height of a ro
 flank would miss.
 """
 
-from typing import Any
-
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import OptionError, StateError, exp, sin_cos
+from rover_gym.core import OptionError, exp, sin_cos
 from rover_gym.core.validation import refuse, whole
 from rover_gym.envs.observation import ObservationLayout
 from rover_gym.envs.rover_env import RoverEnv
@@ -115,15 +113,3 @@ def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:
     cells = points.transpose(0, 2, 1, 3).reshape(-1, pool * pool)
     seen: npt.NDArray[np.intp] = cells[offsets[cells, 0].mean(axis=1) >= -BEHIND]
     return seen
-
-
-def check_observed(given: npt.NDArray[Any], size: int) -> None:
-    """Checks an observation `(size,)` or a batch of them `(n, size)`.
-
-    Raises:
-        StateError: It has a wrong shape or an entry that is not finite.
-    """
-    if given.ndim not in (1, 2) or given.shape[-1] != size:
-        refuse(StateError, "observation", given.shape, f"must be (..., {size})")
-    if not np.isfinite(given).all():
-        refuse(StateError, "observation", given, "must be finite")

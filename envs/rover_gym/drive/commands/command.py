@@ -9,11 +9,12 @@ of a wheel at `(x, z)` from that point, divided by `v`, is
 
 The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and its rim speed is
 `v (a cos(delta) + l sin(delta))`. A wheel that does not steer has delta = 0. With beta = 0 these are `PDPolicy`'s
-formulas. The torques come from the same wheel regulator (`policy.regulator`), with a feedforward of the force that
-holds the rover on a slope.
+formulas. The torques come from the same wheel regulator, `rover_gym.drive.commands.regulator`, with a feedforward of
+the force that holds the rover on a slope.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,16 +22,20 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import OptionError, atan2, sin_cos
-from rover_gym.core.validation import number, refuse
-from rover_gym.drive.pd_policy import SCRUB_RATE, WIDENING, YAW, Turning
-from rover_gym.drive.regulator import WheelRegulator
+from rover_gym.core import atan2, sin_cos
+from rover_gym.core.validation import number
+from rover_gym.drive.commands.driven import given_or_usual
+from rover_gym.drive.commands.regulator import YAW, WheelRegulator
+from rover_gym.drive.commands.turning import SCRUB_RATE, WIDENING, Turning
+from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
-
-Array = npt.NDArray[np.float64]
 
 #: Entries of a command: speed, curvature, sideways.
 N_COMMANDS = 3
+
+#: Applies actions to rovers `(n,)`, of which some are active, with or without the height scan. Returns observations,
+#: rewards, and which episodes have ended or reached their time limit.
+Step = Callable[[Observations, Mask, bool], tuple[Observations, Array, Mask, Mask]]
 
 
 def command_space() -> "gym.spaces.Box[np.float32]":
@@ -68,9 +73,7 @@ class CommandController:
     """
 
     def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None) -> None:
-        if limits is not None and not isinstance(limits, CommandLimits):
-            refuse(OptionError, "limits", limits, "must be CommandLimits")
-        self.limits = CommandLimits() if limits is None else limits
+        self.limits = given_or_usual("limits", limits, CommandLimits)
         layout, model = rover.observation_layout, rover.model
         q, velocity = layout["q"].start, layout["velocity"].start
         self._pitch = q + 5
@@ -122,9 +125,39 @@ class CommandController:
             actions[:, self._n_wheels :] = np.clip(set_points / self._max_steering, -1.0, 1.0)
         return actions
 
+    def hold(
+        self, seen: Observations, commands: npt.NDArray[Any], periods: int, moved: Mask, step: Step
+    ) -> tuple[Observations, Array, Mask, Mask]:
+        """Holds commands `(n, 3)` for some control periods or until a rover's episode ends.
+
+        The height scan is taken once a command, in the last of its periods, and where an episode ends.
+
+        Args:
+            seen: `(n, size)` the last observations.
+            commands: The commands.
+            periods: How many.
+            moved: `(n,)` the rovers that move.
+            step: Takes a control period.
+
+        Returns:
+            The last observations, sums of the rewards `(n,)`, which episodes have ended, and which have reached their
+            time limit.
+        """
+        active, rewards = moved.copy(), np.zeros(len(moved))
+        terminated, truncated = np.zeros_like(moved), np.zeros_like(moved)
+        for left in reversed(range(periods)):
+            if not active.any():
+                break
+            actions = self.act(seen, commands)
+            seen, earned, ended, timed_out = step(actions, active, left == 0)
+            rewards[active] += earned[active]
+            terminated |= ended & active
+            truncated |= timed_out & active
+            active &= ~(terminated | truncated)
+        return seen, rewards, terminated, truncated
+
     def _set_points(self, angles: Array) -> Array:
         """`(n, joints)` the mean angle of each joint's wheels, rad, within the steering limit; from `(n, n_wheels)`."""
         means = [angles[:, own].mean(axis=1) for own in self._steered_wheels]
         stacked = np.stack(means, axis=1) if means else np.zeros((len(angles), 0))
-        within: Array = np.clip(stacked, -self._max_steering, self._max_steering)
-        return within
+        return np.clip(stacked, -self._max_steering, self._max_steering)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from rover_gym.core import OptionError, RoverModel
 from rover_gym.core.extras import require
 from rover_gym.core.validation import number, refuse, vector
-from rover_gym.drive.arc_search import ways_by_price
+from rover_gym.drive.search.arc_search import ways_by_price
 from rover_gym.ground.maps.ground_lookup import TerrainLike, as_terrain
 from rover_gym.ground.terrain_parts import heights_of
 from rover_gym.models.lookup import ModelLike, as_model

@@ -1,0 +1,1 @@
+"""Policies that choose among the planner's arcs by a network."""

@@ -1,0 +1,1 @@
+"""What policies see, and what turns their commands into actions."""

@@ -1,0 +1,1 @@
+"""Networks in files, and the forecast of what becomes of a rover on each arc."""

@@ -1,0 +1,1 @@
+"""The policy that plans with the simulator itself."""

@@ -1,0 +1,1 @@
+"""The policy that plans over the height scan."""
