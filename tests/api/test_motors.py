@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from refusals import refused
+from rovers import placed
 
 from rover_gym import ModelError, Motor, Plane, RoverModel, Simulation, StateError
 
@@ -31,20 +32,15 @@ def rates(sim: Simulation) -> npt.NDArray[np.float64]:
 
 def in_the_air(motor: Motor | None, torque: float, time_step: float = 1e-3) -> Simulation:
     """The rover high above the ground, without weight, its wheels driven."""
-    sim = Simulation(RoverModel().replace(motor=motor), gravity=(0.0, 0.0, 0.0), time_step=time_step)
-    q = np.zeros(21)
-    q[1] = 100.0
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel().replace(motor=motor), gravity=(0.0, 0.0, 0.0), time_step=time_step), y=100.0)
     sim.set_wheel_torques(np.full(6, torque))
     return sim
 
 
 def rolling(motor: Motor | None, slope: float = 0.35, seconds: float = 3.0) -> Simulation:
     """The rover rolling downhill without commands."""
-    sim = Simulation(RoverModel().replace(motor=motor), Plane((math.sin(slope), math.cos(slope), 0.0)))
-    q = np.zeros(21)
-    q[0], q[1], q[5] = 0.35 * math.sin(slope), 0.35 * math.cos(slope), -slope
-    sim.set_state(q)
+    x, y = 0.35 * math.sin(slope), 0.35 * math.cos(slope)
+    sim = placed(Simulation(RoverModel().replace(motor=motor), Plane((x, y, 0.0))), x=x, y=y, pitch=-slope)
     sim.step(round(seconds / sim.time_step))
     return sim
 

@@ -20,6 +20,7 @@ from forged import sealed
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from refusals import refused
+from rovers import placed
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
 from rover_gym.core import (
@@ -134,9 +135,7 @@ def test_a_recorded_welded_rover_is_still_welded(tmp_path: Path) -> None:
 
 
 def driven(sim: Simulation) -> Simulation:
-    q = np.zeros(sim.model.nq)
-    q[1] = 0.4
-    sim.set_state(q)
+    placed(sim, y=0.4)
     sim.set_wheel_torques(np.linspace(5.0, 40.0, 6))
     return sim
 

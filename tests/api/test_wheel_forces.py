@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rovers import standing
 
 from rover_gym.core import HeightField, Plane, RoverModel, Simulation, SphereField
 
@@ -128,8 +129,7 @@ def straight(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Wheel forces (n, wheels, 3) and jolts |a|/g of a drive straight over waves that run across its way."""
     ground = waves()
-    sim = Simulation(model, ground, friction=0.7, time_step=step, gravity=(0.0, -gravity, 0.0), **options)
-    sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.0))
+    sim = standing(model, ground, friction=0.7, time_step=step, gravity=(0.0, -gravity, 0.0), **options)
     sim.set_wheel_torques(0.05 * gravity * model.mass * model.wheel_radii / len(model.wheel_radii))
     forces, jolts = [], []
     for _ in range(round(duration / step)):
@@ -178,8 +178,7 @@ def test_mirrored_states_have_mirrored_forces(name: str) -> None:
     angles = rng.uniform(-0.2, 0.2, (40, len(swap))) * steered
     found = []
     for sign in (1.0, -1.0):
-        sim = Simulation(model, ground, friction=0.7)
-        sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.0))
+        sim = standing(model, ground, friction=0.7)
         forces = []
         for torque, angle in zip(torques, angles, strict=True):
             order = slice(None) if sign > 0.0 else swap
@@ -205,8 +204,7 @@ def test_loads_are_the_same_whatever_solver_and_warm_start(name: str) -> None:
 def test_readings_across_a_rover_that_turns_over_waves_seldom_stand_at_the_limit() -> None:
     """In registered environments two thirds of the lateral readings stood at the limit of friction."""
     model, ground = RoverModel.named("rover"), waves()
-    sim = Simulation(model, ground, friction=0.7)
-    sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.0))
+    sim = standing(model, ground, friction=0.7)
     rng, at_limit = np.random.default_rng(0), []
     for _ in range(40):
         sim.set_commands(np.full(6, rng.uniform(10.0, 40.0)), rng.uniform(-0.1, 0.1) * np.array([1, 1, 0, -1, 0, -1]))

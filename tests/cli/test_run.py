@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import error_of, output_of
+from rovers import placed
 from typer.testing import CliRunner
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
@@ -121,10 +122,7 @@ def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None
 
 
 def dropped_rover() -> Simulation:
-    sim = Simulation(RoverModel(), Plane(), time_step=0.002)
-    q = np.zeros(sim.model.nq)
-    q[1] = 0.6
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), Plane(), time_step=0.002), y=0.6)
     sim.set_wheel_torques(np.full(6, 15.0))
     return sim
 

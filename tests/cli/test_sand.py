@@ -5,9 +5,9 @@ import re
 from pathlib import Path
 
 import matplotlib as mpl
-import numpy as np
 from artists import covered
 from matplotlib.figure import Figure
+from rovers import placed
 from typer.testing import CliRunner
 
 from rover_gym import Plane, RoverModel, Simulation
@@ -72,10 +72,7 @@ def test_the_pull_of_a_rovers_wheel_is_drawn_with_soil_and_rover_in_the_title(tm
 def test_a_run_on_sand_shows_sinkage_and_the_colours_of_sand(tmp_path: Path) -> None:
     """The page of a rover on sand had gaps below zero, on red ground."""
     description = with_wide_wheels(RoverModel.named("open-rover"))
-    sim = Simulation(description, SoftGround(Plane(), named_soil("cmu-sand")), time_step=0.005)
-    q = np.zeros(len(sim.q))
-    q[1] = 0.245
-    sim.set_state(q)
+    sim = placed(Simulation(description, SoftGround(Plane(), named_soil("cmu-sand")), time_step=0.005), y=0.245)
     record_run(sim, 0.1, tmp_path / "run.h5", 50.0)
     saved = read_run(tmp_path / "run.h5")
     assert saved.on_sand

@@ -18,6 +18,7 @@ import numpy.typing as npt
 import pytest
 from gymnasium.wrappers import RecordVideo
 from refusals import refused
+from rovers import placed, standing
 
 import rover_gym
 from rover_gym import HeightField, OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
@@ -149,10 +150,7 @@ def test_rocks_and_goal_are_seen_where_there_are_some(
 
 def test_spheres_without_a_plane_are_drawn(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
     rug = SphereField.rug()
-    simulation = Simulation(model, rug)
-    q = np.zeros(model.nq)
-    q[1] = 2.0
-    simulation.set_state(q)
+    simulation = placed(Simulation(model, rug), y=2.0)
     frame = renderer(rug, goal=(3.0, 0.0)).render(simulation)
     assert like(frame, look.ROCK_COLOUR).mean() > 0.1
     assert like(frame, look.GOAL_COLOUR).sum() > 10
@@ -205,8 +203,7 @@ def test_forces_are_drawn_on_request_and_grow_with_the_load(
     plane = Plane()
     seen = {}
     for gravity in (9.81, 3.72):
-        simulation = Simulation(model, plane, gravity=(0.0, -gravity, 0.0))
-        simulation.set_state(model.resting_pose(plane, (0.0, 0.0), 0.0))
+        simulation = standing(model, plane, gravity=(0.0, -gravity, 0.0))
         simulation.brake()
         simulation.step(40)
         for show in (False, True):
@@ -317,8 +314,7 @@ def test_a_rover_casts_its_shadow_on_hills_too(model: RoverModel) -> None:
     field = HeightField.fractal(20.0, 0.1, 0.05, seed=2)
     level = HeightField(np.zeros((41, 41)), spacing=0.5, origin=(-10.0, -10.0))
     for terrain in (field, level):
-        simulation = Simulation(model, terrain)
-        simulation.set_state(model.resting_pose(terrain, (0.0, 0.0), 0.0))
+        simulation = standing(model, terrain)
         options = {"camera": ((0.0, 9.0, 0.1), (0.0, 0.0, 0.0)), **SIZE}
         with FrameRenderer(model, terrain, **options) as camera:
             with_shadow = camera.render(simulation)
@@ -339,8 +335,7 @@ def test_balls_under_a_rover_lie_in_its_shadow(model: RoverModel) -> None:
     balls = BallsActor(np.full(3, 0.05))
     balls.place(places)
     for terrain in (Plane(), HeightField(np.zeros((41, 41)), spacing=0.5, origin=(-10.0, -10.0))):
-        simulation = Simulation(model, terrain)
-        simulation.set_state(model.resting_pose(terrain, (0.0, 0.0), 0.0))
+        simulation = standing(model, terrain)
         with FrameRenderer(model, terrain, **SIZE) as camera:
             camera.shade(balls)
             camera.render(simulation)
@@ -389,8 +384,7 @@ def test_a_small_rover_fills_the_frame_as_the_large_one_does() -> None:
     shares = []
     for name in ("rover", "open-rover"):
         each = RoverModel.named(name)
-        simulation = Simulation(each, Plane())
-        simulation.set_state(each.resting_pose(Plane(), (0.0, 0.0), 0.0))
+        simulation = standing(each, Plane())
         with FrameRenderer(each, Plane(), **SIZE) as camera:
             frame = camera.render(simulation)
             for actor in camera._solids.values():

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from refusals import refused
+from rovers import placed
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField, StateError
@@ -54,11 +55,7 @@ def actions(n: int, size: tuple[int, ...] = (12,)) -> list[Any]:
 
 
 def at_rest(model: RoverModel, heading: float = 0.0, terrain: Any = None) -> Simulation:
-    simulation = Simulation(model, terrain or Plane())
-    q = np.zeros(model.nq)
-    q[1], q[4] = 5.0, heading
-    simulation.set_state(q)
-    return simulation
+    return placed(Simulation(model, terrain or Plane()), y=5.0, heading=heading)
 
 
 def one(sensor: Sensor, moment: Moment, seed: int = 0) -> Any:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import error_of, output_of
+from rovers import placed
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, Simulation, SphereField, Terrain, TriangleMesh, Union
 from rover_gym.exports import fmu as units
@@ -43,10 +44,7 @@ GROUNDS: dict[str, Terrain] = {
 
 
 def simulation_on(terrain: Terrain, **options: Any) -> Simulation:
-    sim = Simulation(RoverModel(), terrain, **options)
-    q = np.zeros(21)
-    q[1] = 1.0
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), terrain, **options), y=1.0)
     sim.set_steering(np.zeros(6))
     sim.set_wheel_torques(np.full(6, 1.5))
     sim.step(30)

@@ -14,6 +14,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from commands import error_of, output_of
+from rovers import placed, standing
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
@@ -55,10 +56,7 @@ for i in range(2000):
 
 
 def quick_run(path: Path, n: int = 30) -> Path:
-    sim = Simulation(RoverModel(), GROUND, gravity=(0.0, -3.7, 0.0))
-    q = np.zeros(21)
-    q[1] = 0.5
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), GROUND, gravity=(0.0, -3.7, 0.0)), y=0.5)
     sim.set_wheel_torques(np.arange(6.0))
     sampler = RoverSampler(sim.model)
     attributes = describe(sim, "a test", {"goal": (3.0, -1.0)})
@@ -110,8 +108,7 @@ def rep_103(vector: Any) -> Any:
 def test_frames_have_x_forward_and_z_up(tmp_path: Path) -> None:
     """Frames of solids had y up. ROS programs expect REP 103, where y is left and z up."""
     model = RoverModel()
-    sim = Simulation(model)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim = standing(model)
     sampler = RoverSampler(model)
     with McapWriter(tmp_path / "rest.mcap", model, sim.terrain) as log:
         for _ in range(40):

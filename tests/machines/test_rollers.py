@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from rovers import standing
 
 from machines import FOUR, RADIUS, machine
 from rover_gym import Plane, RoverModel, Simulation
@@ -21,12 +22,6 @@ def platform(angles=ANGLES) -> RoverModel:
     for wheel, angle in zip(description["wheels"], angles, strict=True):
         wheel["rollers"] = float(angle)
     return RoverModel.from_dict(description)
-
-
-def standing(model: RoverModel, ground: Plane | None = None, **options) -> Simulation:
-    sim = Simulation(model, ground or Plane(), **options)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
-    return sim
 
 
 def rolling(sim: Simulation) -> np.ndarray:

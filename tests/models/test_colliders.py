@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from models.robot_files import rover, write
 from models.test_writers import assert_same_machine, written_and_read
+from rovers import placed
 
 from rover_gym import ModelError, RoverModel, Simulation, SphereField
 from rover_gym.core import Plane
@@ -146,10 +147,7 @@ def test_the_chassis_mesh_of_an_imported_robot_hits_a_rock(tmp_path):
     lowest = {}
     for parts in (0, 8):
         model = chassis_of(tmp_path, vertices, faces, mesh_parts=parts)
-        simulation = Simulation(model, rock, time_step=0.005)
-        q = np.zeros(model.nv)
-        q[1] = 0.9
-        simulation.set_state(q, np.zeros(model.nv))
+        simulation = placed(Simulation(model, rock, time_step=0.005), y=0.9)
         touched = set()
         for _ in range(100):
             report = simulation.step()
