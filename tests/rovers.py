@@ -45,7 +45,7 @@ def goes_on_alike(sim: Any, steps: int) -> bool:
     return sim.snapshot().to_bytes() == end
 
 
-def changed(
+def with_fields(
     model: RoverModel,
     solids: Mapping[str, Mapping[str, Any]] = {},
     wheels: Mapping[str, Any] = {},

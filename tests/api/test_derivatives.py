@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from refusals import refused
-from rovers import changed, placed, standing
+from rovers import placed, standing, with_fields
 
 from rover_gym import CommandError, OptionError, RoverModel, Simulation, StateError
 from rover_gym.derivatives import Rollout, jax_rollout, rollout, torch_rollout
@@ -112,7 +112,7 @@ def test_every_machine_is_differentiated(name):
 
 
 def damped(model: RoverModel, joint: str, damping: float) -> RoverModel:
-    return changed(model, {joint: {"damping": damping}})
+    return with_fields(model, {joint: {"damping": damping}})
 
 
 def test_derivatives_by_friction_and_mass_of_a_sliding_rover_are_differences():

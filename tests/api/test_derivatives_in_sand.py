@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from refusals import refused
-from rovers import changed, placed
+from rovers import placed, with_fields
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, StateError
 from rover_gym.core import HeightField, SoftGround, SphereField, Terrain
@@ -27,7 +27,7 @@ def wide() -> RoverModel:
 
 def widened(model: RoverModel) -> RoverModel:
     """With wheels for sand."""
-    return changed(model, wheels={"width": 0.08, "grouser_height": 0.005, "grousers": 24})
+    return with_fields(model, wheels={"width": 0.08, "grouser_height": 0.005, "grousers": 24})
 
 
 def steered() -> np.ndarray:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rovers import changed, placed
+from rovers import placed, with_fields
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.core import SimulationBatch
@@ -47,7 +47,7 @@ def test_rebounds_methods_and_cold_starts_are_fast(options: dict[str, Any]) -> N
 
 def test_a_machine_on_a_stand_and_one_that_is_pushed_are_fast() -> None:
     stand = {"joint": "revolute", "axis": [0.0, 0.0, 1.0], "position": [0.0, 0.6, 0.0]}
-    simulation = Simulation(changed(RoverModel(), {"trunk": stand}))
+    simulation = Simulation(with_fields(RoverModel(), {"trunk": stand}))
     simulation.apply_wrench("trunk", force=[0.0, 10.0, 0.0])
     assert simulation.step(20).fallbacks == 0
 
@@ -65,7 +65,7 @@ def test_a_machine_on_a_stand_and_one_that_is_pushed_are_fast() -> None:
     ],
 )
 def test_joints_and_forces_of_every_kind_step_in_lanes(changes: dict[str, Any]) -> None:
-    simulation = Simulation(changed(RoverModel(), {"left_bogie": changes}))
+    simulation = Simulation(with_fields(RoverModel(), {"left_bogie": changes}))
     simulation.step(200)
     simulation.set_wheel_torques([20.0] * 6)
     assert simulation.step(20).fallbacks == 0
@@ -79,7 +79,7 @@ def test_rovers_of_the_gallery_step_in_lanes(name: str) -> None:
 
 
 def test_bodies_that_touch_the_ground_or_each_other_step_in_lanes() -> None:
-    simulation = placed(Simulation(changed(RoverModel(), self_contact=True)), y=0.6, roll=np.pi)
+    simulation = placed(Simulation(with_fields(RoverModel(), self_contact=True)), y=0.6, roll=np.pi)
     report = simulation.step(200)
     assert "box" in simulation.contacts.kinds
     assert report.fallbacks < 40

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from refusals import refused
-from rovers import changed, placed, standing
+from rovers import placed, standing, with_fields
 
 from rover_gym import OptionError, RoverModel, Simulation, StateError
 from rover_gym.core import HeightField, Linearisation, SphereField
@@ -135,7 +135,7 @@ def test_dry_friction_in_joints_is_a_contact_that_sticks_or_slips():
     friction = {f"wheel_{name}": {"friction": 0.2} for name in plain.wheel_names}
     friction |= {f"{side}_bogie": {"friction": 30.0} for side in ("left", "right")}
     # Wheels that yield: locked bogies leave the loads of rigid ones undetermined.
-    model = changed(plain, friction).replace(wheel_stiffness=2e4, wheel_damping=200.0)
+    model = with_fields(plain, friction).replace(wheel_stiffness=2e4, wheel_damping=200.0)
     sim = Simulation(model)
     q, v = model.resting_pose(sim.terrain, (0.0, 0.0), 0.0), np.zeros(model.nv)
     v[0] = 0.3

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from refusals import refused
-from rovers import changed, goes_on_alike, placed, standing
+from rovers import goes_on_alike, placed, standing, with_fields
 
 from rover_gym.core import (
     HeightField,
@@ -151,7 +151,7 @@ def rigid(name: str) -> RoverModel:
 
 
 def yielding(name: str, width: float = 0.08) -> RoverModel:
-    return changed(RoverModel.named(name), wheels={"width": width})
+    return with_fields(RoverModel.named(name), wheels={"width": width})
 
 
 def tilted_map() -> HeightField:
@@ -199,7 +199,7 @@ def test_rigid_wheels_on_four_points_depend_on_micrometres() -> None:
 def test_two_wheels_turned_by_a_rounded_pi_change_nothing(name: str) -> None:
     """3.14159 for pi in a robot's file left two of four wheels without load."""
     model, turn = RoverModel.named(name), {"rotation": [2.65e-6, 0.0, 0.0]}
-    tilted = changed(model, {"wheel_FL": turn, "wheel_BR": turn})
+    tilted = with_fields(model, {"wheel_FL": turn, "wheel_BR": turn})
     turned, plain = (driven(one, None, 0.005) for one in (tilted, model))
     assert distance(turned, plain) < 1e-3
 

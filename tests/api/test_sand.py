@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from equal_bits import bits
-from rovers import changed, placed
+from rovers import placed, with_fields
 
 from rover_gym.core import (
     HeightField,
@@ -225,7 +225,7 @@ def test_slip_and_slope_of_a_processed_trial_are_read(tmp_path: Path) -> None:
 
 
 def wide_rover() -> RoverModel:
-    return changed(RoverModel.named("open-rover"), wheels={"width": 0.08, "grouser_height": 0.005, "grousers": 24})
+    return with_fields(RoverModel.named("open-rover"), wheels={"width": 0.08, "grouser_height": 0.005, "grousers": 24})
 
 
 def on_sand(ground: Terrain | list[Terrain], y: float = 0.245) -> Simulation:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from refusals import refused
-from rovers import changed
+from rovers import with_fields
 
 from rover_gym import (
     CommandError,
@@ -113,7 +113,7 @@ def test_nothing_is_welded_where_wheels_may_turn_by_themselves() -> None:
     lopsided = start.copy()
     lopsided[11] = 0.1  # the left bogie alone
     assert plan(straight(start=lopsided)).kind == "full"
-    trailing = plan(straight(model=changed(RIGID, {"wheel_ML": {"position": [0.02, -0.15, 0.0]}})))
+    trailing = plan(straight(model=with_fields(RIGID, {"wheel_ML": {"position": [0.02, -0.15, 0.0]}})))
     assert trailing.kind == "full"
     assert "beside their steering axes" in trailing.decisions[1].reason
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from rovers import changed, placed, standing
+from rovers import placed, standing, with_fields
 from scipy.optimize import minimize
 
 from rover_gym.core import HeightField, Plane, RoverModel, Simulation
@@ -199,7 +199,7 @@ def test_the_loads_of_a_table_change_as_little_as_its_legs() -> None:
 
 
 def cylinders() -> RoverModel:
-    return changed(RoverModel().replace(wheel_stiffness=0.0), wheels={"width": 0.08, "stiffness": 0.0})
+    return with_fields(RoverModel().replace(wheel_stiffness=0.0), wheels={"width": 0.08, "stiffness": 0.0})
 
 
 def test_both_ends_of_a_rigid_cylinder_share_its_load() -> None:

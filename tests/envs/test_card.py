@@ -258,6 +258,7 @@ VARIANTS = [
         pytest.param("RoverRocks-v0", {"model": model, "difficulty": 0.5}, id=f"rover {name}")
         for name, (_, model) in MACHINES.items()
     ),
+    pytest.param("RoverArcs-v0", {"model": "skid-steered", "friction": (0.4, 0.7)}, id="arcs of another rover"),
     *(
         pytest.param(name, {"sensors": SENSORS}, id=f"{name} with sensors")
         for name in ("RoverCommand-v0", "RoverArcs-v0", "RoverGoal-v0")

@@ -3,6 +3,7 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from episodes import last_step
 from pursuit import pursuit
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
@@ -114,15 +115,11 @@ def test_the_planner_backs_out_of_a_dead_end() -> None:
     """Three rocks stand around the rover's front; the goal lies behind them."""
     centres = [[1.35, 0.0, -0.9], [1.6, 0.0, 0.0], [1.35, 0.0, 0.9]]
     env = gym.make("Rover-v0", terrain=SphereField(centres, [0.5, 0.5, 0.5], Plane()), heading_deg=0.0)
-    seen, _ = env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (4.0, 0.0)})
+    env.reset(seed=0)
     policy = PlannerPolicy(env, PlannerOptions(samples=48), threads=1)
-    ended = ""
-    for _ in range(600):
-        seen, _, over, _, info = env.step(policy.predict(seen)[0])
-        if over:
-            ended = info["termination"]
-            break
-    assert ended == "goal"
+    start = {"position": (0.0, 0.0), "goal": (4.0, 0.0)}
+    *_, info = last_step(env, lambda seen: policy.predict(seen)[0], 600, seed=0, options=start)
+    assert info["termination"] == "goal"
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from episodes import last_step
 from equal_bits import bits
 from refusals import refused
 
@@ -486,12 +487,9 @@ def test_starts_and_goals_off_the_map_are_refused() -> None:
 def test_a_rover_that_drives_off_the_map_ends_its_episode() -> None:
     n = 41
     env = RoverEnv(terrain=HeightField(np.zeros((n, n)), 0.25), goal_distance=1.0, goal_tolerance=0.05)
-    env.reset(seed=0, options={"heading_deg": 0.0, "goal": (4.0, 3.0)})
     action = np.concatenate((np.full(6, 0.4), np.zeros(6))).astype(np.float32)
-    for _ in range(200):
-        _, _, terminated, _, info = env.step(action)
-        if terminated:
-            break
+    start = {"heading_deg": 0.0, "goal": (4.0, 3.0)}
+    *_, info = last_step(env, lambda _: action, 200, seed=0, options=start)
     assert info["termination"] == "step_failed"
     assert "map" in info["solver"]["message"] or "ground" in info["solver"]["message"]
 
