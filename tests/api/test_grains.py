@@ -321,7 +321,6 @@ def test_a_silo_empties_through_its_hole_only_if_it_is_wide(tmp_path: Path) -> N
         out = outflow(run) / run.mass.sum()
         assert (np.diff(out) >= 0.0).all()
         shares.append(out[-1])
-        assert run.vessel is not None
         assert run.vessel["hole"] == hole
     assert shares[0] < 0.05  # a ball of 16 mm blocks a hole of 20 mm
     assert shares[1] > 0.5
@@ -361,7 +360,6 @@ def test_a_rover_on_a_bed_stands_with_its_weight_on_its_wheels(tmp_path: Path) -
     run = open_run(tmp_path / "run.h5")
     loads = run.wheel_forces[-6:, :, 1].sum(axis=1).mean()
     assert loads == pytest.approx(model.mass * 9.81, rel=0.05)
-    assert run.rover is not None
     np.testing.assert_array_equal(run.rover.positions[-1, 0], sim.rover.q[:3])
     with pytest.raises(OptionError, match="too small for the rover"):
         rover_on_bed(settled_balls(20, 0.6, 0.6, radius_min=0.05, radius_max=0.05), model, 0.0)

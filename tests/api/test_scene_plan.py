@@ -202,10 +202,8 @@ def test_a_planar_rover_that_tips_over_says_so() -> None:
 def test_spheres_that_cannot_be_met_are_left_out() -> None:
     centres = np.array([[0.5, -0.3, 0.0], [2.0, 0.0, 0.0], [30.0, 0.0, 0.0]])
     field = SphereField(centres, [0.2, 0.1, 0.3], Plane())
-    assert isinstance(plan(Scene(field)).terrain, SphereField)
     assert len(plan(Scene(field)).terrain) == 2  # type: ignore[arg-type]
     near = plan(Scene(field, reach=5.0)).terrain
-    assert isinstance(near, SphereField)
     assert len(near) == 1
     flat = plan(Scene(field, reach=0.2))
     assert isinstance(flat.terrain, Plane)
@@ -281,7 +279,6 @@ def test_every_economy_is_measured_against_its_bound() -> None:
     economies = {e.name: e for e in measure_economies(plan(straight()), duration=2.0, repeats=1)}
     for name in ("steering welded, against the PD", "planar, against welded", "all of the model's"):
         economy = economies[name]
-        assert economy.bound is not None
         assert economy.error < economy.bound
         assert economy.before > 0.0
         assert economy.after > 0.0

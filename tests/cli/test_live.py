@@ -50,7 +50,6 @@ def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(ending: sig
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads run yet
     )
     try:
-        assert process.stdout is not None
         line = process.stdout.readline()
         found = re.fullmatch(r"live: (http://127\.0\.0\.1:\d+) \(Ctrl-C ends the drive\)\n", line)
         assert found, line

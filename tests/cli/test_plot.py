@@ -184,7 +184,6 @@ def test_the_map_shows_goal_and_the_spheres_in_sight(recordings: dict[str, Path]
     run = read_run(recordings["rocks"])
     axes = drawn("path", run).axes[0]
     (goal,) = (line for line in axes.get_lines() if line.get_label() == "_goal")
-    assert run.goal is not None
     assert (goal.get_xdata()[0], goal.get_ydata()[0]) == pytest.approx((run.goal[1], run.goal[0]))
     (spheres,) = (artist for artist in axes.collections if isinstance(artist, EllipseCollection))
     prints = footprints(run.terrain)

@@ -89,7 +89,6 @@ def test_neighbouring_quaternions_lie_on_one_side() -> None:
 def test_the_grounds_squares_lie_on_the_plane_and_face_up(plane: Plane) -> None:
     run = turning_run(plane)
     tiles = ground_tiles(run)
-    assert tiles is not None
     vertices, light, dark = tiles
     assert vertices @ plane.normal + plane.offset == pytest.approx(0.0, abs=1e-12)
     corners = vertices[np.vstack((light, dark))]
@@ -491,7 +490,6 @@ def test_a_run_over_thousands_of_kilometres_has_a_ground_of_few_squares() -> Non
     run = turning_run(Plane())
     run.trajectory["q"][-1, :3] = 5e8
     tiles = ground_tiles(run)
-    assert tiles is not None
     assert len(tiles[0]) < 4 * 50_000
     assert np.isfinite(tiles[0]).all()
 

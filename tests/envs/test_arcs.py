@@ -124,7 +124,6 @@ def test_the_planner_sees_a_fence_at_the_edge() -> None:
     rows[:, layout["q"].start + 2] = -3.0  # as if it had driven 3 m ahead, to the left of the way to the goal
     rows[:, layout["goal"].start] -= 3.0 / layout.scale[layout["goal"].start]
     beyond = env.driver.planner.beyond_field(rows, np.zeros((1, 2)))
-    assert beyond is not None
     grid = beyond.reshape(48, 40)
     assert grid[0].all()  # ahead, beyond z = -4
     assert not grid[24:].any()
@@ -139,7 +138,6 @@ def test_arcs_through_the_fence_cost_more_than_any_detour() -> None:
     row[layout["q"].start + 2] = -3.6  # 0.4 m before the edge, which lies ahead
     row[layout["goal"].start] -= 3.6 / layout.scale[layout["goal"].start]
     costs = planner._through_fence(row, start)
-    assert costs is not None
     ahead = planner.arcs.poses(0.9 * planner.reach, 1)[:, 0, 0]
     np.testing.assert_array_equal(costs > 0.0, ahead > 0.4)
     assert costs.max() > 40.0

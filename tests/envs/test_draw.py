@@ -59,7 +59,6 @@ def test_a_reset_draws_what_numpy_would_draw(seed: int) -> None:
     slope = generator.uniform(0.0, math.radians(10.0) * difficulty)
     uphill, heading = (generator.uniform(-math.pi, math.pi) for _ in range(2))
     distance, bearing = generator.uniform(5.0, 10.0), generator.uniform(-math.pi / 2.0, math.pi / 2.0)
-    assert env.rocks is not None
     assert (env.rocks.difficulty, env.rocks.seed) == (difficulty, rock_seed)
     assert (env.start.slope, env.start.uphill, env.start.heading) == (slope, uphill, heading)
     assert env.goal == pytest.approx(

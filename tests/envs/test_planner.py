@@ -56,9 +56,7 @@ def test_a_grid_too_fine_is_refused() -> None:
 def planar() -> RoverEnv:
     env = gym.make("Rover-v0", goal_distance=6.0, goal_bearing_deg=20.0)
     env.reset(seed=1)
-    rover = env.unwrapped
-    assert isinstance(rover, RoverEnv)
-    return rover
+    return env.unwrapped
 
 
 def test_a_future_ends_where_the_rover_would() -> None:
@@ -153,9 +151,7 @@ def test_raw_actions_drive_to_the_goal() -> None:
 
 
 def scanning(terrain: SphereField) -> RoverEnv:
-    env = gym.make("Rover-v0", terrain=terrain, heading_deg=0.0, **ScanPolicy.arguments()).unwrapped
-    assert isinstance(env, RoverEnv)
-    return env
+    return gym.make("Rover-v0", terrain=terrain, heading_deg=0.0, **ScanPolicy.arguments()).unwrapped
 
 
 def test_a_planner_that_sees_by_scan_knows_what_was_scanned() -> None:

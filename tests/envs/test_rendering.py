@@ -62,7 +62,6 @@ def renderer(model: RoverModel) -> Iterator[Renderers]:
 def parked(model: RoverModel, terrain: Plane | SphereField, *, heading: float = 0.0) -> Simulation:
     """A rover at rest on the terrain's plane, at the origin."""
     plane = terrain if isinstance(terrain, Plane) else terrain.ground
-    assert plane is not None
     simulation = Simulation(model, terrain)
     simulation.set_state(model.resting_pose(plane, (0.0, 0.0), heading))
     return simulation
@@ -223,7 +222,6 @@ def test_the_arrows_of_a_parked_rover_carry_its_weight(model: RoverModel) -> Non
 
 def test_the_camera_follows_and_the_rover_stays_in_the_middle(renderer: Renderers) -> None:
     env = gym.make("Rover-v0", goal_distance=20.0, goal_bearing_deg=60.0).unwrapped
-    assert isinstance(env, RoverEnv)
     env.reset(seed=1)
     policy = rover_gym.PDPolicy(env)
     camera = renderer(Plane())
@@ -290,7 +288,6 @@ def test_wheels_leave_marks_that_a_new_state_takes_away(model: RoverModel, rende
     other = camera.render(moved(simulation, x=0.2))  # at the same time elsewhere: it was set there
     assert changed(again, other) > 0
     assert changed(other, camera.render(simulation)) == 0
-    assert camera._marks is not None
     assert not camera._marks.actor.GetVisibility()
 
 
@@ -303,7 +300,6 @@ def test_a_rover_casts_its_shadow_on_hills_too(model: RoverModel) -> None:
         options = {"camera": ((0.0, 9.0, 0.1), (0.0, 0.0, 0.0)), **SIZE}
         with FrameRenderer(model, terrain, **options) as camera:
             with_shadow = camera.render(simulation)
-            assert camera._shadow is not None
             camera._shadow.actor.VisibilityOff()
             dark = (camera.render(simulation).astype(int) - with_shadow).min(axis=2) > 15
         rows, columns = np.nonzero(dark)
@@ -324,7 +320,6 @@ def test_balls_under_a_rover_lie_in_its_shadow(model: RoverModel) -> None:
         with FrameRenderer(model, terrain, **SIZE) as camera:
             camera.shade(balls)
             camera.render(simulation)
-            assert camera._shadow is not None
             bright = camera._shadow.brightness(places)
             assert bright[0] == pytest.approx(look.SHADOW, abs=0.01)
             assert bright[1:] == pytest.approx(1.0)
@@ -335,7 +330,6 @@ def test_stones_are_the_same_in_frames_and_on_pages() -> None:
     """The page has its own copy of three formulas; here they are read from it and compared."""
     script = player_file("view.js")
     sun = re.search(r"SUN = new THREE.Vector3\(([^)]+)\)", script)
-    assert sun is not None
     assert [float(one) for one in sun.group(1).split(",")] == pytest.approx(look.SUN, abs=5e-4)
     for light in (look.SKY_LIGHT, look.BOUNCE_LIGHT, look.SUN_LIGHT):
         for name in ("view.js", "grains.js"):
@@ -612,12 +606,10 @@ def test_every_rover_of_a_batch_is_drawn_as_it_would_be_alone() -> None:
         venv.step(np.tile(action, (2, 1)))
     frame = alone.render()
     frames = many.render()
-    assert frames is not None
     assert len(frames) == 2
     np.testing.assert_array_equal(frames[0], frame)
     assert not np.array_equal(frames[1], frame)
     tiled = venv.render()
-    assert tiled is not None
     np.testing.assert_array_equal(tiled[:120, :160], frame)
     for env in (alone, many, venv):
         env.close()

@@ -257,7 +257,6 @@ def test_the_features_see_the_rock_on_the_arcs_that_lead_over_it() -> None:
 
 
 def foreseen_by(policy: ScanPolicy, row: Any) -> Outcomes:
-    assert policy.forecast is not None
     return policy.forecast(row, *policy.ground(row))
 
 

@@ -112,7 +112,6 @@ def test_a_state_of_ones_own_is_a_trap_without_a_drive(env: RoverTrapEnv) -> Non
     env.reset(seed=0)
     q, goal = env.simulation.q, env.goal
     field = env.rocks
-    assert field is not None
     slope = env.start
     options = {
         "q": q,

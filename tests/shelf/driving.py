@@ -16,7 +16,6 @@ def hardest(simulation: Simulation, steps: int) -> Dense:
         report = simulation.step()
         if report.iterations > worst:
             worst, problem = report.iterations, simulation.last_problem()
-    assert problem is not None
     return Dense(*(np.array(array) for array in problem))
 
 
