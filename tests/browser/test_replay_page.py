@@ -14,13 +14,15 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 import pytest
 from PIL import Image
+from recordings import recorded
+from rovers import placed, standing
 from selenium import webdriver
 from selenium.common.exceptions import TimeoutException, WebDriverException
 from selenium.webdriver.common.by import By
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
 from rover_gym.ground.grains import rover_on_disks, settled_disks
-from rover_gym.record import DiskRun, Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.record import DiskRun, RoverRun
 from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.frames.appearance import GROUND_COLOUR, SKY_COLOUR, TRUNK_COLOUR
 from rover_gym.show.replay import write_page
@@ -79,20 +81,9 @@ def start_browser(profile: Path) -> webdriver.Chrome:
 
 def drive(path: Path, terrain: Terrain = ROCKS) -> RoverRun:
     """Two seconds over a few rocks, or over another ground, at 10 frames a second."""
-    sim = Simulation(RoverModel(), terrain)
-    q = np.zeros(sim.model.nq)
-    q[1] = 0.4
-    if terrain is not ROCKS:
-        q = sim.model.resting_pose(terrain, (0.0, 0.0), 0.0)
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), terrain), y=0.4) if terrain is ROCKS else standing(RoverModel(), terrain)
     sim.set_wheel_torques(np.full(6, 20.0))
-    sampler = RoverSampler(sim.model)
-    with Recorder(path, sampler.channels, describe(sim, "a drive over rocks"), terrain=sim.terrain) as recorder:
-        recorder.append(sampler.row(sim))
-        for _ in range(100):
-            sim.step(4)
-            recorder.append(sampler.row(sim))
-    run = read_run(path)
+    run = recorded(sim, path, 100, 4)
     run.trajectory["wheel_forces"][62, 0, 0] = PEAK  # between two frames of the page
     return run.resample(10.0)
 

@@ -11,10 +11,11 @@ import h5py
 import numpy as np
 import pytest
 from forged import without_checksum
+from recordings import recorded
 from refusals import refused
 
 from rover_gym import RoverModel, Simulation
-from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
+from rover_gym.record import Channel, Recorder, RecordingError, read_run, read_trajectory
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
@@ -56,13 +57,8 @@ for i in range(25):
 @pytest.fixture(scope="session")
 def sound_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recorded run of the rover, 25 rows."""
-    sim = Simulation(RoverModel())
-    sampler = RoverSampler(sim.model)
     path = tmp_path_factory.mktemp("sound") / "run.h5"
-    with Recorder(path, sampler.channels, describe(sim, "a drop"), terrain=sim.terrain, rows_per_flush=10) as recorder:
-        for _ in range(25):
-            sim.step()
-            recorder.append(sampler.row(sim))
+    recorded(Simulation(RoverModel()), path, 24)
     return path
 
 

@@ -28,21 +28,9 @@ rover = partial(commands.rover, "live")
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "sigterm"])
 def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(ending: signal.Signals, tmp_path: Path) -> None:
     """SIGTERM left a recording without rows."""
-    command = [
-        sys.executable,
-        "-c",
-        RUN,
-        "live",
-        "--port",
-        "0",
-        "--no-open",
-        "--output",
-        str(tmp_path),
-        "--policy",
-        "pd",
-    ]
+    options = ["--port", "0", "--no-open", "--output", str(tmp_path), "--policy", "pd"]
     process = subprocess.Popen(
-        command,
+        [sys.executable, "-c", RUN, "live", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

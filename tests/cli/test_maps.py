@@ -9,6 +9,8 @@ import pygltflib
 import pytest
 from commands import error_of, output_of, rover
 from forged import without_checksum
+from recordings import recorded
+from rovers import standing
 
 from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh
 from rover_gym.ground.terrain_parts import parts_of, surfaces_of, triangles_of
@@ -56,9 +58,8 @@ def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) ->
     env = RoverEnv(terrain=HeightField(np.zeros((21, 21)), 0.5), goal_distance=(2.0, 3.0))
     env.reset(seed=0)
     sampler, info = RoverSampler(env.model), {"termination": ""}
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(env.simulation, "off"), terrain=env.simulation.terrain
-    ) as tape:
+    facts, ground = describe(env.simulation, "off"), env.simulation.terrain
+    with Recorder(tmp_path / "run.h5", sampler.channels, facts, terrain=ground) as tape:
         while not info["termination"]:
             *_, info = env.step(np.float32([1.0] * 6 + [0.0] * 6))
             solver = info["solver"]
@@ -80,12 +81,7 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
         [[0, 2, 3], [2, 1, 3], [1, 0, 3], [0, 1, 2]],
     )
     simulation = Simulation(RoverModel(), [field, spheres, mesh])
-    sampler = RoverSampler(simulation.model)
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(simulation, "parts"), terrain=simulation.terrain
-    ) as tape:
-        tape.append(sampler.row(simulation, residual=0.0, iterations=0))
-    terrain = read_run(tmp_path / "run.h5").terrain
+    terrain = recorded(simulation, tmp_path / "run.h5").terrain
     kinds = {type(part): part for part in parts_of(terrain)}
     np.testing.assert_array_equal(kinds[HeightField].grid, field.grid)
     assert (kinds[HeightField].spacing, kinds[HeightField].origin) == (field.spacing, field.origin)
@@ -107,26 +103,16 @@ def test_a_recorded_drive_replays_with_its_materials(kind: str, tmp_path: Path) 
         "spheres": [pebbles, SphereField([[5.0, -1.0, 5.0]], [1.0], material="ice")],
     }
     laws = {("wheel", "ice"): (0.02, 0.0), ("wheel", "chalk"): (0.1, 0.0), ("wheel", "ground"): (0.9, 0.0)}
-    simulation = Simulation(RoverModel.named("skid-steered"), grounds[kind], materials=laws)
-    simulation.set_state(simulation.model.resting_pose(simulation.terrain, (0.0, 0.0), 0.0))
-    sampler, torques = RoverSampler(simulation.model), np.full(4, 12.0)
-    simulation.set_wheel_torques(torques)
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(simulation, "slippery"), terrain=simulation.terrain
-    ) as tape:
-        for _ in range(20):
-            simulation.step(10)
-            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
-    run = read_run(tmp_path / "run.h5")
+    simulation = standing(RoverModel.named("skid-steered"), grounds[kind], materials=laws)
+    simulation.set_wheel_torques(np.full(4, 12.0))
+    run = recorded(simulation, tmp_path / "run.h5", 20, 10)
     assert [part.material for part in parts_of(run.terrain)] == [part.material for part in parts_of(simulation.terrain)]
     scene = run.trajectory.attributes["scene"]
-    again = Simulation(run.model, run.terrain, **run.trajectory.attributes["solver"])
-    again.set_state(scene["q"])
-    again.set_wheel_torques(scene["wheel_torques"])
-    plain = Simulation(run.model, run.terrain)
-    plain.set_state(scene["q"])
-    plain.set_wheel_torques(scene["wheel_torques"])
-    for q in run.trajectory["q"]:
+    again, plain = (Simulation(run.model, run.terrain, **own) for own in (run.trajectory.attributes["solver"], {}))
+    for sim in (again, plain):
+        sim.set_state(scene["q"])
+        sim.set_wheel_torques(scene["wheel_torques"])
+    for q in run.trajectory["q"][1:]:
         again.step(10)
         plain.step(10)
         np.testing.assert_array_equal(again.q, q)
@@ -142,9 +128,8 @@ def test_damaged_materials_are_refused(tmp_path: Path) -> None:
     ):
         field = HeightField(np.zeros((5, 5)), 1.0)
         simulation = Simulation(RoverModel(), [field, SphereField([[0.0, 0.0, 0.0]], [0.1])])
-        sampler, path = RoverSampler(simulation.model), tmp_path / "damaged.h5"
-        with Recorder(path, sampler.channels, describe(simulation, "x"), terrain=simulation.terrain) as tape:
-            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+        path = tmp_path / "damaged.h5"
+        recorded(simulation, path)
         with h5py.File(path, "r+") as file:
             file["terrain"][name].attrs[key] = value
             without_checksum(file)
@@ -166,12 +151,7 @@ def test_a_replay_shows_the_goal_on_the_ground_and_no_rock_beside_the_map_that_i
     rocks = SphereField([[1.0, 2.0, 1.0], [15.0, 2.0, 15.0]], [0.1, 0.2])
     simulation = Simulation(RoverModel.named("open-rover"), [field, rocks])
     simulation.set_state(simulation.model.resting_pose(field, (0.0, 0.0), 0.0))
-    sampler, scene = RoverSampler(simulation.model), {"goal": (3.0, -1.0)}
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(simulation, "goal", scene), terrain=simulation.terrain
-    ) as tape:
-        tape.append(sampler.row(simulation, residual=0.0, iterations=0))
-    run = read_run(tmp_path / "run.h5")
+    run = recorded(simulation, tmp_path / "run.h5", scene={"goal": (3.0, -1.0)})
     pole, _ = goal_parts(run)
     assert pole.position[1] - 0.5 * pole.size[1] == pytest.approx(2.0)
     np.testing.assert_array_equal(spheres(run)[1], [0.1])

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from commands import error_of, output_of
 
-from rover_gym.cli import app
 from rover_gym.drive import ScanPolicy
 from rover_gym.ground.terrain_parts import heights_of, surfaces_of
 from rover_gym.record import RoverRun, read_run
@@ -16,13 +15,8 @@ from rover_gym.show.replay.overlays import NO_PLAN, NO_SCAN, sensor_of
 from rover_gym.show.replay.rover_scene import rover_scene
 
 
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
-
-
 def driven(folder: Path, *arguments: str) -> RoverRun:
-    result = rover("drive", "--time-limit", "1", "--seed", "3", "--output", str(folder), *arguments)
-    assert result.exit_code == 0, result.output
+    output_of("drive", "--time-limit", "1", "--seed", "3", "--output", folder, *arguments)
     return read_run(folder / "episode-3.h5")
 
 
@@ -116,16 +110,14 @@ def test_what_a_run_does_not_hold_has_a_reason(tmp_path: Path) -> None:
 
 
 def test_an_unknown_sensor_is_refused_before_driving(tmp_path: Path) -> None:
-    result = rover("drive", "--sensor", "sonar", "--output", str(tmp_path / "run"))
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: --sensor: must be one of laser, depth")
+    error = error_of("drive", "--sensor", "sonar", "--output", tmp_path / "run")
+    assert error.startswith("error: --sensor: must be one of laser, depth")
     assert not (tmp_path / "run").exists()
 
 
 def test_a_ghost_drives_along_and_stays_where_it_ended(tmp_path: Path) -> None:
     first = driven(tmp_path / "a", "--difficulty", "0.5")
-    other = rover("drive", "--time-limit", "0.5", "--seed", "4", "--output", str(tmp_path / "b"))
-    assert other.exit_code == 0
+    output_of("drive", "--time-limit", "0.5", "--seed", "4", "--output", tmp_path / "b")
     ghost = read_run(tmp_path / "b" / "episode-4.h5")
     scene = rover_scene(first, follow=True, ghost=ghost)
     n = len(first.model.solid_names)
@@ -138,17 +130,15 @@ def test_a_ghost_drives_along_and_stays_where_it_ended(tmp_path: Path) -> None:
     assert chart["values"][1][5] is not None
     assert chart["values"][1][-1] is None  # it was over by then
     page = tmp_path / "page.html"
-    given = [str(tmp_path / "a"), "--ghost", str(tmp_path / "b"), "--html", str(page), "--no-open"]
-    assert rover("replay", *given).exit_code == 0
+    output_of("replay", tmp_path / "a", "--ghost", tmp_path / "b", "--html", page, "--no-open")
     assert page.stat().st_size > 100_000
 
 
 def test_a_ghost_beside_something_else_is_refused(tmp_path: Path) -> None:
-    assert rover("planar", "ball", "--duration", "0.1", "--output", str(tmp_path)).exit_code == 0
+    output_of("planar", "ball", "--duration", "0.1", "--output", tmp_path)
     driven(tmp_path / "rover")
-    result = rover("replay", str(tmp_path / "ball.h5"), "--ghost", str(tmp_path / "rover"), "--no-open")
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: --ghost: can only drive beside a rover's run")
+    error = error_of("replay", tmp_path / "ball.h5", "--ghost", tmp_path / "rover", "--no-open")
+    assert error.startswith("error: --ghost: can only drive beside a rover's run")
 
 
 def test_the_arcs_of_a_policy_begin_at_the_middle_of_its_wheelbase_and_fan_out() -> None:

@@ -345,9 +345,8 @@ def test_gltf_is_whole(tmp_path: Path) -> None:
             assert corners.max() < len(points)
             assert 0 <= primitive.material < len(gltf.materials)
     for animation in gltf.animations:
-        assert len({(channel.target.node, channel.target.path) for channel in animation.channels}) == len(
-            animation.channels
-        )
+        targets = [(channel.target.node, channel.target.path) for channel in animation.channels]
+        assert len(set(targets)) == len(targets)
 
 
 def test_another_reader_finds_the_rover_in_the_gltf(tmp_path: Path) -> None:
@@ -528,8 +527,7 @@ def test_all_formats_are_written_and_named(recording: Path, tmp_path: Path) -> N
     assert held(targets[0]).head["time"] == pytest.approx(np.linspace(0.0, 1.0, 11))
     vrml = Vrml(targets[1].read_text(encoding="utf-8"))
     assert len(vrml.named["trunk_place"].fields["key"]) == 11
-    goal = read_run(recording).goal
-    assert goal is not None
+    assert read_run(recording).goal is not None
     assert "goal" in [node.name for node in pygltflib.GLTF2.load(targets[2]).nodes]
 
 
@@ -569,9 +567,6 @@ def test_a_missing_package_is_named_with_its_extra(
 
 
 def test_the_panel_says_scene_seed_difficulty_and_outcome(tmp_path: Path) -> None:
-
-    from rover_gym.record import read_run  # noqa: PLC0415 - as above
-
     drive = ["drive", "--difficulty", "0.5", "--slope", "3", "--seed", "4", "--time-limit", "0.2"]
     assert rover(*drive, "--output", tmp_path).exit_code == 0
     told = ["scene: rocks", "slope: 3.0 degrees", "seed: 4", "difficulty: 0.5", "outcome: ran out of time"]

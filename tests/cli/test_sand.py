@@ -2,16 +2,16 @@
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
 from artists import covered
+from commands import error_of, output_of
 from matplotlib.figure import Figure
 from rovers import placed
-from typer.testing import CliRunner
 
 from rover_gym import Plane, RoverModel, Simulation
-from rover_gym.cli import app
 from rover_gym.cli.console import figure, tidy
 from rover_gym.core import SoftGround
 from rover_gym.ground.sand import named_soil, with_wide_wheels
@@ -23,13 +23,7 @@ from rover_gym.show.figures.style import STYLE
 from rover_gym.show.frames.appearance import SAND_GROUND
 from rover_gym.show.replay.rover_scene import rover_curves, rover_scene
 
-RUNNER = CliRunner()
-
-
-def run(*words: str) -> str:
-    result = RUNNER.invoke(app, ["sand", *words])
-    assert result.exit_code == 0, result.output
-    return result.output
+run = partial(output_of, "sand")
 
 
 def test_soils_and_runs_are_listed() -> None:
@@ -88,8 +82,7 @@ def test_a_run_on_sand_shows_sinkage_and_the_colours_of_sand(tmp_path: Path) -> 
 
 
 def test_an_unknown_soil_is_refused() -> None:
-    result = RUNNER.invoke(app, ["sand", "bed", "--soil", "mud"])
-    assert result.exit_code != 0
+    error_of("sand", "bed", "--soil", "mud")
 
 
 def test_a_rover_that_has_dug_itself_in_gets_free_and_climbs() -> None:

@@ -6,11 +6,11 @@ import pickle
 import gymnasium as gym
 import numpy as np
 import pytest
+from recordings import recorded
 
 from machines import FOUR, RADIUS, machine
 from rover_gym import Plane, RoverModel, Simulation
 from rover_gym.core import ModelError, OptionError
-from rover_gym.record import Recorder, RoverSampler, describe, read_run
 from rover_gym.show.replay import write_page
 from rover_gym.show.replay.rover_scene import bare_scene
 
@@ -258,12 +258,7 @@ def test_a_rover_tows_one_without_power_up_a_slope(hitch):
 def test_a_run_of_several_machines_is_recorded_and_drawn(tmp_path):
     sim = on_slope({"tug": cart(), "load": cart()}, [0.0, -1.3])
     sim.set_wheel_torques([8.0, -8.0, 8.0, -8.0, 2.0, 2.0, 2.0, 2.0])
-    sampler, path = RoverSampler(sim.model), tmp_path / "meet.h5"
-    with Recorder(path, sampler.channels, describe(sim, "two carts"), terrain=sim.terrain) as recorder:
-        for _ in range(20):
-            sim.step(5)
-            recorder.append(sampler.row(sim))
-    run = read_run(path)
+    run = recorded(sim, tmp_path / "meet.h5", 20, 5)
     assert run.model == sim.model
     last = sim.poses()
     for solid, place in zip(run.model.solid_names, run.positions[-1], strict=True):
