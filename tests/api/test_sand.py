@@ -345,3 +345,19 @@ def test_a_rover_slips_more_the_steeper_and_the_looser_the_sand() -> None:
         slip_on_slope(rover, named_soil("grc-1"), -0.1)
     with pytest.raises(RoverGymError, match="width: must be above 0"):
         with_wide_wheels(rover, 0.0)
+
+
+def test_options_are_off_and_belong_to_the_law_bekker() -> None:
+    soil = named_soil("dry-sand-bekker")
+    names = ("stress_angle", "stress_angle_slip", "slip_sinkage")
+    assert [soil.numbers[name] for name in names] == [0.0] * 3
+    plain, angle, with_slip, sinking = (
+        np.array(WHEEL.on(soil.having(**option)).steady(drives([0.0, 0.3], [0.0])))
+        for option in ({}, *({name: 0.3} for name in names))
+    )
+    np.testing.assert_allclose([with_slip[0], sinking[0]], [plain[0]] * 2, rtol=5e-3)
+    assert angle[0, 1] < 1.2 * plain[0, 1]
+    assert with_slip[1, 1] < 1.5 * plain[1, 1]
+    assert sinking[1, 0] > 1.2 * plain[1, 0]
+    with pytest.raises(OptionError, match="slip_sinkage: no number of the law resistive"):
+        named_soil("cmu-sand").having(slip_sinkage=0.1)
