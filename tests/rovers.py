@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym import RoverModel, Simulation, Terrain
+from rover_gym import Plane, RoverModel, Simulation, Terrain
 from rover_gym.core import Snapshot
 
 
@@ -33,6 +33,15 @@ def standing(
     q[1] += lift
     sim.set_state(q)
     return sim
+
+
+def slid(model: RoverModel, degrees: float, heading: float = 0.0, seconds: float = 2.0, **options: Any) -> float:
+    """How far a braked machine moves on a slope, m."""
+    sim = standing(model, Plane.tilted(np.radians(degrees), 0.0), heading=heading, **options)
+    start = sim.q
+    sim.brake()
+    assert sim.step(round(seconds / sim.time_step)).is_converged
+    return float(np.linalg.norm((sim.q - start)[:3]))
 
 
 def goes_on_alike(sim: Any, steps: int) -> bool:
