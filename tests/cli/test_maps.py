@@ -9,6 +9,7 @@ import pygltflib
 import pytest
 from commands import error_of, output_of, rover
 from forged import without_checksum
+from models.test_colliders import box
 from recordings import recorded
 from rovers import standing
 
@@ -76,12 +77,9 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
     heights[3, 4] = np.nan
     field = HeightField(heights, (0.5, 0.25), (-7.0, -2.0))
     spheres = SphereField([[9.0, 0.0, 9.0]], [0.3])
-    mesh = TriangleMesh(
-        [[5.0, -1.0, -1.0], [7.0, -1.0, -1.0], [6.0, -1.0, 1.0], [6.0, 1.5, 0.0]],
-        [[0, 2, 3], [2, 1, 3], [1, 0, 3], [0, 1, 2]],
-    )
-    simulation = Simulation(RoverModel(), [field, spheres, mesh])
-    terrain = recorded(simulation, tmp_path / "run.h5").terrain
+    corners = [[5.0, -1.0, -1.0], [7.0, -1.0, -1.0], [6.0, -1.0, 1.0], [6.0, 1.5, 0.0]]
+    mesh = TriangleMesh(corners, [[0, 2, 3], [2, 1, 3], [1, 0, 3], [0, 1, 2]])
+    terrain = recorded(Simulation(RoverModel(), [field, spheres, mesh]), tmp_path / "run.h5").terrain
     kinds = {type(part): part for part in parts_of(terrain)}
     np.testing.assert_array_equal(kinds[HeightField].grid, field.grid)
     assert (kinds[HeightField].spacing, kinds[HeightField].origin) == (field.spacing, field.origin)
@@ -93,13 +91,10 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["map", "mesh", "spheres"])
 def test_a_recorded_drive_replays_with_its_materials(kind: str, tmp_path: Path) -> None:
     """The file alone makes the simulation again: the ground with its materials, and the laws of their pairs."""
-    box = [[x, y, z] for x in (-9.0, 9.0) for y in (-1.0, 0.0) for z in (-9.0, 9.0)]
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = [(a, b, c) for a, b, c, _ in sides] + [(a, c, d) for a, _, c, d in sides]
     pebbles = SphereField([[0.5, 0.0, 0.3], [0.9, 0.0, -0.3]], [0.05, 0.04], Plane(), material="chalk")
     grounds = {
         "map": HeightField(np.zeros((31, 31)), 1.0, material="ice"),
-        "mesh": TriangleMesh(box, faces, material="ice"),
+        "mesh": TriangleMesh(*box((-9.0, -1.0, -9.0), (9.0, 0.0, 9.0)), material="ice"),
         "spheres": [pebbles, SphereField([[5.0, -1.0, 5.0]], [1.0], material="ice")],
     }
     laws = {("wheel", "ice"): (0.02, 0.0), ("wheel", "chalk"): (0.1, 0.0), ("wheel", "ground"): (0.9, 0.0)}
@@ -126,10 +121,8 @@ def test_damaged_materials_are_refused(tmp_path: Path) -> None:
         ("sphere_centres", "counts", [-1, 2]),
         ("sphere_centres", "materials", np.bytes_(b"rock")),
     ):
-        field = HeightField(np.zeros((5, 5)), 1.0)
-        simulation = Simulation(RoverModel(), [field, SphereField([[0.0, 0.0, 0.0]], [0.1])])
-        path = tmp_path / "damaged.h5"
-        recorded(simulation, path)
+        ground, path = [HeightField(np.zeros((5, 5)), 1.0), SphereField([[0.0] * 3], [0.1])], tmp_path / "damaged.h5"
+        recorded(Simulation(RoverModel(), ground), path)
         with h5py.File(path, "r+") as file:
             file["terrain"][name].attrs[key] = value
             without_checksum(file)
@@ -149,8 +142,7 @@ def test_a_flat_map_is_not_taken_for_a_trap(tmp_path: Path) -> None:
 def test_a_replay_shows_the_goal_on_the_ground_and_no_rock_beside_the_map_that_it_shows(tmp_path: Path) -> None:
     field = HeightField(np.full((81, 81), 2.0), 0.5)
     rocks = SphereField([[1.0, 2.0, 1.0], [15.0, 2.0, 15.0]], [0.1, 0.2])
-    simulation = Simulation(RoverModel.named("open-rover"), [field, rocks])
-    simulation.set_state(simulation.model.resting_pose(field, (0.0, 0.0), 0.0))
+    simulation = standing(RoverModel.named("open-rover"), [field, rocks])
     run = recorded(simulation, tmp_path / "run.h5", scene={"goal": (3.0, -1.0)})
     pole, _ = goal_parts(run)
     assert pole.position[1] - 0.5 * pole.size[1] == pytest.approx(2.0)
@@ -200,12 +192,8 @@ def test_a_scene_on_a_map_has_a_plan(folder: Path) -> None:
     assert "face" in parts["steering"]["reason"]
     assert "not the same left and right" in parts["base"]["reason"]
     assert "4 joints" in parts["steering"]["built"]
-    for given, named in (
-        (("--slope", "3"), "--slope"),
-        (("--start", "90", "0"), "--start"),
-        (("--model", "nobody"), "--model"),
-    ):
-        assert error_of("scene", *place, *given).startswith(f"error: {named}: ")
+    for given in (("--slope", "3"), ("--start", "90", "0"), ("--model", "nobody")):
+        assert error_of("scene", *place, *given).startswith(f"error: {given[0]}: ")
 
 
 def test_a_drive_off_the_map_names_its_option(folder: Path) -> None:
