@@ -20,6 +20,12 @@ def driven(folder: Path, *arguments: str) -> RoverRun:
     return read_run(folder / "episode-3.h5")
 
 
+def in_the_world(q: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Places x, z, m, of points ahead of and to the right of the rover."""
+    sine, cosine = math.sin(q[4]), math.cos(q[4])
+    return q[[0, 2]] + points @ [[cosine, -sine], [sine, cosine]]
+
+
 def test_a_laser_over_a_plane_measures_what_its_height_and_angle_say(tmp_path: Path) -> None:
     run = driven(tmp_path, "--sensor", "laser", "--sensor", "depth", "--heading", "0")
     sensor = sensor_of("laser", run.model)
@@ -54,14 +60,12 @@ def test_the_scans_points_lie_on_the_ground_and_the_plan_is_one_of_the_arcs(tmp_
     grid = np.reshape(page.arrays["scan-grid"][1], (-1, 2))
     assert channels["scan"].shape == (run.n_frames, len(grid), 1)
     q = run.trajectory["q"][10]
-    sine, cosine = math.sin(q[4]), math.cos(q[4])
-    x, z = q[0] + cosine * grid[:, 0] + sine * grid[:, 1], q[2] - sine * grid[:, 0] + cosine * grid[:, 1]
-    assert channels["scan"][10, :, 0] == pytest.approx(heights_of(run.terrain, np.column_stack((x, z))))
+    assert channels["scan"][10, :, 0] == pytest.approx(heights_of(run.terrain, in_the_world(q, grid)))
     assert page.facts["missing"].keys() == {"laser", "depth"}
     assert page.facts["friction"] == 0.7
-    levels = np.array([channel.levels(slice(10, 11)) for channel in page.channels if channel.name == "mass"])
     (mass,) = (channel for channel in page.channels if channel.name == "mass")
-    assert levels.reshape(3) * mass.step + mass.low == pytest.approx(run.model.tags(q)["centre_of_mass"], abs=1e-4)
+    centre = np.reshape(mass.levels(slice(10, 11)), 3) * mass.step + mass.low
+    assert centre == pytest.approx(run.model.tags(q)["centre_of_mass"], abs=1e-4)
 
 
 def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
@@ -74,16 +78,11 @@ def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
     (field,) = surfaces_of(run.terrain)
     for row in (1, 20):
         q = run.trajectory["q"][row]
-        sine, cosine = math.sin(q[4]), math.cos(q[4])
         for points, heights in (
             (channels["path"][row, :, :2], channels["path"][row, :, 2]),
             (arcs, channels["arc-heights"][row, :, 0]),
         ):
-            x, z = (
-                q[0] + cosine * points[:, 0] + sine * points[:, 1],
-                q[2] - sine * points[:, 0] + cosine * points[:, 1],
-            )
-            assert heights == pytest.approx(field.heights(np.column_stack((x, z))))
+            assert heights == pytest.approx(field.heights(in_the_world(q, points)))
             assert np.ptp(heights) > 0.02
     assert channels["path"][0].tolist() == [[-1e5, -1e5, pytest.approx(run.trajectory["q"][0, 1])]] * 13
 

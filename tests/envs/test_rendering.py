@@ -37,6 +37,7 @@ from rover_gym.show.replay.page import player_file
 Frame = npt.NDArray[np.uint8]
 Renderers = Callable[..., FrameRenderer]
 
+PLANE = Plane()
 SIZE = {"width": 160, "height": 120}
 
 
@@ -57,14 +58,6 @@ def renderer(model: RoverModel) -> Iterator[Renderers]:
     yield make
     for one in made:
         one.close()
-
-
-def parked(model: RoverModel, terrain: Plane | SphereField, *, heading: float = 0.0) -> Simulation:
-    """A rover at rest on the terrain's plane, at the origin."""
-    plane = terrain if isinstance(terrain, Plane) else terrain.ground
-    simulation = Simulation(model, terrain)
-    simulation.set_state(model.resting_pose(plane, (0.0, 0.0), heading))
-    return simulation
 
 
 def moved(simulation: Simulation, **changes: float) -> Simulation:
@@ -91,8 +84,7 @@ def changed(a: Frame, b: Frame) -> int:
 
 
 def test_a_frame_is_an_image_of_the_size_asked_for(model: RoverModel, renderer: Renderers) -> None:
-    plane = Plane()
-    frame = renderer(plane, width=200, height=90).render(parked(model, plane))
+    frame = renderer(PLANE, width=200, height=90).render(standing(model, PLANE))
     assert frame.shape == (90, 200, 3)
     assert frame.dtype == np.uint8
     assert frame.flags.owndata
@@ -100,8 +92,7 @@ def test_a_frame_is_an_image_of_the_size_asked_for(model: RoverModel, renderer: 
 
 
 def test_sky_is_above_ground_and_the_rover_stands_on_it(model: RoverModel, renderer: Renderers) -> None:
-    plane = Plane()
-    frame = renderer(plane).render(parked(model, plane))
+    frame = renderer(PLANE).render(standing(model, PLANE))
     ground, deck = like(frame, look.GROUND_COLOUR), like(frame, look.DECK_COLOUR)
     assert ground[-20:].mean() > 0.8
     assert ground[:8].mean() < 0.1
@@ -114,13 +105,12 @@ def test_sky_is_above_ground_and_the_rover_stands_on_it(model: RoverModel, rende
 
 
 def test_the_nose_is_in_front(model: RoverModel, renderer: Renderers) -> None:
-    plane = Plane()
     # From above, x is up in the picture and z to its right.
-    frame = renderer(plane, camera="top").render(parked(model, plane))
+    frame = renderer(PLANE, camera="top").render(standing(model, PLANE))
     nose, deck = (np.argwhere(like(frame, colour)).mean(axis=0) for colour in (look.NOSE_COLOUR, look.DECK_COLOUR))
     assert nose[0] < deck[0] - 5
     assert abs(nose[1] - deck[1]) < 2
-    frame = renderer(plane, camera="top").render(parked(model, plane, heading=-np.pi / 2))  # heading to +z
+    frame = renderer(PLANE, camera="top").render(standing(model, PLANE, heading=-np.pi / 2))  # heading to +z
     nose, deck = (np.argwhere(like(frame, colour)).mean(axis=0) for colour in (look.NOSE_COLOUR, look.DECK_COLOUR))
     assert nose[1] > deck[1] + 5
     assert abs(nose[0] - deck[0]) < 2
@@ -128,14 +118,14 @@ def test_the_nose_is_in_front(model: RoverModel, renderer: Renderers) -> None:
 
 def test_rocks_and_goal_are_seen_where_there_are_some(model: RoverModel, renderer: Renderers) -> None:
     field = SphereField([[1.6, 0.0, 1.2], [1.6, 0.0, -1.2]], [0.3, 0.3], Plane())
-    bare = renderer(Plane(), camera="top").render(parked(model, Plane()))
-    rocks = renderer(field, camera="top").render(parked(model, field))
-    flagged = renderer(Plane(), camera="top", goal=(1.8, 0.0), goal_tolerance=0.5).render(parked(model, Plane()))
+    bare = renderer(PLANE, camera="top").render(standing(model, PLANE))
+    rocks = renderer(field, camera="top").render(standing(model, field))
+    flagged = renderer(PLANE, camera="top", goal=(1.8, 0.0), goal_tolerance=0.5).render(standing(model, PLANE))
     assert not like(bare, look.GOAL_COLOUR).any()
     assert like(flagged, look.GOAL_COLOUR).sum() > 20
     # The ring's midpoint: 8 m above the trunk, 34 degrees over 120 rows.
     rows, _ = np.nonzero(like(flagged, look.GOAL_COLOUR))
-    height = 8.0 + parked(model, Plane()).q[1]
+    height = 8.0 + standing(model, PLANE).q[1]
     row = 60.0 - 1.8 * 60.0 / (height * np.tan(np.radians(17.0)))
     assert 0.5 * (rows.min() + rows.max()) == pytest.approx(row, abs=4.0)
     # Two discs of 0.3 m, seen from 8 m less their own height.
@@ -153,9 +143,8 @@ def test_spheres_without_a_plane_are_drawn(model: RoverModel, renderer: Renderer
 
 
 def test_ground_moves_past_when_the_rover_drives(model: RoverModel, renderer: Renderers) -> None:
-    plane = Plane()
-    simulation = parked(model, plane)
-    camera = renderer(plane)
+    simulation = standing(model, PLANE)
+    camera = renderer(PLANE)
     before = camera.render(simulation)
     other = changed(before, camera.render(moved(simulation, x=0.5)))  # the other tile under the rover
     assert other > 1000
@@ -165,9 +154,8 @@ def test_ground_moves_past_when_the_rover_drives(model: RoverModel, renderer: Re
 
 
 def test_a_turn_of_the_wheels_alone_shows_at_every_wheel(model: RoverModel, renderer: Renderers) -> None:
-    plane = Plane()
-    camera = renderer(plane, width=640, height=480)
-    simulation = parked(model, plane)
+    camera = renderer(PLANE, width=640, height=480)
+    simulation = standing(model, PLANE)
     before = camera.render(simulation)
     wheels = [model.dof_names[index] for index in model.wheel_joint_indices]
     visible = {"BR", "MR", "FR", "BL"}  # the view is from behind and from the right
@@ -181,9 +169,8 @@ def test_a_turn_of_the_wheels_alone_shows_at_every_wheel(model: RoverModel, rend
 
 
 def test_steering_and_suspension_show(model: RoverModel, renderer: Renderers) -> None:
-    plane = Plane()
-    camera = renderer(plane, width=320, height=240)
-    simulation = parked(model, plane)
+    camera = renderer(PLANE, width=320, height=240)
+    simulation = standing(model, PLANE)
     before = camera.render(simulation)
     for index in (*model.steering_joint_indices[-2:], model.dof_names.index("right_bogie")):
         name = model.dof_names[index]
@@ -192,14 +179,13 @@ def test_steering_and_suspension_show(model: RoverModel, renderer: Renderers) ->
 
 
 def test_forces_are_drawn_on_request_and_grow_with_the_load(model: RoverModel, renderer: Renderers) -> None:
-    plane = Plane()
     seen = {}
     for gravity in (9.81, 3.72):
-        simulation = standing(model, plane, gravity=(0.0, -gravity, 0.0))
+        simulation = standing(model, PLANE, gravity=(0.0, -gravity, 0.0))
         simulation.brake()
         simulation.step(40)
         for show in (False, True):
-            frame = renderer(plane, camera="side", show_forces=show, width=320, height=240).render(simulation)
+            frame = renderer(PLANE, camera="side", show_forces=show, width=320, height=240).render(simulation)
             seen[gravity, show] = like(frame, look.FORCE_COLOUR).sum()
     assert seen[9.81, False] == seen[3.72, False] == 0
     assert seen[9.81, True] > 60
@@ -208,8 +194,7 @@ def test_forces_are_drawn_on_request_and_grow_with_the_load(model: RoverModel, r
 
 
 def test_the_arrows_of_a_parked_rover_carry_its_weight(model: RoverModel) -> None:
-    plane = Plane.tilted(np.radians(10.0), 0.5)
-    simulation = parked(model, plane, heading=0.3)
+    simulation = standing(model, Plane.tilted(np.radians(10.0), 0.5), heading=0.3)
     assert [array.shape for array in contact_forces(simulation)] == [(0, 3), (0, 3)], "no step, no contact"
     simulation.brake()
     simulation.step(400)
@@ -224,7 +209,7 @@ def test_the_camera_follows_and_the_rover_stays_in_the_middle(renderer: Renderer
     env = gym.make("Rover-v0", goal_distance=20.0, goal_bearing_deg=60.0).unwrapped
     env.reset(seed=1)
     policy = rover_gym.PDPolicy(env)
-    camera = renderer(Plane())
+    camera = renderer(PLANE)
     action = np.zeros(12, np.float32)
     centres = []
     for _ in range(60):
@@ -273,7 +258,7 @@ def test_tracks_in_sand_are_seen_behind_the_rover() -> None:
 
 
 def test_wheels_leave_marks_that_a_new_state_takes_away(model: RoverModel, renderer: Renderers) -> None:
-    camera, simulation = renderer(Plane(), camera=((0.0, 9.0, 0.1), (0.0, 0.0, 0.0))), parked(model, Plane())
+    camera, simulation = renderer(PLANE, camera=((0.0, 9.0, 0.1), (0.0, 0.0, 0.0))), standing(model, PLANE)
     bare = camera.render(moved(simulation, x=2.0))
     moved(simulation, x=-2.0)
     simulation.set_wheel_torques(np.full(6, 60.0))
@@ -376,9 +361,8 @@ def test_a_slope_is_seen(model: RoverModel, renderer: Renderers) -> None:
     """Facing across the slope the horizon of the ground leans as the ground does."""
     slope = np.radians(15.0)
     plane = Plane.tilted(slope, np.pi / 2)  # uphill to the left of x
-    frame = renderer(plane, camera=((-4.0, 1.5, 0.0), (0.0, 1.2, 0.0)), width=320, height=240).render(
-        parked(model, plane)
-    )
+    camera = renderer(plane, camera=((-4.0, 1.5, 0.0), (0.0, 1.2, 0.0)), width=320, height=240)
+    frame = camera.render(standing(model, plane))
     ground = like(frame, look.GROUND_COLOUR, within=0.08)
     first = np.argmax(ground, axis=0)
     left, right = first[10:60].mean(), first[-60:-10].mean()
@@ -389,7 +373,7 @@ def test_equal_states_give_equal_frames(model: RoverModel, renderer: Renderers) 
     field = SphereField.rocks(0.1, (-5, -5, 5, 5), 0, clear=[[0.0, 0.0, 1.5]])
     frames = []
     for _ in range(2):
-        camera, simulation = renderer(field, goal=(4.0, 1.0), show_forces=True), parked(model, field)
+        camera, simulation = renderer(field, goal=(4.0, 1.0), show_forces=True), standing(model, field)
         simulation.set_wheel_torques(np.full(6, 30.0))
         for _ in range(3):
             simulation.step(10)
@@ -400,13 +384,13 @@ def test_equal_states_give_equal_frames(model: RoverModel, renderer: Renderers) 
 
 
 def test_a_new_episode_brings_its_own_ground_and_goal(model: RoverModel, renderer: Renderers) -> None:
-    camera = renderer(Plane(), camera="top")
+    camera = renderer(PLANE, camera="top")
     field = SphereField([[1.6, 0.0, 1.2]], [0.3], Plane())
-    alone = camera.render(parked(model, Plane()))
+    alone = camera.render(standing(model, PLANE))
     camera.set_scene(field, goal=(1.8, 0.0))
-    assert changed(alone, camera.render(parked(model, field))) > 50
+    assert changed(alone, camera.render(standing(model, field))) > 50
     camera.set_scene(Plane())
-    assert np.array_equal(alone, camera.render(parked(model, Plane())))
+    assert np.array_equal(alone, camera.render(standing(model, PLANE)))
 
 
 def test_a_model_of_another_shape_is_drawn_as_it_is() -> None:
@@ -414,7 +398,7 @@ def test_a_model_of_another_shape_is_drawn_as_it_is() -> None:
     areas = []
     for each in (RoverModel(), thin):
         with FrameRenderer(each, Plane(), **SIZE) as camera:
-            areas.append(like(camera.render(parked(each, Plane())), look.DECK_COLOUR).sum())
+            areas.append(like(camera.render(standing(each, Plane())), look.DECK_COLOUR).sum())
     assert areas[1] < 0.75 * areas[0]
 
 
@@ -422,7 +406,7 @@ def test_a_frame_takes_well_under_a_second(model: RoverModel) -> None:
     field = SphereField.rocks(0.1, (-10, -10, 10, 10), 0, min_diameter=0.1, clear=[[0.0, 0.0, 1.5]])
     assert len(field) > 200
     with FrameRenderer(model, field) as camera:
-        simulation = parked(model, field)
+        simulation = standing(model, field)
         camera.render(simulation)
         start = time.process_time()
         for _ in range(5):
