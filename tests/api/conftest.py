@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from rovers import placed
 
 import rover_gym
 
@@ -21,8 +21,4 @@ def reference() -> dict[str, Any]:
 @pytest.fixture
 def sim() -> rover_gym.Simulation:
     """The rover on flat ground, touching it."""
-    sim = rover_gym.Simulation()
-    q = np.zeros(21)
-    q[1] = 0.35
-    sim.set_state(q)
-    return sim
+    return placed(rover_gym.Simulation(), y=0.35)

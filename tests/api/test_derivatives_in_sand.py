@@ -5,6 +5,7 @@ import functools
 import numpy as np
 import pytest
 from refusals import refused
+from rovers import placed, with_fields
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, StateError
 from rover_gym.core import HeightField, SoftGround, SphereField, Terrain
@@ -26,10 +27,7 @@ def wide() -> RoverModel:
 
 def widened(model: RoverModel) -> RoverModel:
     """With wheels for sand."""
-    described = model.to_dict()
-    for wheel in described["wheels"]:
-        wheel |= {"width": 0.08, "grouser_height": 0.005, "grousers": 24}
-    return RoverModel.from_dict(described)
+    return with_fields(model, wheels={"width": 0.08, "grouser_height": 0.005, "grousers": 24})
 
 
 def steered() -> np.ndarray:
@@ -250,10 +248,7 @@ def test_columns_at_rest_are_the_mean_of_both_sides():
 
 def test_a_body_on_a_rock_in_sand_is_differentiated_in_its_modes():
     rock = SphereField([[0.0, 0.02, 0.0]], [0.16])
-    sim = Simulation(wide(), [SoftGround(Plane(), named_soil("cmu-sand")), rock], stabilisation="none")
-    q = np.zeros(wide().nv)
-    q[1] = 0.245
-    sim.set_state(q)
+    sim = placed(Simulation(wide(), [SoftGround(Plane(), named_soil("cmu-sand")), rock], stabilisation="none"), y=0.245)
     sim.set_wheel_torques(np.full(6, 0.5))
     sim.step(60)
     linear = sim.linearise(check=True)

@@ -8,6 +8,7 @@ import pytest
 from machines import RADIUS
 from machines.test_rollers import platform
 from machines.test_several import cart, on_slope
+from rovers import standing
 
 from rover_gym import Plane, RoverModel, Simulation, StateError
 from rover_gym.core import Linearisation
@@ -230,8 +231,7 @@ def test_a_rover_with_a_bar_differential_is_that_with_coupled_rockers():
     coupled, model = RoverModel.named("open-rover"), with_a_bar()
     found = []
     for one in (coupled, model):
-        sim = Simulation(one)
-        sim.set_state(one.resting_pose(Plane(), (0.0, 0.0), 0.0))
+        sim = standing(one)
         sim.set_wheel_torques(np.full(6, 0.5))
         sim.step(20)
         commands = np.tile(np.repeat([0.5, 0.0], 6), (30, 1))
@@ -305,8 +305,7 @@ def test_machines_that_fly_apart_are_differentiated():
 
 
 def test_a_platform_on_rollers_is_differentiated_along_a_drive():
-    sim = Simulation(platform(), stabilisation="none")
-    sim.set_state(sim.model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    sim = standing(platform(), stabilisation="none")
     sim.set_wheel_torques([3.0, -2.0, 1.0, 3.0])
     sim.step(50)
     start, commands = state_of(sim), np.tile(np.concatenate([sim.wheel_torques, sim.steering]), (30, 1))

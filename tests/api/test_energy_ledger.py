@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from rovers import placed, standing
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation
 from rover_gym.core import StepReport
@@ -112,8 +113,7 @@ def test_the_entries_of_a_drive_add_up_to_its_change_of_energy(name: str, varian
     """Springs and held joints were in no entry, and the work of the actuators neither."""
     rng = np.random.default_rng(3)
     model = RoverModel.named(name)
-    sim = Simulation(model, waves(), variant=variant)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.4))
+    sim = standing(model, waves(), heading=0.4, variant=variant)
     n = len(model.wheel_names)
     reports = []
     for _ in range(6):
@@ -130,10 +130,7 @@ def test_the_entries_of_a_drive_add_up_to_its_change_of_energy(name: str, varian
 def test_the_entries_of_a_tumble_add_up(index: int, variant: Variant) -> None:
     rng = np.random.default_rng(7)
     model = linkages()[index]
-    sim = Simulation(model, Plane(), variant=variant)
-    q, v = np.zeros(model.nq), rng.normal(size=model.nv)
-    q[1] = 0.6
-    sim.set_state(q, v)
+    sim = placed(Simulation(model, Plane(), variant=variant), rng.normal(size=model.nv), y=0.6)
     lifted = 0.0
     for _ in range(30):
         sim.set_joint_torques(rng.uniform(-5.0, 5.0, len(model.joint_names)))

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rovers import placed, with_fields
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.core import SimulationBatch
@@ -45,10 +46,8 @@ def test_rebounds_methods_and_cold_starts_are_fast(options: dict[str, Any]) -> N
 
 
 def test_a_machine_on_a_stand_and_one_that_is_pushed_are_fast() -> None:
-    description = RoverModel().to_dict()
-    trunk = next(solid for solid in description["solids"] if "parent" not in solid)
-    trunk.update({"joint": "revolute", "axis": [0.0, 0.0, 1.0], "position": [0.0, 0.6, 0.0]})
-    simulation = Simulation(RoverModel.from_dict(description))
+    stand = {"joint": "revolute", "axis": [0.0, 0.0, 1.0], "position": [0.0, 0.6, 0.0]}
+    simulation = Simulation(with_fields(RoverModel(), {"trunk": stand}))
     simulation.apply_wrench("trunk", force=[0.0, 10.0, 0.0])
     assert simulation.step(20).fallbacks == 0
 
@@ -66,10 +65,7 @@ def test_a_machine_on_a_stand_and_one_that_is_pushed_are_fast() -> None:
     ],
 )
 def test_joints_and_forces_of_every_kind_step_in_lanes(changes: dict[str, Any]) -> None:
-    description = RoverModel().to_dict()
-    bogie = next(solid for solid in description["solids"] if solid["name"] == "left_bogie")
-    bogie.update(changes)
-    simulation = Simulation(RoverModel.from_dict(description))
+    simulation = Simulation(with_fields(RoverModel(), {"left_bogie": changes}))
     simulation.step(200)
     simulation.set_wheel_torques([20.0] * 6)
     assert simulation.step(20).fallbacks == 0
@@ -83,12 +79,7 @@ def test_rovers_of_the_gallery_step_in_lanes(name: str) -> None:
 
 
 def test_bodies_that_touch_the_ground_or_each_other_step_in_lanes() -> None:
-    description = RoverModel().to_dict()
-    description["self_contact"] = True
-    simulation = Simulation(RoverModel.from_dict(description))
-    q = simulation.q
-    q[1], q[3] = 0.6, np.pi
-    simulation.set_state(q)
+    simulation = placed(Simulation(with_fields(RoverModel(), self_contact=True)), y=0.6, roll=np.pi)
     report = simulation.step(200)
     assert "box" in simulation.contacts.kinds
     assert report.fallbacks < 40
@@ -96,10 +87,5 @@ def test_bodies_that_touch_the_ground_or_each_other_step_in_lanes() -> None:
 
 def test_a_report_counts_steps_that_take_more_than_the_usual_effort() -> None:
     # A base that turns by more than half a radian in a step is taken in parts.
-    simulation = Simulation(gravity=[0.0, 0.0, 0.0])
-    velocity = np.zeros(len(simulation.v))
-    velocity[3] = 150.0
-    q = simulation.q
-    q[1] = 50.0
-    simulation.set_state(q, velocity)
+    simulation = placed(Simulation(gravity=[0.0, 0.0, 0.0]), 150.0 * np.eye(21)[3], y=50.0)
     assert simulation.step(3).fallbacks == 3

@@ -5,6 +5,7 @@ import pytest
 import scipy.sparse
 from hypothesis import given, settings, strategies as st
 from refusals import refused
+from rovers import placed
 
 import rover_gym
 from rover_gym import solve_friction_contact
@@ -69,10 +70,7 @@ def test_the_relaxed_law_says_that_it_is_another_law():
 
 def test_the_last_problem_is_that_of_the_velocities_where_the_position_was_projected():
     """`last_problem` returned the problem of the projection, whose q are gaps in metres."""
-    sim = rover_gym.Simulation(RIGID, warm_start=False)  # not by the fast step
-    q = sim.q
-    q[1] = 0.5
-    sim.set_state(q)
+    sim = placed(rover_gym.Simulation(RIGID, warm_start=False), y=0.5)  # not by the fast step
     while sim.step().energy_lifted == 0.0:
         assert sim.time < 2.0
     W, q_free, _ = sim.last_problem()

@@ -151,9 +151,7 @@ def test_a_rover_among_balls_is_recorded_with_its_forces_and_sinkage(tmp_path: P
     path = tmp_path / "rover.h5"
     record_run(sim, 0.4, path)
     run = open_run(path)
-    assert run.model is not None
     assert run.model.to_dict() == RoverModel().to_dict()
-    assert run.rover is not None
     np.testing.assert_allclose(run.rover.positions[-1, 0], sim.rover.q[:3], atol=1e-12)
     weight = run.model.mass * 9.81
     assert run.wheel_forces[1:, :, 1].sum(axis=1).mean() == pytest.approx(weight, rel=0.05)
@@ -435,7 +433,6 @@ def test_a_drive_is_recorded_with_all_balls(bed: BallBed, tmp_path: Path) -> Non
     assert not run.kinematic.any()
     assert run.time[-1] == pytest.approx(0.12)
     assert run.trajectory["n_asleep"][0] > 0.3 * len(bed.radius)
-    assert run.model is not None
     potential = run.trajectory["potential_energy"][0]
     assert potential == pytest.approx(3.71 * float(bed.mass @ bed.position[:, 1]) + MODEL.mass * 3.71 * 0.58, rel=0.2)
 

@@ -10,13 +10,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from refusals import refused
+from rovers import standing
 
-from rover_gym import OptionError, RoverGymError, RoverModel, Simulation
+from rover_gym import OptionError, RoverGymError, RoverModel
 from rover_gym.identification import Identification, Parameter, identify
 
 pytest.importorskip("h5py", reason="the extra record is not installed")
 
-from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.record import RoverRun, read_run
+from rover_gym.record.saved_runs import record_run
 
 Torque = Callable[[float], float]
 
@@ -33,17 +35,10 @@ def a_run(
     path: Path, torque: Torque, seconds: float = 1.0, *, friction: float = 0.5, mass_scale: float = 1.2
 ) -> RoverRun:
     """A rover that stands at first, driven over flat ground; a row each 0.05 s."""
-    sim = Simulation(MODEL.replace(mass_scale=mass_scale), friction=friction)
-    sim.set_state(sim.model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim = standing(MODEL.replace(mass_scale=mass_scale), friction=friction)
     sim.step(200)
     sim.set_state(sim.q)
-    sampler = RoverSampler(sim.model)
-    with Recorder(path, sampler.channels, describe(sim, "a drive"), terrain=sim.terrain) as recorder:
-        recorder.append(sampler.row(sim))
-        while sim.time < seconds - 1e-9:
-            sim.set_wheel_torques(np.full(6, torque(sim.time)))
-            sim.step(10)
-            recorder.append(sampler.row(sim))
+    record_run(sim, seconds, path, 20.0, before_row=lambda sim: sim.set_wheel_torques(np.full(6, torque(sim.time))))
     return read_run(path)
 
 

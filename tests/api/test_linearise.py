@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from refusals import refused
+from rovers import placed, standing, with_fields
 
 from rover_gym import OptionError, RoverModel, Simulation, StateError
 from rover_gym.core import HeightField, Linearisation, SphereField
@@ -13,11 +14,7 @@ RIGID = RoverModel().replace(wheel_stiffness=0.0)
 
 
 def on_wheels(**options) -> Simulation:
-    sim = Simulation(RIGID, stabilisation="none", **options)
-    q = np.zeros(NV)
-    q[1] = 0.35
-    sim.set_state(q)
-    return sim
+    return placed(Simulation(RIGID, stabilisation="none", **options), y=0.35)
 
 
 def slope(degrees: float) -> np.ndarray:
@@ -26,11 +23,8 @@ def slope(degrees: float) -> np.ndarray:
 
 
 def flying() -> Simulation:
-    sim = Simulation(RIGID)
-    q = np.zeros(NV)
-    q[1], q[3:6] = 1.0, [0.1, 0.2, 0.3]
-    sim.set_state(q, 0.5 * np.random.default_rng(0).normal(size=NV))
-    return sim
+    v = 0.5 * np.random.default_rng(0).normal(size=NV)
+    return placed(Simulation(RIGID), v, y=1.0, roll=0.1, heading=0.2, pitch=0.3)
 
 
 def rolling() -> Simulation:
@@ -41,8 +35,7 @@ def rolling() -> Simulation:
 
 
 def rolling_on_treads() -> Simulation:
-    sim = Simulation(stabilisation="none")
-    sim.set_state(sim.model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim = standing(stabilisation="none")
     sim.set_wheel_torques(np.full(6, 20.0))
     sim.step(200)
     return sim
@@ -67,10 +60,7 @@ def on_rocks(stabilisation: str = "none", steps: int = 170) -> Simulation:
     centres = np.column_stack([rng.uniform(-2, 4, 400), np.zeros(400), rng.uniform(-2, 2, 400)])
     radii = rng.uniform(0.05, 0.25, 400)
     centres[:, 1] = -0.6 * radii
-    sim = Simulation(RIGID, SphereField(centres, radii), stabilisation=stabilisation)
-    q = np.zeros(NV)
-    q[1] = 0.55
-    sim.set_state(q)
+    sim = placed(Simulation(RIGID, SphereField(centres, radii), stabilisation=stabilisation), y=0.55)
     sim.set_wheel_torques(np.full(6, 10.0))
     sim.step(steps)
     return sim
@@ -131,8 +121,8 @@ def test_columns_hold_where_a_wheel_is_about_to_leave_an_edge_of_the_ground(seed
     rng = np.random.default_rng(seed)
     model = RoverModel.named(str(rng.choice(RoverModel.names())))
     ground = HeightField.fractal(20.0, 0.1, 0.1, seed=seed % 7)
-    sim = Simulation(model, ground, friction=0.7, time_step=float(rng.choice([0.001, 0.005, 0.01])))
-    sim.set_state(model.resting_pose(ground, (0.0, 0.0), rng.uniform(-3, 3)))
+    step = float(rng.choice([0.001, 0.005, 0.01]))
+    sim = standing(model, ground, heading=rng.uniform(-3, 3), friction=0.7, time_step=step)
     sim.set_wheel_torques(np.array(model.wheel_torque_limits) * rng.uniform(-0.5, 0.5, len(model.wheel_names)))
     sim.step(int(rng.integers(1, 80)))
     found = sim.linearise(check=True)
@@ -141,14 +131,11 @@ def test_columns_hold_where_a_wheel_is_about_to_leave_an_edge_of_the_ground(seed
 
 
 def test_dry_friction_in_joints_is_a_contact_that_sticks_or_slips():
-    description = RoverModel.named("open-rover").to_dict()
-    for solid in description["solids"]:
-        if solid["name"] in ("left_bogie", "right_bogie"):
-            solid["friction"] = 30.0
-        elif solid["name"].startswith("wheel"):
-            solid["friction"] = 0.2
+    plain = RoverModel.named("open-rover")
+    friction = {f"wheel_{name}": {"friction": 0.2} for name in plain.wheel_names}
+    friction |= {f"{side}_bogie": {"friction": 30.0} for side in ("left", "right")}
     # Wheels that yield: locked bogies leave the loads of rigid ones undetermined.
-    model = RoverModel.from_dict(description).replace(wheel_stiffness=2e4, wheel_damping=200.0)
+    model = with_fields(plain, friction).replace(wheel_stiffness=2e4, wheel_damping=200.0)
     sim = Simulation(model)
     q, v = model.resting_pose(sim.terrain, (0.0, 0.0), 0.0), np.zeros(model.nv)
     v[0] = 0.3
@@ -183,11 +170,7 @@ def test_it_says_where_modes_change():
     assert not linear.is_smooth
     # Over the ground by less than the tested change, a wheel touches on one side only.
     falling = Simulation(RIGID, stabilisation="none")
-    q = np.zeros(NV)
-    v = np.zeros(NV)
-    v[1] = -1.0
-    q[1] = 0.35 + 0.5 * falling.time_step + 1e-7
-    falling.set_state(q, v)
+    placed(falling, -np.eye(NV)[1], y=0.35 + 0.5 * falling.time_step + 1e-7)
     near = falling.linearise(check=True)
     assert near.modes == []
     assert not near.holds[1]
@@ -226,10 +209,7 @@ def test_a_bad_perturbation_is_refused_by_name(given):
 def test_what_cannot_be_linearised_is_refused():
     with pytest.raises(OptionError, match="variant"):
         Simulation(variant="newton").linearise()
-    sim = Simulation(RIGID)
-    q = np.zeros(NV)
-    q[1], q[5] = 5.0, np.pi / 2
-    sim.set_state(q)
+    sim = placed(Simulation(RIGID), y=5.0, pitch=np.pi / 2)
     with pytest.raises(StateError, match="singular"):
         sim.linearise(check=True)
 

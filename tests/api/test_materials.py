@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from refusals import refused
+from rovers import goes_on_alike, placed, standing, with_fields
 
 from rover_gym.core import (
     HeightField,
@@ -64,13 +65,7 @@ def test_a_pair_decides_and_the_rest_keeps_the_common_coefficients() -> None:
 def test_a_snapshot_continues_with_materials() -> None:
     sim = Simulation(materials=MATERIALS)
     sim.set_wheel_torques([10.0] * 6)
-    sim.step(20)
-    saved = sim.snapshot()
-    sim.step(20)
-    after = sim.q
-    sim.restore(saved)
-    sim.step(20)
-    assert np.array_equal(sim.q, after)
+    assert goes_on_alike(sim, 20)
 
 
 @pytest.mark.parametrize(
@@ -156,10 +151,7 @@ def rigid(name: str) -> RoverModel:
 
 
 def yielding(name: str, width: float = 0.08) -> RoverModel:
-    description = RoverModel.named(name).to_dict()
-    for wheel in description["wheels"]:
-        wheel["width"] = width
-    return RoverModel.from_dict(description)
+    return with_fields(RoverModel.named(name), wheels={"width": width})
 
 
 def tilted_map() -> HeightField:
@@ -206,11 +198,9 @@ def test_rigid_wheels_on_four_points_depend_on_micrometres() -> None:
 @pytest.mark.parametrize("name", FOUR)
 def test_two_wheels_turned_by_a_rounded_pi_change_nothing(name: str) -> None:
     """3.14159 for pi in a robot's file left two of four wheels without load."""
-    description = RoverModel.named(name).to_dict()
-    for solid in description["solids"]:
-        if solid["name"] in ("wheel_FL", "wheel_BR"):
-            solid["rotation"] = [2.65e-6, 0.0, 0.0]
-    turned, plain = (driven(m, None, 0.005) for m in (RoverModel.from_dict(description), RoverModel.named(name)))
+    model, turn = RoverModel.named(name), {"rotation": [2.65e-6, 0.0, 0.0]}
+    tilted = with_fields(model, {"wheel_FL": turn, "wheel_BR": turn})
+    turned, plain = (driven(one, None, 0.005) for one in (tilted, model))
     assert distance(turned, plain) < 1e-3
 
 
@@ -219,8 +209,7 @@ def test_the_loads_do_not_depend_on_the_step(name: str) -> None:
     """A rover on a rigid chassis parked itself on two wheels at 0.2 ms and on four at 20 ms."""
     found = []
     for step in (0.02, 0.005, 0.001):
-        sim = Simulation(RoverModel.named(name), SLOPE, time_step=step)
-        sim.set_state(sim.model.resting_pose(SLOPE, (0.0, 0.0), 0.3))
+        sim = standing(RoverModel.named(name), SLOPE, heading=0.3, time_step=step)
         sim.brake()
         sim.step(round(1.0 / step))
         found.append(sim.wheel_forces[:, 0])
@@ -257,8 +246,7 @@ def test_a_rigid_body_on_two_bogies_turns_alike_at_every_step() -> None:
     """JPL's Open Source Rover ended 15 mm from Drake's path at 5 ms, and 0.45 m at 0.2 ms with one wheel unloaded."""
     ends, loads = [], []
     for step in (0.02, 0.005, 0.001):
-        sim = Simulation(braced(1e7), time_step=step)
-        sim.set_state(sim.model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+        sim = standing(braced(1e7), time_step=step)
         for k in range(30):
             share = min(1.0, (k + 1) / 10.0)
             angles = [0.2 * share if name.endswith(("FL", "FR")) else 0.0 for name in sim.model.wheel_names]
@@ -274,8 +262,7 @@ def test_a_rigid_body_on_two_bogies_turns_alike_at_every_step() -> None:
 @pytest.mark.parametrize("name", FOUR)
 def test_a_wheel_yields_by_its_load_over_its_stiffness(name: str) -> None:
     model = RoverModel.named(name)
-    sim = Simulation(model)
-    sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    sim = standing(model)
     sim.step(400)
     np.testing.assert_allclose(-sim.wheel_gaps, sim.wheel_forces[:, 0] / model.wheel_stiffnesses, rtol=1e-4)
     assert sim.wheel_forces[:, 0].sum() == pytest.approx(9.81 * model.mass, rel=1e-9)
@@ -288,10 +275,7 @@ def test_a_wheel_yields_by_its_load_over_its_stiffness(name: str) -> None:
 def test_every_stiffness_is_stable_at_every_step(stiffness: float, step: float) -> None:
     """Dropped by 0.1 m: comes to rest, and never has more energy than at the start."""
     model = RoverModel.named("four-steered").replace(wheel_stiffness=stiffness, wheel_damping=0.02 * stiffness)
-    sim = Simulation(model, time_step=step)
-    q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
-    q[1] += 0.1
-    sim.set_state(q)
+    sim = standing(model, lift=0.1, time_step=step)
     sim.brake()
     most = sim.energy().total
     for _ in range(round(3.0 / step)):
@@ -305,10 +289,7 @@ def test_every_stiffness_is_stable_at_every_step(stiffness: float, step: float) 
 def test_a_stiff_contact_does_not_bounce_and_a_soft_one_swings_at_its_frequency() -> None:
     def dropped(stiffness: float, step: float, n: int) -> np.ndarray:
         model = RoverModel.named("four-steered").replace(wheel_stiffness=stiffness, wheel_damping=0.0)
-        sim = Simulation(model, time_step=step)
-        q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
-        q[1] += 0.01 if stiffness > 1e6 else 0.0
-        sim.set_state(q)
+        sim = standing(model, lift=0.01 if stiffness > 1e6 else 0.0, time_step=step)
         sim.brake()
         heights = []
         for _ in range(n):
@@ -338,8 +319,7 @@ def test_its_limit_is_the_rigid_wheel() -> None:
 
 def test_parked_on_a_slope_it_does_not_creep() -> None:
     model = RoverModel.named("skid-steered")
-    sim = Simulation(model, SLOPE)
-    sim.set_state(model.resting_pose(SLOPE, (0.0, 0.0), 0.3))
+    sim = standing(model, SLOPE, heading=0.3)
     sim.brake()
     sim.step(400)
     start = sim.q
@@ -352,10 +332,7 @@ def test_parked_on_a_slope_it_does_not_creep() -> None:
 def test_what_no_force_has_pressed_in_is_not_given_back(name: str, depth: float) -> None:
     """A rover set 2 cm into the ground was shot up by 2 kJ; landings gave 100 J."""
     model = RoverModel.named(name)
-    sim = Simulation(model, Plane(), stabilisation="none")
-    q = model.resting_pose(Plane(), (0.0, 0.0), 0.0)
-    q[1] += -depth if depth else 0.3
-    sim.set_state(q)
+    sim = standing(model, lift=-depth if depth else 0.3, stabilisation="none")
     start, given = sim.energy().total, 0.0
     for _ in range(300):
         before = sim.energy().total
@@ -372,8 +349,7 @@ def test_what_no_force_has_pressed_in_is_not_given_back(name: str, depth: float)
 
 def test_the_report_says_when_loads_are_undetermined() -> None:
     def count(model: RoverModel) -> int:
-        sim = Simulation(model)
-        sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+        sim = standing(model)
         return sim.step(50).undetermined_loads
 
     assert count(rigid("rover")) == 6
@@ -390,10 +366,7 @@ def test_a_step_that_is_split_counts_the_loads_of_its_last_part() -> None:
     draw = np.random.default_rng(0)
     n = 300
     centres = np.column_stack((draw.uniform(-2.0, 6.0, n), np.full(n, -0.06), draw.uniform(-1.0, 1.0, n)))
-    sim = Simulation(RoverModel(), SphereField(centres, [0.1] * n, Plane()))
-    q = sim.q
-    q[1] = 0.3
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), SphereField(centres, [0.1] * n, Plane())), y=0.3)
     sim.step(100)
     longer = 0
     for k in range(100):

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from refusals import refused
+from rovers import placed
 
 from rover_gym import ModelError, Motor, Plane, RoverModel, Simulation, StateError
 
@@ -29,22 +30,18 @@ def rates(sim: Simulation) -> npt.NDArray[np.float64]:
     return forward * sim.v[sim.model.wheel_joint_indices]
 
 
-def in_the_air(motor: Motor | None, torque: float, time_step: float = 1e-3) -> Simulation:
+def in_the_air(motor: Motor | None, torque: float, time_step: float = 1e-3, spin: float = 0.0) -> Simulation:
     """The rover high above the ground, without weight, its wheels driven."""
     sim = Simulation(RoverModel().replace(motor=motor), gravity=(0.0, 0.0, 0.0), time_step=time_step)
-    q = np.zeros(21)
-    q[1] = 100.0
-    sim.set_state(q)
+    placed(sim, spin * np.isin(np.arange(21), sim.model.wheel_joint_indices), y=100.0)
     sim.set_wheel_torques(np.full(6, torque))
     return sim
 
 
 def rolling(motor: Motor | None, slope: float = 0.35, seconds: float = 3.0) -> Simulation:
     """The rover rolling downhill without commands."""
-    sim = Simulation(RoverModel().replace(motor=motor), Plane((math.sin(slope), math.cos(slope), 0.0)))
-    q = np.zeros(21)
-    q[0], q[1], q[5] = 0.35 * math.sin(slope), 0.35 * math.cos(slope), -slope
-    sim.set_state(q)
+    x, y = 0.35 * math.sin(slope), 0.35 * math.cos(slope)
+    sim = placed(Simulation(RoverModel().replace(motor=motor), Plane((x, y, 0.0))), x=x, y=y, pitch=-slope)
     sim.step(round(seconds / sim.time_step))
     return sim
 
@@ -85,10 +82,8 @@ def test_an_infinite_no_load_speed_is_the_command_to_the_bit() -> None:
 
 
 def test_downhill_a_regenerating_motor_brakes_and_another_coasts() -> None:
-    braked, coasting, free = (
-        rolling(Motor(300.0, 10.0, regenerating)) if line else rolling(None)
-        for line, regenerating in ((True, True), (True, False), (False, False))
-    )
+    motors = Motor(300.0, 10.0), Motor(300.0, 10.0, regenerating=False), None
+    braked, coasting, free = map(rolling, motors)
     assert (rates(braked) < 12.0).all(), "a little beyond the no-load speed, where the line holds the weight"
     assert (braked.motor_torques < -10.0).all()
     np.testing.assert_allclose(rates(coasting), rates(free))
@@ -99,10 +94,7 @@ def test_downhill_a_regenerating_motor_brakes_and_another_coasts() -> None:
 @pytest.mark.parametrize("time_step", [5e-3, 5e-2])
 def test_a_motor_that_brakes_hard_does_not_ring(time_step: float) -> None:
     # All that the motor has would turn the wheels back four times as fast within the longer step.
-    sim = in_the_air(Motor(300.0, 0.5), 0.0, time_step)
-    v = np.zeros(21)
-    v[sim.model.wheel_joint_indices] = -20.0
-    sim.set_state(sim.q, v)
+    sim = in_the_air(Motor(300.0, 0.5), 0.0, time_step, spin=-20.0)
     for _ in range(20):
         before = sim.energy().kinetic
         sim.step()
@@ -113,10 +105,7 @@ def test_a_motor_that_brakes_hard_does_not_ring(time_step: float) -> None:
 
 @pytest.mark.parametrize("torque", [150.0, -40.0])
 def test_the_work_that_is_booked_is_the_torque_given_times_the_angle(torque: float) -> None:
-    sim = in_the_air(Motor(300.0, 30.0), torque)
-    v = np.zeros(21)
-    v[sim.model.wheel_joint_indices] = -8.0
-    sim.set_state(sim.q, v)
+    sim = in_the_air(Motor(300.0, 30.0), torque, spin=-8.0)
     places = sim.reading_layout()
     before, total = sim.energy().kinetic, np.zeros(6)
     for _ in range(400):

@@ -17,6 +17,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from recordings import recorded
 from torture.hostile import hostile_values
 
 from rover_gym import PDPolicy, Plane, RoverGymError, RoverModel, Simulation
@@ -24,7 +25,7 @@ from rover_gym.core import BallSimulation, DiskSimulation, GrainSimulation, Line
 from rover_gym.core.extras import MissingExtraError
 from rover_gym.ground.grains import Pull, settled_balls, settled_disks
 from rover_gym.ground.grains.lab import PlatePoint, ShearLaw, ShearPoint, WheelPoint
-from rover_gym.record import Channel, Recorder, RoverSampler, describe, read_run
+from rover_gym.record import Channel
 from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.live import LiveChoices, LiveLoop, LiveRover
 
@@ -51,17 +52,10 @@ class World:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.sim = Simulation()
-        self.sampler = RoverSampler(self.sim.model)
-        facts = describe(self.sim, "a stand")
-        with Recorder(folder / "run.h5", self.sampler.channels, facts, terrain=Plane()) as recorder:
-            for _ in range(3):
-                recorder.append(self.sampler.row(self.sim))
-                self.sim.step(5)
-        self.run = read_run(folder / "run.h5")
+        self.run = recorded(self.sim, folder / "run.h5", 2, 5)
         record_run(fall(), 0.05, folder / "grains.h5")
         self.grains = open_run(folder / "grains.h5")
-        ball = BallSimulation(Line())
-        record_run(ball, 0.1, folder / "planar.h5")
+        record_run(BallSimulation(Line()), 0.1, folder / "planar.h5")
         self.planar = open_run(folder / "planar.h5")
         disks = DiskSimulation(*disk_packing(6, width=0.2), walls=[(0.0, 0.0, 0.0, 1.0)])
         record_run(disks, 0.02, folder / "disks.h5", 50.0)
@@ -121,14 +115,8 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "run_out": {"run": w.grains, "tube": 0.1},
         "settle": {"sim": fall()},
         "settled_balls": {"count": 5, "width": 0.1, "depth": 0.1, "radius_min": 0.01, "radius_max": 0.012},
-        "settled_track": {
-            "length": 0.1,
-            "across": 0.1,
-            "layers": 1.0,
-            "tile": 0.1,
-            "radius_min": 0.02,
-            "radius_max": 0.025,
-        },
+        "settled_track": dict.fromkeys(("length", "across", "tile"), 0.1)
+        | {"layers": 1.0, "radius_min": 0.02, "radius_max": 0.025},
         "sieved_radii": {"count": 5, "diameters": [0.01, 0.02], "passing": [0.0, 1.0]},
         "silo": {"count": 5, "tube": 0.1, "hole": 0.05, "radius": 0.02},
         "slopes": {"run": w.grains},
@@ -153,13 +141,8 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "McapWriter": {"path": out / "a.mcap", "model": RoverModel(), "terrain": Plane()},
         "onnx_policy": {"policy": "anywhere"},
         "write_onnx": {"policy": "anywhere", "path": out / "a.onnx"},
-        "write_dataset": {
-            "name": "rover/test-v0",
-            "environment": "Rover-v0",
-            "make_policy": PDPolicy,
-            "seeds": [0],
-            "folder": out,
-        },
+        "write_dataset": {"name": "rover/test-v0", "environment": "Rover-v0", "make_policy": PDPolicy}
+        | {"seeds": [0], "folder": out},
         "write_fmu": {"simulation": w.sim, "path": out / "a.fmu"},
         "write_mcap": {"run": w.run, "path": out / "a.mcap"},
     }

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from refusals import refused
+from rovers import placed
 
 from rover_gym.core import (
     HeightField,
     OptionError,
     Plane,
-    RoverModel,
     Simulation,
     SphereField,
     TriangleMesh,
@@ -55,11 +55,7 @@ def test_from_one_place_many_rays_measure_a_slope() -> None:
 
 
 def test_a_simulation_sees_its_ground_and_its_own_parts_if_asked() -> None:
-    model = RoverModel()
-    simulation = Simulation(model)
-    q = np.zeros(model.nq)
-    q[:3] = 2.0, 1.0, -3.0
-    simulation.set_state(q)
+    simulation = placed(Simulation(), x=2.0, y=1.0, z=-3.0)
     x, _ = simulation.poses()["wheel_FL"]
     ahead = x + np.array([5.0, 0.0, 0.0])
     back = np.array([-1.0, 0.0, 0.0])
@@ -72,7 +68,7 @@ def test_a_simulation_sees_its_ground_and_its_own_parts_if_asked() -> None:
     assert abs(normal[0, 2]) == pytest.approx(1.0)
     missed, _ = simulation.cast_rays(aslant, towards, parts=True, without="wheel_FL")
     assert missed[0] > distance[0]
-    over = q[:3] - 3.0 * DOWN
+    over = simulation.q[:3] - 3.0 * DOWN
     trunk, _ = simulation.cast_rays(over, DOWN, parts=True)
     ground, _ = simulation.cast_rays(over, DOWN)
     assert trunk[0] < ground[0] == pytest.approx(4.0)

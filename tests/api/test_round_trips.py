@@ -18,7 +18,9 @@ import numpy as np
 import pytest
 from forged import sealed
 from hypothesis import HealthCheck, given, settings, strategies as st
+from recordings import recorded
 from refusals import refused
+from rovers import placed
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
 from rover_gym.core import (
@@ -33,7 +35,6 @@ from rover_gym.core import (
     TwoWheelRoverSimulation,
     disk_packing,
 )
-from rover_gym.record import Recorder, RoverSampler, describe, read_run
 
 quick = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 lengths = st.floats(-1e3, 1e3)
@@ -122,20 +123,14 @@ def test_a_welded_model_is_no_freer_after_a_file() -> None:
 def test_a_recorded_welded_rover_is_still_welded(tmp_path: Path) -> None:
     plane = Plane((-0.3, 1.0, 0.1), 0.02)
     sim = driven(Simulation(RoverModel().weld({"front_axle": 0.05, "left_bogie": 0.0}), plane))
-    sampler = RoverSampler(sim.model)
-    with Recorder(tmp_path / "run.h5", sampler.channels, describe(sim, "welded"), terrain=plane) as recorder:
-        recorder.append(sampler.row(sim))
-    run = read_run(tmp_path / "run.h5")
+    run = recorded(sim, tmp_path / "run.h5")
     assert run.model == sim.model
     assert run.model.nv == 19
-    assert isinstance(run.terrain, Plane)
     assert bits(run.terrain) == bits(plane)
 
 
 def driven(sim: Simulation) -> Simulation:
-    q = np.zeros(sim.model.nq)
-    q[1] = 0.4
-    sim.set_state(q)
+    placed(sim, y=0.4)
     sim.set_wheel_torques(np.linspace(5.0, 40.0, 6))
     return sim
 

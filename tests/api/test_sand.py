@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from equal_bits import bits
+from rovers import placed, with_fields
 
 from rover_gym.core import (
     HeightField,
@@ -16,6 +18,7 @@ from rover_gym.core import (
     Simulation,
     SoftGround,
     SphereField,
+    Terrain,
     TerrainError,
     Union,
 )
@@ -151,15 +154,8 @@ def test_a_fit_finds_the_soil_behind_synthetic_runs() -> None:
 
 def test_tables_are_converted_read_and_refused_by_line(tmp_path: Path) -> None:
     (tmp_path / "raw.csv").write_text("beta,vrim,v,Fx,Fy,Fz,z\n0,8,10,-1,0,20,0.01\n15,10,10,-2,7,20,0.012\n")
-    columns = [
-        "slip_angle_deg=beta",
-        "rim_speed_mm_s=vrim",
-        "speed_mm_s=v",
-        "drawbar_N=Fx",
-        "lateral_N=Fy*-1",
-        "load_N=Fz",
-        "sinkage_mm=z*1000",
-    ]
+    columns = ["slip_angle_deg=beta", "rim_speed_mm_s=vrim", "speed_mm_s=v", "drawbar_N=Fx", "lateral_N=Fy*-1"]
+    columns += ["load_N=Fz", "sinkage_mm=z*1000"]
     assert convert_runs(tmp_path / "raw.csv", tmp_path / "runs.csv", columns, "mine") == 2
     runs = read_runs(tmp_path / "runs.csv", {"mine": WHEEL})[0]
     assert runs.measured[1] == pytest.approx([-2.0, -7.0, 0.012])
@@ -176,25 +172,11 @@ def test_tables_are_converted_read_and_refused_by_line(tmp_path: Path) -> None:
 
 def test_a_matlab_file_of_structs_is_converted_as_its_authors_store_runs(tmp_path: Path) -> None:
     io = pytest.importorskip("scipy.io")
-    fields = [
-        ("beta", float),
-        ("Vry", float),
-        ("avg_Fx", float),
-        ("avg_Fy", float),
-        ("avg_Fz", float),
-        ("avg_Z", float),
-    ]
+    fields = [(name, float) for name in ("beta", "Vry", "avg_Fx", "avg_Fy", "avg_Fz", "avg_Z")]
     runs = np.array([(0.0, 8.0, 0.5, 1.0, -20.0, -10.0), (15.0, 12.0, -7.0, -2.0, -21.0, -12.0)], dtype=fields)
     io.savemat(tmp_path / "all.mat", {"all_results": runs, "note": "synthetic"})
-    columns = [
-        "slip_angle_deg=beta",
-        "rim_speed_mm_s=Vry",
-        "speed_mm_s=10",
-        "drawbar_N=avg_Fy*-1",
-        "lateral_N=avg_Fx*-1",
-        "load_N=avg_Fz*-1",
-        "sinkage_mm=avg_Z*-1",
-    ]
+    columns = ["slip_angle_deg=beta", "rim_speed_mm_s=Vry", "speed_mm_s=10", "drawbar_N=avg_Fy*-1"]
+    columns += ["lateral_N=avg_Fx*-1", "load_N=avg_Fz*-1", "sinkage_mm=avg_Z*-1"]
     assert convert_runs(tmp_path / "all.mat", tmp_path / "runs.csv", columns, "smooth") == 2
     read = read_runs(tmp_path / "runs.csv", {"smooth": WHEEL})[0]
     assert read.measured[1] == pytest.approx([2.0, 7.0, 0.012])
@@ -243,21 +225,18 @@ def test_slip_and_slope_of_a_processed_trial_are_read(tmp_path: Path) -> None:
 
 
 def wide_rover() -> RoverModel:
-    description = RoverModel.named("open-rover").to_dict()
-    for wheel in description["wheels"]:
-        wheel |= {"width": 0.08, "grouser_height": 0.005, "grousers": 24}
-    return RoverModel.from_dict(description)
+    return with_fields(RoverModel.named("open-rover"), wheels={"width": 0.08, "grouser_height": 0.005, "grousers": 24})
+
+
+def on_sand(ground: Terrain | list[Terrain], y: float = 0.245) -> Simulation:
+    return placed(Simulation(wide_rover(), ground, time_step=0.005), y=y)
 
 
 def test_a_rover_sinks_and_says_how_deep() -> None:
     soft = SoftGround(Plane(), named_soil("cmu-sand"))
-    sim = Simulation(wide_rover(), terrain=soft, time_step=0.005)
-    q = np.zeros(len(sim.q))
-    q[1] = 0.245
-    sim.set_state(q, np.zeros(len(sim.v)))
+    sim = on_sand(soft)
     sim.step(300)
     sand = sim.sand()
-    assert sand is not None
     assert sand["force"].shape == (6, 3)
     assert np.all(sand["sinkage"] > 5e-4)
     assert sand["force"][:, 1].sum() == pytest.approx(12.7 * 9.81, rel=0.02)
@@ -270,10 +249,7 @@ def test_a_rover_sinks_and_says_how_deep() -> None:
 
 def test_ruts_follow_the_wheels_and_snapshots_keep_them() -> None:
     rocks = SphereField(np.array([[5.0, 0.0, 5.0]]), np.array([0.2]))
-    sim = Simulation(wide_rover(), terrain=[SoftGround(Plane(), named_soil("cmu-sand")), rocks], time_step=0.005)
-    q = np.zeros(len(sim.q))
-    q[1] = 0.245
-    sim.set_state(q, np.zeros(len(sim.v)))
+    sim = on_sand([SoftGround(Plane(), named_soil("cmu-sand")), rocks])
     sim.set_wheel_torques(np.full(6, 1.0))
     sim.step(300)
     snapshot = sim.snapshot()
@@ -281,11 +257,7 @@ def test_ruts_follow_the_wheels_and_snapshots_keep_them() -> None:
     first = sim.sand()
     sim.restore(snapshot)
     sim.step(50)
-    second = sim.sand()
-    assert first is not None
-    assert second is not None
-    for name in first:
-        assert np.array_equal(first[name], second[name]), name
+    assert bits(sim.sand()) == bits(first)
     assert len(first["ruts"]) > 10
     assert np.all(first["ruts"][:, 2] > 0.0)
     assert np.unique(np.sign(first["ruts"][:, 1])).tolist() == [-1.0, 1.0]
@@ -299,15 +271,10 @@ def test_a_level_map_is_the_plane_and_a_tilted_one_a_slope() -> None:
         grounds = (Plane.tilted(math.atan(slope), 0.0), HeightField(heights, 0.2, origin=(-2.0, -2.0)))
         found = []
         for ground in grounds:
-            sim = Simulation(wide_rover(), terrain=SoftGround(ground, soil), time_step=0.005)
-            q = np.zeros(len(sim.q))
-            q[1] = 0.25
-            sim.set_state(q, np.zeros(len(sim.v)))
+            sim = on_sand(SoftGround(ground, soil), 0.25)
             sim.brake()
             sim.step(300)
-            sand = sim.sand()
-            assert sand is not None
-            found.append(sand["sinkage"])
+            found.append(sim.sand()["sinkage"])
         assert found[0] == pytest.approx(found[1], abs=3e-4)
 
 
@@ -378,3 +345,19 @@ def test_a_rover_slips_more_the_steeper_and_the_looser_the_sand() -> None:
         slip_on_slope(rover, named_soil("grc-1"), -0.1)
     with pytest.raises(RoverGymError, match="width: must be above 0"):
         with_wide_wheels(rover, 0.0)
+
+
+def test_options_are_off_and_belong_to_the_law_bekker() -> None:
+    soil = named_soil("dry-sand-bekker")
+    names = ("stress_angle", "stress_angle_slip", "slip_sinkage")
+    assert [soil.numbers[name] for name in names] == [0.0] * 3
+    plain, angle, with_slip, sinking = (
+        np.array(WHEEL.on(soil.having(**option)).steady(drives([0.0, 0.3], [0.0])))
+        for option in ({}, *({name: 0.3} for name in names))
+    )
+    np.testing.assert_allclose([with_slip[0], sinking[0]], [plain[0]] * 2, rtol=5e-3)
+    assert angle[0, 1] < 1.2 * plain[0, 1]
+    assert with_slip[1, 1] < 1.5 * plain[1, 1]
+    assert sinking[1, 0] > 1.2 * plain[1, 0]
+    with pytest.raises(OptionError, match="slip_sinkage: no number of the law resistive"):
+        named_soil("cmu-sand").having(slip_sinkage=0.1)

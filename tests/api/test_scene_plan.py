@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from refusals import refused
+from rovers import with_fields
 
 from rover_gym import (
     CommandError,
@@ -112,10 +113,7 @@ def test_nothing_is_welded_where_wheels_may_turn_by_themselves() -> None:
     lopsided = start.copy()
     lopsided[11] = 0.1  # the left bogie alone
     assert plan(straight(start=lopsided)).kind == "full"
-    description = RIGID.to_dict()
-    wheel = next(solid for solid in description["solids"] if solid["name"] == "wheel_ML")
-    wheel["position"] = [0.02, -0.15, 0.0]
-    trailing = plan(straight(model=RoverModel.from_dict(description)))
+    trailing = plan(straight(model=with_fields(RIGID, {"wheel_ML": {"position": [0.02, -0.15, 0.0]}})))
     assert trailing.kind == "full"
     assert "beside their steering axes" in trailing.decisions[1].reason
 
@@ -175,12 +173,10 @@ def test_the_planar_image_is_put_where_the_full_rover_is_on_a_diagonal() -> None
 def test_what_was_left_out_is_refused() -> None:
     rover = plan(straight()).rover()
     rover.set_steering(np.zeros(6))
-    with pytest.raises(CommandError, match="without steering") as steering:
+    with refused(CommandError, "steering", "without steering"):
         rover.set_steering([0.1, 0.1, 0.0, 0.0, 0.0, 0.0])
-    assert steering.value.field == "steering"
-    with pytest.raises(CommandError, match="equal torques") as torques:
+    with refused(CommandError, "torques", "equal torques"):
         rover.set_wheel_torques([10.0, 11.0, 10.0, 10.0, 10.0, 10.0])
-    assert torques.value.field == "torques"
     with pytest.raises(CommandError, match="6 numbers"):
         rover.set_wheel_torques([10.0] * 3)
     welded = plan(straight(), planar=False).rover()
@@ -206,10 +202,8 @@ def test_a_planar_rover_that_tips_over_says_so() -> None:
 def test_spheres_that_cannot_be_met_are_left_out() -> None:
     centres = np.array([[0.5, -0.3, 0.0], [2.0, 0.0, 0.0], [30.0, 0.0, 0.0]])
     field = SphereField(centres, [0.2, 0.1, 0.3], Plane())
-    assert isinstance(plan(Scene(field)).terrain, SphereField)
     assert len(plan(Scene(field)).terrain) == 2  # type: ignore[arg-type]
     near = plan(Scene(field, reach=5.0)).terrain
-    assert isinstance(near, SphereField)
     assert len(near) == 1
     flat = plan(Scene(field, reach=0.2))
     assert isinstance(flat.terrain, Plane)
@@ -285,7 +279,6 @@ def test_every_economy_is_measured_against_its_bound() -> None:
     economies = {e.name: e for e in measure_economies(plan(straight()), duration=2.0, repeats=1)}
     for name in ("steering welded, against the PD", "planar, against welded", "all of the model's"):
         economy = economies[name]
-        assert economy.bound is not None
         assert economy.error < economy.bound
         assert economy.before > 0.0
         assert economy.after > 0.0

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rovers import placed
 from torture.hostile import NO_NUMBERS, throw
 
 import rover_gym
@@ -344,10 +345,7 @@ def test_a_plane_of_a_huge_normal_is_still_ground() -> None:
     """The normal overflowed to zero: the solver converged, and there was no ground."""
     plane = Plane([1e308] * 3)
     np.testing.assert_allclose(plane.normal, np.sqrt(1.0 / 3.0), rtol=1e-15)
-    sim = Simulation(terrain=Plane([0.0, 1e308, 0.0]))
-    q = np.zeros(21)
-    q[1] = 0.35
-    sim.set_state(q)
+    sim = placed(Simulation(terrain=Plane([0.0, 1e308, 0.0])), y=0.35)
     assert sim.step().n_contacts == 6
 
 

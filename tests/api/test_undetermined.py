@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from rovers import placed, standing, with_fields
 from scipy.optimize import minimize
 
 from rover_gym.core import HeightField, Plane, RoverModel, Simulation
@@ -36,24 +37,17 @@ def table(places: Array) -> RoverModel:
 LEGS = np.array([[0.4, 0.4], [0.4, -0.4], [-0.4, 0.4], [-0.4, -0.4], [0.1, 0.05]])
 
 
-def placed(model: RoverModel, ground: Any, height: float, steps: int = 1, **options: Any) -> Simulation:
-    sim = Simulation(model, ground, **({"friction": 0.7} | options))
-    q = sim.q
-    q[1] = height
-    sim.set_state(q)
+def lying(model: RoverModel, ground: Any, height: float, steps: int = 1, **options: Any) -> Simulation:
+    sim = placed(Simulation(model, ground, **({"friction": 0.7} | options)), y=height)
     sim.step(steps)
     return sim
 
 
 def on_slope(share: float, **options: Any) -> Simulation:
     """The box flat on a slope, at rest."""
-    sim = Simulation(box(), slope(share), **({"friction": 0.7} | options))
-    q = sim.q
     angle = np.arctan(share)
-    q[:3] = -0.1 * np.sin(angle), 0.1 * np.cos(angle), 0.0
-    q[5] = angle
-    sim.set_state(q)
-    sim.step()
+    sim = Simulation(box(), slope(share), **({"friction": 0.7} | options))
+    placed(sim, x=-0.1 * np.sin(angle), y=0.1 * np.cos(angle), pitch=angle).step()
     return sim
 
 
@@ -84,8 +78,7 @@ def rigid_on_slope(solver: str = "auto", **options: Any) -> tuple[Simulation, An
     """Six rigid wheels parked across a slope."""
     ground = slope(0.1, 0.25)
     model = RoverModel().replace(wheel_stiffness=0.0)
-    sim = Simulation(model, ground, friction=0.8, solver=solver, **options)
-    sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.3))
+    sim = standing(model, ground, heading=0.3, friction=0.8, solver=solver, **options)
     return sim, sim.step(20)
 
 
@@ -105,8 +98,7 @@ def test_loads_do_not_depend_on_the_last_step() -> None:
     """A rover that had turned on the spot kept its squeeze when it was placed again as it stood."""
     ground = Plane()
     model = RoverModel()
-    sim = Simulation(model, ground, friction=0.7)
-    sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.0))
+    sim = standing(model, ground, friction=0.7)
     sim.set_wheel_torques([60.0, -60.0, 60.0, -60.0, 60.0, -60.0])
     sim.step(100)
     sim.set_wheel_torques([0.0] * 6)
@@ -126,8 +118,7 @@ def test_straight_over_waves_the_count_is_that_of_the_rank() -> None:
     model = RoverModel.named("open-rover").replace(wheel_stiffness=0.0)
     counts = []
     for surface in (Plane(), ground):
-        sim = Simulation(model, surface, friction=0.7, gravity=(0, -3.71, 0))
-        sim.set_state(model.resting_pose(surface, (0.0, 0.0), 0.0))
+        sim = standing(model, surface, friction=0.7, gravity=(0, -3.71, 0))
         sim.set_wheel_torques(0.05 * 3.71 * model.mass * model.wheel_radii / 6)
         for _ in range(60):
             count = sim.step().undetermined_loads
@@ -144,7 +135,7 @@ def test_straight_over_waves_the_count_is_that_of_the_rank() -> None:
 
 
 def test_a_box_shares_its_weight_like_four_equal_springs() -> None:
-    sim = placed(box(), Plane(), 0.1)
+    sim = lying(box(), Plane(), 0.1)
     W, _, _ = sim.last_problem()
     assert len(W) == 12
     assert np.linalg.matrix_rank(W) == 6
@@ -173,7 +164,7 @@ def test_a_box_on_a_slope_has_the_least_impulses_within_the_cones(share: float) 
 
 def loads_of_table(places: Array, order: Any = None, height: float = 0.15, **options: Any) -> Array:
     order = np.arange(len(places)) if order is None else np.asarray(order)
-    sim = placed(table(places[order]), Plane(), height, **options)
+    sim = lying(table(places[order]), Plane(), height, **options)
     points = sim.contacts.points[:, [0, 2]]
     impulses = sim.contacts.impulses
     assert len(impulses) == len(places)
@@ -193,7 +184,7 @@ def test_a_table_of_five_legs_has_the_loads_of_equal_springs_in_any_order() -> N
         assert np.abs(loads_of_table(LEGS, order) - found).max() < 1e-9 * 98.1
     mirrored = loads_of_table(LEGS * [1.0, -1.0])
     np.testing.assert_allclose(mirrored * [1.0, 1.0, -1.0], found, atol=1e-9 * 98.1)
-    assert placed(table(LEGS), Plane(), 0.15).step().undetermined_loads == 5
+    assert lying(table(LEGS), Plane(), 0.15).step().undetermined_loads == 5
     for solver in SOLVERS[1:]:
         assert np.abs(loads_of_table(LEGS, solver=solver) - found).max() < 1e-6 * 98.1
 
@@ -207,13 +198,13 @@ def test_the_loads_of_a_table_change_as_little_as_its_legs() -> None:
         assert change < 200.0 * size
 
 
+def cylinders() -> RoverModel:
+    return with_fields(RoverModel().replace(wheel_stiffness=0.0), wheels={"width": 0.08, "stiffness": 0.0})
+
+
 def test_both_ends_of_a_rigid_cylinder_share_its_load() -> None:
-    description = RoverModel().replace(wheel_stiffness=0.0).to_dict()
-    for wheel in description["wheels"]:
-        wheel.update(width=0.08, stiffness=0.0)
-    model = RoverModel.from_dict(description)
-    sim = Simulation(model, Plane(), friction=0.7)
-    sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    model = cylinders()
+    sim = standing(model, Plane(), friction=0.7)
     report = sim.step(20)
     forces = sim.contacts.impulses[:, 0] / sim.time_step
     assert len(forces) == 12
@@ -231,16 +222,10 @@ def test_both_ends_of_a_rigid_cylinder_share_its_load() -> None:
 
 def test_cylinders_that_fell_on_a_slope_bear_the_same_whatever_the_solver() -> None:
     """From the impact on, some solvers kept an answer with wheels wedged against each other that slipped aside."""
-    description = RoverModel().replace(wheel_stiffness=0.0).to_dict()
-    for wheel in description["wheels"]:
-        wheel.update(width=0.08, stiffness=0.0)
-    model, ground = RoverModel.from_dict(description), slope(0.1, 0.25)
-    start = model.resting_pose(ground, (0.0, 0.0), 0.3)
-    start[1] += 0.01
+    model, ground = cylinders(), slope(0.1, 0.25)
     forces = []
     for solver in SOLVERS:
-        sim = Simulation(model, ground, friction=0.8, solver=solver)
-        sim.set_state(start)
+        sim = standing(model, ground, heading=0.3, lift=0.01, friction=0.8, solver=solver)
         report = sim.step(40)
         assert report.status == "converged"
         assert report.undetermined_loads == 12
@@ -250,6 +235,5 @@ def test_cylinders_that_fell_on_a_slope_bear_the_same_whatever_the_solver() -> N
 
 def test_contacts_that_yield_are_determined() -> None:
     model = RoverModel.named("skid-steered")
-    sim = Simulation(model)
-    sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    sim = standing(model)
     assert sim.step(50).undetermined_loads == 0

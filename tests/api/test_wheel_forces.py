@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rovers import placed, standing
 
 from rover_gym.core import HeightField, Plane, RoverModel, Simulation, SphereField
 
@@ -19,26 +20,18 @@ NAMES = RoverModel.names()
 def caster(ahead: float, **tread: float) -> RoverModel:
     """A steered wheel on a straight rail, whose point of contact runs ahead of the steering axis."""
     turned = float(np.arctan2(ahead, RADIUS))
-    inertia = [1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0]
-    place = {"position": [0.0, 0.0, 0.0], "inertia": inertia}
+    axis = [float(np.sin(turned)), float(np.cos(turned)), 0.0]
+    place = {"position": [0.0, 0.0, 0.0], "inertia": [1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0]}
     solids: list[dict[str, Any]] = [
         place | {"name": "sled", "joint": "prismatic", "axis": [1.0, 0.0, 0.0], "mass": 5.0},
         place | {"name": "strut", "parent": "sled", "joint": "prismatic", "axis": [0.0, 1.0, 0.0], "mass": 1.0},
-        place
-        | {"name": "fork", "parent": "strut", "axis": [float(np.sin(turned)), float(np.cos(turned)), 0.0], "mass": 0.2},
+        place | {"name": "fork", "parent": "strut", "axis": axis, "mass": 0.2},
         {"name": "wheel", "parent": "fork", "position": [0.0, 0.0, 0.0], "axis": [0.0, 0.0, 1.0], "mass": 0.3},
     ]
     solids[2]["hold"] = {"stiffness": GAIN, "damping": DAMPING}
     solids[3]["shape"] = {"kind": "disc", "radius": RADIUS}
-    wheel = {
-        "name": "W",
-        "solid": "wheel",
-        "axle": [0.0, 0.0, 1.0],
-        "radius": RADIUS,
-        "torque_limit": 10.0,
-        "drive_sign": -1.0,
-    }
-    wheel |= {"steering": "fork", "steering_limit": 0.5}
+    wheel = {"name": "W", "solid": "wheel", "axle": [0.0, 0.0, 1.0], "radius": RADIUS}
+    wheel |= {"torque_limit": 10.0, "drive_sign": -1.0, "steering": "fork", "steering_limit": 0.5}
     return RoverModel.from_dict({"name": "caster", "solids": solids, "wheels": [wheel | tread]})
 
 
@@ -108,9 +101,8 @@ def test_a_steady_side_force_needs_its_slip_angle_and_a_parked_wheel_none() -> N
     """Side force = k_T sigma times the angle between the motion and the wheel's plane, at every step."""
     model = caster(0.0, **TREAD).replace(wheel_damping=1000.0)
     for step in (0.02, 0.005, 0.001):
-        sim = Simulation(model, time_step=step, friction=0.8)
         angle = 2e-3
-        sim.set_state([0.0, RADIUS, angle, 0.0], [0.3, 0.0, 0.0, -0.3 / RADIUS])
+        sim = rolling(model, 0.3, step, turned=angle)
         sim.set_steering([angle])
         sim.step(round(1.0 / step))
         slip, lateral = sim.q[2], sim.wheel_forces[0, 2]
@@ -127,9 +119,7 @@ def straight(
     model: RoverModel, gravity: float, step: float, duration: float, **options: Any
 ) -> tuple[np.ndarray, np.ndarray]:
     """Wheel forces (n, wheels, 3) and jolts |a|/g of a drive straight over waves that run across its way."""
-    ground = waves()
-    sim = Simulation(model, ground, friction=0.7, time_step=step, gravity=(0.0, -gravity, 0.0), **options)
-    sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.0))
+    sim = standing(model, waves(), friction=0.7, time_step=step, gravity=(0.0, -gravity, 0.0), **options)
     sim.set_wheel_torques(0.05 * gravity * model.mass * model.wheel_radii / len(model.wheel_radii))
     forces, jolts = [], []
     for _ in range(round(duration / step)):
@@ -152,9 +142,8 @@ def test_nothing_pushes_sideways_on_a_straight_way_over_waves(name: str, gravity
 @pytest.mark.parametrize("name", ["rover", "mars-rover", "open-rover"])
 def test_no_jolt_over_waves_is_missing_at_a_tenth_of_the_step(name: str) -> None:
     """When the squeeze of rigid wheels let go, the trunk jolted by 0.5 to 0.7 g."""
-    most = [
-        float(straight(RoverModel.named(name), 3.71, step, 1.5)[1][round(0.2 / step) :].max()) for step in (0.01, 0.001)
-    ]
+    model, steps = RoverModel.named(name), (0.01, 0.001)
+    most = [float(straight(model, 3.71, step, 1.5)[1][round(0.2 / step) :].max()) for step in steps]
     assert most[0] < 0.2
     assert most[0] <= most[1] + 0.01
 
@@ -165,9 +154,7 @@ def mirrored(model: RoverModel) -> list[int]:
     return [model.wheel_names.index(name.translate(other)) for name in model.wheel_names]
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in NAMES if name != "skid-steered"]
-)  # its mass centre is not in the middle
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "skid-steered"])  # its mass centre is to one side
 def test_mirrored_states_have_mirrored_forces(name: str) -> None:
     """On rigid wheels the sign of a rounding error decided which way they squeezed."""
     model, ground = RoverModel.named(name), waves()
@@ -178,8 +165,7 @@ def test_mirrored_states_have_mirrored_forces(name: str) -> None:
     angles = rng.uniform(-0.2, 0.2, (40, len(swap))) * steered
     found = []
     for sign in (1.0, -1.0):
-        sim = Simulation(model, ground, friction=0.7)
-        sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.0))
+        sim = standing(model, ground, friction=0.7)
         forces = []
         for torque, angle in zip(torques, angles, strict=True):
             order = slice(None) if sign > 0.0 else swap
@@ -204,9 +190,7 @@ def test_loads_are_the_same_whatever_solver_and_warm_start(name: str) -> None:
 
 def test_readings_across_a_rover_that_turns_over_waves_seldom_stand_at_the_limit() -> None:
     """In registered environments two thirds of the lateral readings stood at the limit of friction."""
-    model, ground = RoverModel.named("rover"), waves()
-    sim = Simulation(model, ground, friction=0.7)
-    sim.set_state(model.resting_pose(ground, (0.0, 0.0), 0.0))
+    sim = standing(RoverModel.named("rover"), waves(), friction=0.7)
     rng, at_limit = np.random.default_rng(0), []
     for _ in range(40):
         sim.set_commands(np.full(6, rng.uniform(10.0, 40.0)), rng.uniform(-0.1, 0.1) * np.array([1, 1, 0, -1, 0, -1]))
@@ -226,10 +210,9 @@ def test_wheels_that_are_thrown_onto_rocks_give_off_no_more_than_they_took(resti
         rocks = SphereField(rng.uniform((-2, -0.3, -2), (2, 0.1, 2), (40, 3)), rng.uniform(0.05, 0.3, 40), Plane())
         step = float(rng.choice([2e-3, 5e-3, 2e-2]))
         sim = Simulation(terrain=rocks, restitution=restitution, time_step=step, variant=variant)
-        q, v = np.zeros(sim.model.nq), np.zeros(sim.model.nv)
-        q[1], v[:6] = 1.0, rng.normal(0.0, 3.0, 6)
+        v = np.concatenate([rng.normal(0.0, 3.0, 6), np.zeros(sim.model.nv - 6)])
         v[1] = -1.0
-        sim.set_state(q, v)
+        placed(sim, v, y=1.0)
         most = sim.energy().total
         given = np.cumsum([sim.step().energy_released for _ in range(int(1.0 / step))])
         assert given.max() <= 1e-12 * most

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from browser.test_replay_page import start_browser
+from browser.test_replay_page import resize, start_browser
 from PIL import Image
 from selenium import webdriver
 
@@ -50,13 +50,7 @@ def main() -> None:
     width, height = (int(number) for number in options.size.split("x"))
     with tempfile.TemporaryDirectory() as profile:
         browser = start_browser(Path(profile))
-        size = {
-            "width": round(SHARPER * width),
-            "height": round(SHARPER * height),
-            "deviceScaleFactor": 1,
-            "mobile": False,
-        }
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        resize(browser, round(SHARPER * width), round(SHARPER * height))
         browser.get(options.page.resolve().as_uri())
         while not browser.find_elements("css selector", f"#presets [data-name={options.preset}]"):
             time.sleep(0.1)
@@ -66,15 +60,8 @@ def main() -> None:
         frames = [shown(browser, moment).resize((width, height), Image.Resampling.LANCZOS) for moment in moments]
         browser.quit()
     options.film.parent.mkdir(parents=True, exist_ok=True)
-    frames[0].save(
-        options.film,
-        save_all=True,
-        append_images=frames[1:],
-        duration=round(1000 / FPS),
-        loop=0,
-        quality=QUALITY,
-        method=6,
-    )
+    film = {"save_all": True, "append_images": frames[1:], "duration": round(1000 / FPS), "loop": 0}
+    frames[0].save(options.film, **film, quality=QUALITY, method=6)
 
 
 if __name__ == "__main__":

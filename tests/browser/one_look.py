@@ -11,10 +11,11 @@ from unittest import mock
 
 import numpy as np
 import numpy.typing as npt
-from browser.test_replay_page import frames, go_to, opened, picture
+from browser.test_replay_page import frames, go_to, opened, picture, resize
 from PIL import Image
+from rovers import standing
 
-from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
+from rover_gym import HeightField, Plane, RoverModel, SphereField, Terrain, Union
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.show.frames import FrameRenderer
 from rover_gym.show.frames.frame_renderer import VIEW_ANGLE
@@ -46,8 +47,7 @@ def grounds() -> dict[str, Terrain]:
 def both(terrain: Terrain, folder: Path) -> tuple[Picture, Picture]:
     """A drive at `MOMENT`, (height, width, 3) levels each: as a frame and on a page."""
     model = RoverModel()
-    sim = Simulation(model, terrain)
-    sim.set_state(model.resting_pose(terrain, (0.0, 0.0), 0.3))
+    sim = standing(model, terrain, heading=0.3)
     sim.set_wheel_torques(np.full(6, 25.0))
     sampler = RoverSampler(model)
     # Looked at from one place: then nothing hangs on how the two cameras follow.
@@ -71,8 +71,7 @@ def shown(run: RoverRun, camera: tuple[npt.NDArray[np.float64], npt.NDArray[np.f
     with mock.patch.object(rover_scene, "first_view", return_value=view):
         page = write_page(run, folder / "page.html", follow=False)
     with opened(page, folder / "profile") as browser:
-        size = {"width": WIDTH + PANEL, "height": HEIGHT, "deviceScaleFactor": 1, "mobile": False}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        resize(browser, WIDTH + PANEL, HEIGHT)
         go_to(browser, MOMENT)
         frames(browser, 3)
         return picture(browser)

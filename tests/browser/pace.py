@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 from browser.test_grain_page import MovingBalls
-from browser.test_replay_page import start_browser
+from browser.test_replay_page import resize, start_browser
 from rich.console import Console
 from rich.table import Table
+from rovers import standing
 
-from rover_gym import Plane, RoverModel, Simulation, SphereField, Terrain
+from rover_gym import Plane, RoverModel, SphereField, Terrain
 from rover_gym.record import read_run
 from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.replay import write_page
@@ -30,8 +31,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 def driven(folder: Path, terrain: Terrain, name: str) -> Path:
     """The page of a rover that drives straight on for ten seconds."""
-    sim = Simulation(RoverModel(), terrain)
-    sim.set_state(sim.model.resting_pose(terrain, (0.0, 0.0), 0.0))
+    sim = standing(RoverModel(), terrain)
     sim.set_wheel_torques(np.full(6, 15.0))
     record_run(sim, 10.0, folder / f"{name}.h5", 25.0)
     return write_page(read_run(folder / f"{name}.h5"), folder / f"{name}.html")
@@ -89,8 +89,7 @@ def pace(page: Path, seconds: float) -> tuple[float, float, float]:
     with tempfile.TemporaryDirectory() as profile:
         browser = start_browser(Path(profile))
         try:
-            metrics = {"width": SIZE[0], "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False}
-            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+            resize(browser, *SIZE)
             browser.get(page.as_uri())
             script = "return Number(document.querySelector('#root canvas').dataset[arguments[0]] || 0);"
             while browser.execute_script(script, "drawn") < 5:  # shaders are compiled, the first pieces unpacked

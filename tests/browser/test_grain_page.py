@@ -8,22 +8,26 @@ import pytest
 from balls import MovingBalls, RoverOnMovingBalls
 from browser.test_overlays import KEYS, after
 from browser.test_replay_page import (
+    LOADS,
     Shown,
     assert_alone,
     await_that,
+    changed,
     click_halfway,
     coarse,
+    errors,
     go_to,
-    opened,
+    grey,
+    headings,
     picture,
     play,
     readings,
+    showing,
     shown_load,
     slider,
 )
 from pages import held
 from selenium import webdriver
-from selenium.webdriver.common.by import By
 
 from rover_gym.record import GrainRun
 from rover_gym.record.saved_runs import open_run, record_run
@@ -66,10 +70,8 @@ const done = arguments[arguments.length - 1];
 def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[GrainRun]]:
     folder = tmp_path_factory.mktemp("grains")
     record_run(RoverOnMovingBalls(), 1.2, folder / "run.h5", 10.0, title="a rover & <balls>")
-    run = open_run(folder / "run.h5")
-    page = write_page(run, folder / "replay.html")
-    with opened(page, folder / "profile") as browser:
-        yield Shown(browser, run, page)
+    with showing(open_run(folder / "run.h5", GrainRun), folder) as shown:
+        yield shown
 
 
 def test_the_page_loads_without_errors_and_without_the_network(shown: Shown[GrainRun]) -> None:
@@ -104,9 +106,9 @@ def test_the_timeline_moves_balls_and_rover_and_comes_back(shown: Shown[GrainRun
     go_to(shown.browser, 0.25)
     back = still(shown.browser)
     paint(shown.browser, 0)
-    changed = (np.abs(later - first).max(axis=-1) > 15.0).mean()
-    assert changed > 0.03
-    assert (np.abs(back - first).max(axis=-1) > 15.0).mean() < 0.05 * changed
+    share = changed(later, first, 15.0).mean()
+    assert share > 0.03
+    assert changed(back, first, 15.0).mean() < 0.05 * share
 
 
 @pytest.mark.parametrize("name", ["forces", "mass", "trails", "loads"])
@@ -115,20 +117,15 @@ def test_a_key_shows_an_overlay_among_balls_and_takes_it_away(name: str, shown: 
     bare = still(shown.browser)
     with_it = after(shown.browser, KEYS[name])
     without = after(shown.browser, KEYS[name])
-    changed = (np.abs(coarse(with_it) - bare).max(axis=-1) > 10.0).sum()
-    assert changed > 3
-    assert (np.abs(coarse(without) - bare).max(axis=-1) > 10.0).sum() < 0.2 * changed
+    pixels = changed(coarse(with_it), bare, 10.0).sum()
+    assert pixels > 3
+    assert changed(coarse(without), bare, 10.0).sum() < 0.2 * pixels
 
 
 def test_what_means_nothing_among_balls_is_grey_and_says_why(shown: Shown[GrainRun]) -> None:
-    buttons = shown.browser.find_elements(By.CSS_SELECTOR, "#overlays button")
-    grey = {
-        button.get_attribute("data-name"): button.get_attribute("title")
-        for button in buttons
-        if not button.is_enabled()
-    }
-    assert grey.keys() == {"marks", "cones", "plan", "scan", "laser", "depth", "slope", "spheres"}
-    assert "balls" in str(grey["marks"])
+    reasons = grey(shown.browser)
+    assert reasons.keys() == {"marks", "cones", "plan", "scan", "laser", "depth", "slope", "spheres"}
+    assert "balls" in reasons["marks"]
 
 
 def still(browser: webdriver.Chrome) -> np.ndarray:
@@ -159,19 +156,13 @@ def test_layers_show_the_height_at_the_start(shown: Shown[GrainRun]) -> None:
     go_to(shown.browser, 0.2)
     layered = still(shown.browser)
     paint(shown.browser, 0)
-    assert (np.abs(layered - plain).max(axis=-1) > 15.0).mean() > 0.03
+    assert changed(layered, plain, 15.0).mean() > 0.03
 
 
 def test_the_curves_follow_the_timeline(shown: Shown[GrainRun]) -> None:
     browser, run = shown.browser, shown.run
-    assert run.model is not None
-    assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
-        f"wheel load, mean over {LOAD_TIME:g} s (N)",
-        "sinkage (mm)",
-        "energy (J)",
-        "contacts (1)",
-        "deepest overlap (% of a radius)",
-    ]
+    told = [LOADS, "sinkage (mm)", "energy (J)", "contacts (1)", "deepest overlap (% of a radius)"]
+    assert headings(browser) == told
     go_to(browser, float(run.time[7]) + 0.01)
     loads = run.mean(lambda run: run.wheel_forces[..., 1], LOAD_TIME)[7]
     pairs = zip(run.model.wheel_names, loads, strict=True)
@@ -194,18 +185,16 @@ def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: Shown[GrainRun]) -> No
     )
     go_to(browser, 0.1)
     near = still(browser)
-    assert (np.abs(near - far).max(axis=-1) > 15.0).mean() > 0.1
+    assert changed(near, far, 15.0).mean() > 0.1
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_holds_the_places_of_every_sample")
 def test_twenty_thousand_balls_cost_the_script_little(tmp_path: Path) -> None:
     """It took longer than a frame of 17 ms; as some additions a number it is 0.6 ms, of 50 000 balls less than 3."""
     record_run(MovingBalls((50, 10, 40), 0.01, 0.5), 0.4, tmp_path / "run.h5")
-    page = write_page(open_run(tmp_path / "run.h5"), tmp_path / "replay.html")
-    with opened(page, tmp_path / "profile") as browser:
-        took, addition = browser.execute_async_script(SAMPLE_TIMES)
-        severe = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
-    assert severe == []
+    with showing(open_run(tmp_path / "run.h5"), tmp_path) as shown:
+        took, addition = shown.browser.execute_async_script(SAMPLE_TIMES)
+        assert errors(shown.browser) == []
     assert 0.0 < took < 15.0 * addition  # 5 where nothing else runs
 
 

@@ -6,7 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from browser.test_replay_page import PATIENCE, await_that, frames, messages, picture, start_browser
+from browser.test_replay_page import (
+    PATIENCE,
+    await_that,
+    changed,
+    errors,
+    frames,
+    grey,
+    messages,
+    picture,
+    start_browser,
+)
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
@@ -71,17 +81,13 @@ def key(browser: webdriver.Chrome, kind: str, name: str) -> None:
     )
 
 
-def slide(browser: webdriver.Chrome, name: str, value: float) -> None:
+def slide(browser: webdriver.Chrome, name: str, value: float | str) -> None:
     browser.execute_script(
         "const slider = document.getElementById(arguments[0]); slider.value = arguments[1];"
         "for (const kind of ['input', 'change']) slider.dispatchEvent(new Event(kind, {bubbles: true}));",
         name,
         value,
     )
-
-
-def choose(browser: webdriver.Chrome, name: str, value: str) -> None:
-    slide(browser, name, value)  # type: ignore[arg-type]
 
 
 def press(browser: webdriver.Chrome, name: str) -> None:
@@ -155,40 +161,39 @@ def test_it_pauses_steps_goes_back_and_records(live: Live) -> None:
 
 
 def test_a_policy_drives_and_a_rock_falls_in_its_way(live: Live) -> None:
-    choose(live.browser, "driver", "scan")
+    slide(live.browser, "driver", "scan")
     await_that(lambda: live.loop.state.scene.driver == "scan", "the driver")
     distance = live.loop.state.distance_to_goal
     await_that(lambda: live.loop.state.distance_to_goal < distance - 1.0, "the way to the goal")
     world = live.loop.state.world
     key(live.browser, "keydown", "t")
     await_that(lambda: live.loop.state.world > world, "the rock")
-    choose(live.browser, "driver", "hand")
+    slide(live.browser, "driver", "hand")
     await_that(lambda: live.loop.state.scene.driver == "hand", "the driver")
 
 
 @pytest.mark.nightly("tests/browser/test_overlays.py::test_a_key_shows_an_overlay_and_takes_it_away")
 def test_overlays_show_what_the_rover_sees_and_those_of_a_planner_wait_for_one(live: Live) -> None:
-    grey = "return [...document.querySelectorAll('#overlays button:disabled')].map((one) => one.dataset.name).sort();"
     world = live.loop.state.world
     press(live.browser, "restart")  # away from the rock, which may fill the depth camera's picture
     await_that(lambda: live.loop.state.world > world, "the start")
     at_rest(live)
-    await_that(lambda: {"plan", "scan"} == set(live.browser.execute_script(grey)) - {"spheres"}, "what is grey by hand")
+    await_that(lambda: {"plan", "scan"} == set(grey(live.browser)) - {"spheres"}, "what is grey by hand")
     for letter in "cgzb":
         bare = picture(live.browser)
         key(live.browser, "keydown", letter)
         frames(live.browser, 6)
         # A sensor is asked for with the key, and its picture comes when it comes.
-        await_that(lambda: (np.abs(picture(live.browser) - bare).max(axis=-1) > 20.0).sum() > 50, letter)  # noqa: B023
+        await_that(lambda: changed(picture(live.browser), bare, 20.0).sum() > 50, letter)  # noqa: B023
         key(live.browser, "keydown", letter)
         frames(live.browser, 6)
     key(live.browser, "keydown", "p")
     said = "return document.getElementById('message').textContent;"  # it is soon hidden again
     await_that(lambda: "choose scan" in live.browser.execute_script(said), "the reason")
-    choose(live.browser, "driver", "scan")
-    await_that(lambda: not {"plan", "scan"} & set(live.browser.execute_script(grey)), "plan and scan")
-    choose(live.browser, "driver", "hand")
-    await_that(lambda: "plan" in live.browser.execute_script(grey), "the wheel")
+    slide(live.browser, "driver", "scan")
+    await_that(lambda: not {"plan", "scan"} & set(grey(live.browser)), "plan and scan")
+    slide(live.browser, "driver", "hand")
+    await_that(lambda: "plan" in grey(live.browser), "the wheel")
 
 
 def test_text_of_the_drive_is_shown_as_text(live: Live) -> None:
@@ -219,10 +224,10 @@ def test_another_rover_is_named_and_the_camera_comes_nearer(live: Live) -> None:
     canvas = live.browser.find_element(By.CSS_SELECTOR, "#root canvas")
     await_that(lambda: text(live.browser, "name") == "rover, driven by hand", "the rover's name")
     before = float(canvas.get_attribute("data-distance") or "nan")
-    choose(live.browser, "model", "open-rover")
+    slide(live.browser, "model", "open-rover")
     await_that(lambda: text(live.browser, "name").startswith("open-rover"), "the other rover's name")
     await_that(lambda: float(canvas.get_attribute("data-distance") or "nan") < 0.7 * before, "a nearer camera")
-    choose(live.browser, "model", "rover")
+    slide(live.browser, "model", "rover")
     await_that(lambda: text(live.browser, "name").startswith("rover,"), "the first rover's name")
     at_rest(live)
 
@@ -252,5 +257,4 @@ def test_nothing_leaves_the_machine_and_nothing_fails(live: Live) -> None:
     own = (live.server.address, live.server.address.replace("http", "ws", 1), "data:", "blob:", "chrome:")
     assert any(url.startswith(live.server.address) for url in asked)
     assert [url[:100] for url in asked if not url.startswith(own)] == []
-    severe = [entry["message"] for entry in live.browser.get_log("browser") if entry["level"] == "SEVERE"]
-    assert severe == []
+    assert errors(live.browser) == []

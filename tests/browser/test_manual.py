@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser.manual_pages import DOCS, build, printed
-from browser.test_replay_page import await_that, messages, start_browser
+from browser.test_replay_page import await_that, messages, resize, start_browser
 from PIL import Image
 from selenium import webdriver
 
@@ -85,14 +85,17 @@ def public_names() -> Iterator[tuple[str, Any]]:
             full = f"{room.__name__}.{name}"
             yield full, thing
             if isinstance(thing, type) and full != "rover_gym.envs.RoverArguments":  # its card has its table
-                bases = thing.__mro__[1:]
-                inherited = {one for base in bases for one in {**vars(base), **vars(base).get("__annotations__", {})}}
-                for member in {**vars(thing), **vars(thing).get("__annotations__", {})}:
+                inherited = {one for base in thing.__mro__[1:] for one in {**vars(base), **data(base)}}
+                for member in {**vars(thing), **data(thing)}:
                     if not member.startswith("_") and member not in inherited:
-                        is_data = member in vars(thing).get(
-                            "__annotations__", {}
-                        )  # a class as a value has no words here
+                        # A class as a value has no words here.
+                        is_data = member in data(thing)
                         yield f"{full}.{member}", None if is_data else inspect.getattr_static(thing, member, None)
+
+
+def data(of: type) -> dict[str, Any]:
+    """The members that a class annotates itself."""
+    return vars(of).get("__annotations__", {})
 
 
 def letters(text: str) -> str:
@@ -142,8 +145,7 @@ def test_no_page_is_wider_than_the_window(manual: Path, browser: webdriver.Chrom
     assert len(pages) > 40
     if not whole:
         pages = [manual / name for name in SAMPLE]
-    size = {"width": WIDTHS[device], "height": 844, "deviceScaleFactor": 1, "mobile": False}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    resize(browser, WIDTHS[device], 844)
     wide = {}
     for page in pages:
         browser.get(page.as_uri())

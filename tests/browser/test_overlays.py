@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser.test_replay_page import Shown, await_that, go_to, opened, picture
+from browser.test_replay_page import Shown, await_that, changed, errors, go_to, grey, opened, picture, showing
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from typer.testing import CliRunner
@@ -16,19 +16,8 @@ from rover_gym.record import RoverRun, read_run
 from rover_gym.show.replay import write_page
 from rover_gym.show.replay.page import player_file
 
-KEYS = {
-    "trails": "v",
-    "forces": "f",
-    "cones": "c",
-    "mass": "g",
-    "plan": "p",
-    "scan": "x",
-    "laser": "z",
-    "depth": "b",
-    "loads": "l",
-    "slope": "h",
-    "spheres": "k",
-}
+NAMES = ("trails", "forces", "cones", "mass", "plan", "scan", "laser", "depth", "loads", "slope", "spheres")
+KEYS = dict(zip(NAMES, "vfcgpxzblhk", strict=True))
 
 
 OTHER_KEY = pytest.mark.nightly("tests/browser/test_overlays.py::test_a_key_shows_an_overlay_and_takes_it_away")
@@ -48,10 +37,9 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[RoverRun]]
     folder = tmp_path_factory.mktemp("overlays")
     sees = ("--sensor", "laser", "--sensor", "depth")
     run = drive(folder / "run", "--difficulty", "1", "--policy", "scan", *sees)
-    page = write_page(run, folder / "replay.html")
-    with opened(page, folder / "profile") as browser:
-        go_to(browser, 1.0)
-        yield Shown(browser, run, page)
+    with showing(run, folder) as shown:
+        go_to(shown.browser, 1.0)
+        yield shown
 
 
 def press(browser: webdriver.Chrome, key: str) -> None:
@@ -78,9 +66,9 @@ def test_a_key_shows_an_overlay_and_takes_it_away(name: str, shown: Shown[RoverR
     bare = picture(shown.browser)
     with_it = after(shown.browser, KEYS[name])
     without = after(shown.browser, KEYS[name])
-    changed = (np.abs(with_it - bare).max(axis=-1) > 20.0).sum()
-    assert changed > 50
-    assert (np.abs(without - bare).max(axis=-1) > 20.0).sum() < 0.2 * changed
+    pixels = changed(with_it, bare, 20.0).sum()
+    assert pixels > 50
+    assert changed(without, bare, 20.0).sum() < 0.2 * pixels
 
 
 def test_the_help_names_the_key_of_every_overlay_and_escape_closes_it(shown: Shown[RoverRun]) -> None:
@@ -114,15 +102,12 @@ def test_what_a_run_does_not_hold_is_grey_and_says_why_and_a_ghost_drives_along(
     page = write_page(run, tmp_path / "replay.html", ghost=ghost)
     with opened(page, tmp_path / "profile") as browser:
         go_to(browser, 1.4)
-        grey = {}
-        for button in browser.find_elements(By.CSS_SELECTOR, "#overlays button"):
-            if not button.is_enabled():
-                grey[button.get_attribute("data-name")] = button.get_attribute("title")
-        assert grey.keys() == {"plan", "scan", "laser", "depth", "spheres"}
-        assert all(re.search("run|rocks|recorded", reason) for reason in grey.values()), grey
+        reasons = grey(browser)
+        assert reasons.keys() == {"plan", "scan", "laser", "depth", "spheres"}
+        assert all(re.search("run|rocks|recorded", reason) for reason in reasons.values()), reasons
         press(browser, "z")
         message = browser.find_element(By.ID, "message")
         await_that(lambda: "--sensor laser" in (message.text or ""), "the reason")
         dashed = browser.find_elements(By.CSS_SELECTOR, "#panel path.ghost")
         assert len(dashed) == len(browser.find_elements(By.CSS_SELECTOR, "#panel path.curve:not(.ghost)")) > 0
-        assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+        assert errors(browser) == []

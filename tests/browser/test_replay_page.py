@@ -14,13 +14,15 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 import pytest
 from PIL import Image
+from recordings import recorded
+from rovers import placed, standing
 from selenium import webdriver
 from selenium.common.exceptions import TimeoutException, WebDriverException
 from selenium.webdriver.common.by import By
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
 from rover_gym.ground.grains import rover_on_disks, settled_disks
-from rover_gym.record import DiskRun, Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.record import DiskRun, RoverRun
 from rover_gym.record.saved_runs import open_run, record_run
 from rover_gym.show.frames.appearance import GROUND_COLOUR, SKY_COLOUR, TRUNK_COLOUR
 from rover_gym.show.replay import write_page
@@ -30,6 +32,7 @@ from rover_gym.show.replay.rover_scene import WHEEL_NAMES
 R = TypeVar("R")
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
+LOADS = f"wheel load, mean over {LOAD_TIME:g} s (N)"
 PEAK = 1e5  # N, of an impact
 PATIENCE = 120.0  # s: without a GPU, on a busy machine, a frame takes seconds
 
@@ -79,20 +82,9 @@ def start_browser(profile: Path) -> webdriver.Chrome:
 
 def drive(path: Path, terrain: Terrain = ROCKS) -> RoverRun:
     """Two seconds over a few rocks, or over another ground, at 10 frames a second."""
-    sim = Simulation(RoverModel(), terrain)
-    q = np.zeros(sim.model.nq)
-    q[1] = 0.4
-    if terrain is not ROCKS:
-        q = sim.model.resting_pose(terrain, (0.0, 0.0), 0.0)
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), terrain), y=0.4) if terrain is ROCKS else standing(RoverModel(), terrain)
     sim.set_wheel_torques(np.full(6, 20.0))
-    sampler = RoverSampler(sim.model)
-    with Recorder(path, sampler.channels, describe(sim, "a drive over rocks"), terrain=sim.terrain) as recorder:
-        recorder.append(sampler.row(sim))
-        for _ in range(100):
-            sim.step(4)
-            recorder.append(sampler.row(sim))
-    run = read_run(path)
+    run = recorded(sim, path, 100, 4)
     run.trajectory["wheel_forces"][62, 0, 0] = PEAK  # between two frames of the page
     return run.resample(10.0)
 
@@ -100,8 +92,14 @@ def drive(path: Path, terrain: Terrain = ROCKS) -> RoverRun:
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[RoverRun]]:
     folder = tmp_path_factory.mktemp("page")
-    run = drive(folder / "run.h5")
-    page = write_page(run, folder / "replay.html")
+    with showing(drive(folder / "run.h5"), folder) as shown:
+        yield shown
+
+
+@contextmanager
+def showing(run: R, folder: Path) -> Iterator[Shown[R]]:
+    """A browser with the page of a run."""
+    page = write_page(run, folder / "replay.html")  # type: ignore[arg-type]
     with opened(page, folder / "profile") as browser:
         yield Shown(browser, run, page)
 
@@ -176,6 +174,33 @@ def picture(browser: webdriver.Chrome) -> np.ndarray:
     return image[y : y + height, x : x + width]
 
 
+def resize(browser: webdriver.Chrome, width: int, height: int) -> None:
+    """Gives the page this many CSS pixels."""
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def changed(one: np.ndarray, other: np.ndarray, level: float) -> np.ndarray:
+    """The pixels in which two pictures differ by more than a level of 255."""
+    return np.abs(one - other).max(axis=-1) > level
+
+
+def grey(browser: webdriver.Chrome) -> dict[str, str]:
+    """The overlays that cannot be chosen, with the reasons."""
+    buttons = browser.find_elements(By.CSS_SELECTOR, "#overlays button:disabled")
+    return {str(button.get_attribute("data-name")): str(button.get_attribute("title")) for button in buttons}
+
+
+def headings(browser: webdriver.Chrome) -> list[str]:
+    """What stands above the curves."""
+    return [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")]
+
+
+def errors(browser: webdriver.Chrome) -> list[str]:
+    """What the browser has reported as an error since the last call."""
+    return [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
 def messages(browser: webdriver.Chrome, method: str) -> list[dict[str, Any]]:
     found = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     return [message["params"] for message in found if message["method"] == method]
@@ -183,7 +208,7 @@ def messages(browser: webdriver.Chrome, method: str) -> list[dict[str, Any]]:
 
 def test_the_page_loads_without_errors_and_without_the_network(shown: Shown[RoverRun]) -> None:
     assert_alone(shown)
-    assert shown.browser.title == "a drive over rocks"
+    assert shown.browser.title == shown.run.title
 
 
 def assert_alone(shown: Shown[Any]) -> None:
@@ -193,8 +218,7 @@ def assert_alone(shown: Shown[Any]) -> None:
     inside = ("data:", "blob:", "chrome:", shown.page.as_uri())
     assert [url[:100] for url in asked if not url.startswith(inside)] == []
     assert messages(shown.browser, "Network.webSocketCreated") == []
-    severe = [entry for entry in shown.browser.get_log("browser") if entry["level"] == "SEVERE"]
-    assert severe == []
+    assert errors(shown.browser) == []
 
 
 def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown[RoverRun]) -> None:
@@ -224,12 +248,10 @@ def test_a_map_lies_under_the_rover_and_no_rock_floats_in_the_sky(tmp_path: Path
     """Rocks outside the displayed part of the map floated in the air."""
     field = HeightField.fractal(60.0, 0.25, 0.1, hurst=0.8, craters=0.02, crater_diameter=(1.0, 4.0), seed=3)
     rocks = SphereField.rocks(0.05, field.bounds, 1, ground=field, clear=[[0.0, 0.0, 1.5]])
-    page = write_page(drive(tmp_path / "run.h5", Union([field, rocks])), tmp_path / "replay.html")
-    with opened(page, tmp_path / "profile") as browser:
-        go_to(browser, 1.0)
-        image = picture(browser)
-        severe = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
-    assert severe == []
+    with showing(drive(tmp_path / "run.h5", Union([field, rocks])), tmp_path) as shown:
+        go_to(shown.browser, 1.0)
+        image = picture(shown.browser)
+        assert errors(shown.browser) == []
     red, _, blue = np.moveaxis(image, -1, 0)
     height = len(image)
     assert (red > blue + 20.0)[height // 2 :].mean() > 0.5  # the ground
@@ -244,10 +266,10 @@ def test_the_timeline_moves_the_rover(shown: Shown[RoverRun]) -> None:
     later = picture(shown.browser)
     go_to(shown.browser, 0.3)
     back = picture(shown.browser)
-    changed = (np.abs(later - first).max(axis=-1) > 30.0).mean()
-    assert changed > 0.05
-    assert (np.abs(again - first).max(axis=-1) > 30.0).mean() < 0.1 * changed  # paused, it stands still
-    assert (np.abs(back - first).max(axis=-1) > 30.0).mean() < 0.1 * changed  # and back in time it is as it was
+    share = changed(later, first, 30.0).mean()
+    assert share > 0.05
+    assert changed(again, first, 30.0).mean() < 0.1 * share  # paused, it stands still
+    assert changed(back, first, 30.0).mean() < 0.1 * share  # and back in time it is as it was
 
 
 def cursors(browser: webdriver.Chrome) -> list[float]:
@@ -268,11 +290,7 @@ def readings(browser: webdriver.Chrome) -> list[list[str]]:
 
 def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown[RoverRun]) -> None:
     browser, run = shown.browser, shown.run
-    assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
-        f"wheel load, mean over {LOAD_TIME:g} s (N)",
-        "wheel gap (mm)",
-        "speed (m/s)",
-    ]
+    assert headings(browser) == [LOADS, "wheel gap (mm)", "speed (m/s)"]
     assert len(browser.find_elements(By.CSS_SELECTOR, "#panel .curve")) == 13
     (canvas, *_) = browser.find_elements(By.CSS_SELECTOR, "#root canvas[data-engine]")
     panel = browser.find_element(By.ID, "panel")
@@ -284,17 +302,13 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown[
         go_to(browser, float(run.time[row] - run.time[0]) + 0.01)
         await_that(lambda row=row: f"{run.time[row] + 0.01:.2f} s of" in panel.text, "the panel's clock")
         positions.append(cursors(browser))
-        names = run.model.wheel_names
-        expected = []
-        for name, load in zip(names, np.round(loads[row]), strict=True):
-            expected += [*WHEEL_NAMES[name].split(), shown_load(load)]
+        pairs = zip(run.model.wheel_names, np.round(loads[row]), strict=True)
+        expected = [word for name, load in pairs for word in (*WHEEL_NAMES[name].split(), shown_load(load))]
         assert readings(browser)[0] == expected
     assert len(positions[0]) == 3
     # One impact must not flatten the other curves: the axis ends below it and notes that.
-    assert (
-        browser.find_element(By.CSS_SELECTOR, "#panel .peak").text
-        == f"beyond the scale: peak {float(f'{loads.max():.3g}'):g} N"
-    )
+    peak = browser.find_element(By.CSS_SELECTOR, "#panel .peak").text
+    assert peak == f"beyond the scale: peak {float(f'{loads.max():.3g}'):g} N"
     curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
     heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]
     assert min(heights) == pytest.approx(6.0, abs=0.1)  # the top
@@ -373,10 +387,8 @@ def disks_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown[Disk
     sim = rover_on_disks(bed)
     sim.set_torques([50.0, 50.0])
     record_run(sim, 0.5, folder / "disks.h5", 20.0, title="the rover on 150 disks")
-    run = open_run(folder / "disks.h5")
-    page = write_page(run, folder / "disks.html")
-    with opened(page, folder / "profile") as browser:
-        yield Shown(browser, run, page)
+    with showing(open_run(folder / "disks.h5", DiskRun), folder) as shown:
+        yield shown
 
 
 @pytest.mark.nightly("tests/browser/test_grain_page.py::test_the_page_loads_without_errors_and_without_the_network")
@@ -384,11 +396,7 @@ def test_a_page_of_disks_loads_alone_and_shows_rover_and_disks(disks_shown: Show
     assert_alone(disks_shown)
     browser = disks_shown.browser
     assert browser.title == "the rover on 150 disks"
-    assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
-        f"wheel load, mean over {LOAD_TIME:g} s (N)",
-        "sinkage (mm)",
-        "rim speed minus forward speed (mm/s)",
-    ]
+    assert headings(browser) == [LOADS, "sinkage (mm)", "rim speed minus forward speed (mm/s)"]
     red, green, blue = np.moveaxis(picture(browser), -1, 0)
     assert ((blue > red + 60.0) & (green < blue)).mean() > 0.002  # the body, blue
     assert (np.maximum(red, np.maximum(green, blue)) < 70.0).mean() > 0.002  # the tyres, black
@@ -410,9 +418,9 @@ def test_the_timeline_of_disks_moves_disks_chains_and_wheels_and_comes_back(disk
     back = picture(browser)
     red = [((image[..., 0] > image[..., 1] + 120.0) & (image[..., 2] < 90.0)).sum() for image in (first, later)]
     assert red[1] > red[0]  # no contact had borne anything at the start
-    changed = (np.abs(coarse(later) - coarse(first)).max(axis=-1) > 15.0).mean()
-    assert changed > 0.01
-    assert (np.abs(coarse(back) - coarse(first)).max(axis=-1) > 15.0).mean() < 0.1 * changed
+    share = changed(coarse(later), coarse(first), 15.0).mean()
+    assert share > 0.01
+    assert changed(coarse(back), coarse(first), 15.0).mean() < 0.1 * share
 
 
 def coarse(image: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Recordings that are damaged, forged, written twice or on a full disk: one error type, and no intact row lost."""
 
 import os
+import shutil
 import struct
 import subprocess
 import sys
@@ -10,11 +11,13 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from equal_bits import bits
 from forged import without_checksum
+from recordings import recorded
 from refusals import refused
 
 from rover_gym import RoverModel, Simulation
-from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
+from rover_gym.record import Channel, Recorder, RecordingError, read_run, read_trajectory
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
@@ -56,13 +59,8 @@ for i in range(25):
 @pytest.fixture(scope="session")
 def sound_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recorded run of the rover, 25 rows."""
-    sim = Simulation(RoverModel())
-    sampler = RoverSampler(sim.model)
     path = tmp_path_factory.mktemp("sound") / "run.h5"
-    with Recorder(path, sampler.channels, describe(sim, "a drop"), terrain=sim.terrain, rows_per_flush=10) as recorder:
-        for _ in range(25):
-            sim.step()
-            recorder.append(sampler.row(sim))
+    recorded(Simulation(RoverModel()), path, 24)
     return path
 
 
@@ -75,6 +73,12 @@ def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture
+def copied(sound_run: Path, tmp_path: Path) -> Path:
+    """A copy of the sound run that a test may damage."""
+    return Path(shutil.copy(sound_run, tmp_path / "run.h5"))
+
+
 def short_run(path: Path, rows: int = 5) -> Path:
     with Recorder(path, [TIME, POINT], {"title": "short"}) as recorder:
         for i in range(rows):
@@ -82,8 +86,11 @@ def short_run(path: Path, rows: int = 5) -> Path:
     return path
 
 
-def run_python(program: str, path: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=False)
+def printed_by(program: str, path: Path) -> str:
+    command = [sys.executable, "-c", program, str(path)]
+    child = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (child.returncode, child.stderr) == (0, "")
+    return child.stdout
 
 
 def refusal(path: Path) -> str:
@@ -102,7 +109,7 @@ def test_a_second_writer_is_refused_and_the_run_is_whole(tmp_path: Path) -> None
             recorder.append({"time": i})
         with pytest.raises(RecordingError, match="is in use"):
             Recorder(path, [TIME])
-        assert "is in use" in run_python(AGAIN, path).stdout
+        assert "is in use" in printed_by(AGAIN, path)
         recorder.append({"time": 4})
     assert read_trajectory(path)["time"].tolist() == [0, 1, 2, 3, 4]
     short_run(path, 2)  # now it is free
@@ -119,13 +126,10 @@ def test_a_run_that_is_being_recorded_says_so_to_its_reader(tmp_path: Path) -> N
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes")
 def test_a_full_disk_ends_with_an_error_of_ours_and_keeps_what_was_written(tmp_path: Path) -> None:
     """It ended in a segmentation fault when the interpreter closed the file. A limit of file sizes acts as a disk."""
-    child = subprocess.run(
-        [sys.executable, "-c", FULL, str(tmp_path / "run.h5")], capture_output=True, text=True, check=False
-    )
-    assert (child.returncode, child.stderr) == (0, "")
+    printed = printed_by(FULL, tmp_path / "run.h5")
     trajectory = read_trajectory(tmp_path / "run.h5")
     rows = len(trajectory["x"])
-    assert f"the recording stopped: File too large; {rows} rows are on the disk" in child.stdout
+    assert f"the recording stopped: File too large; {rows} rows are on the disk" in printed
     assert rows >= 500
     assert trajectory["x"][:, 3].tolist() == list(range(rows))
     assert not trajectory.attributes["complete"]
@@ -139,10 +143,7 @@ def test_what_is_no_file_is_not_recorded_to(place: str) -> None:
 
 
 def test_a_recorder_that_nobody_closed_leaves_what_was_flushed(tmp_path: Path) -> None:
-    child = subprocess.run(
-        [sys.executable, "-c", LEFT_OPEN, str(tmp_path / "run.h5")], capture_output=True, text=True, check=False
-    )
-    assert (child.returncode, child.stderr) == (0, "")
+    printed_by(LEFT_OPEN, tmp_path / "run.h5")
     assert len(read_trajectory(tmp_path / "run.h5")["time"]) == 20
 
 
@@ -323,14 +324,8 @@ def test_a_changed_number_is_told_by_its_checksum(sound_run: Path, tmp_path: Pat
 
 def same_runs(one: Any, other: Any) -> bool:
     """Whether two trajectories hold the same, to the bit."""
-    grounds = [repr(run.terrain) for run in (one, other)]
-    return (
-        one.attributes == other.attributes
-        and one.units == other.units
-        and one.data.keys() == other.data.keys()
-        and all(values.tobytes() == other.data[name].tobytes() for name, values in one.data.items())
-        and grounds[0] == grounds[1]
-    )
+    first, second = ([run.attributes, run.units, bits(run.data), repr(run.terrain)] for run in (one, other))
+    return first == second
 
 
 def test_a_flipped_bit_is_refused_or_changes_nothing(sound_run: Path, tmp_path: Path) -> None:
@@ -352,31 +347,25 @@ def test_a_flipped_bit_is_refused_or_changes_nothing(sound_run: Path, tmp_path: 
 
 
 @pytest.mark.parametrize("key", ["unit", "description", "columns"])
-def test_attributes_of_data_sets_have_a_checksum_too(key: str, sound_run: Path, tmp_path: Path) -> None:
-    path = tmp_path / "run.h5"
-    path.write_bytes(sound_run.read_bytes())
-    with h5py.File(path, "r+") as file:
+def test_attributes_of_data_sets_have_a_checksum_too(key: str, copied: Path) -> None:
+    with h5py.File(copied, "r+") as file:
         value = file["q"].attrs[key]
         file["q"].attrs[key] = np.bytes_(b"x" * 5) if key != "columns" else value[::-1]
-    assert "checksum: does not fit" in refusal(path)
+    assert "checksum: does not fit" in refusal(copied)
 
 
-def test_a_recording_of_version_3_is_still_read(sound_run: Path, tmp_path: Path) -> None:
-    path = tmp_path / "run.h5"
-    path.write_bytes(sound_run.read_bytes())
-    with h5py.File(path, "r+") as file:
+def test_a_recording_of_version_3_is_still_read(copied: Path) -> None:
+    with h5py.File(copied, "r+") as file:
         without_checksum(file)
-    trajectory = read_trajectory(path)
+    trajectory = read_trajectory(copied)
     assert trajectory.attributes["format_version"] == 3
     assert len(trajectory["time"]) == 25
 
 
-def test_a_later_version_without_its_checksum_is_refused(sound_run: Path, tmp_path: Path) -> None:
-    path = tmp_path / "run.h5"
-    path.write_bytes(sound_run.read_bytes())
-    with h5py.File(path, "r+") as file:
+def test_a_later_version_without_its_checksum_is_refused(copied: Path) -> None:
+    with h5py.File(copied, "r+") as file:
         del file.attrs["checksum"]
-    assert "checksum: does not fit" in refusal(path)
+    assert "checksum: does not fit" in refusal(copied)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes")
@@ -384,9 +373,8 @@ def test_a_full_disk_leaves_an_older_recording_as_it_was(tmp_path: Path) -> None
     """It was emptied before the first row was written."""
     path = tmp_path / "run.h5"
     before = short_run(path).read_bytes()
-    child = run_python(FULL, path)
-    assert (child.returncode, child.stderr) == (0, "")
-    assert f"{path}: the recording stopped: File too large; the earlier file is as it was" in child.stdout
+    reason = "the recording stopped: File too large; the earlier file is as it was"
+    assert f"{path}: {reason}" in printed_by(FULL, path)
     assert path.read_bytes() == before
     assert [one.name for one in tmp_path.iterdir()] == ["run.h5"]
 
@@ -414,36 +402,30 @@ def test_an_older_recording_stays_until_the_new_one_is_closed(tmp_path: Path) ->
         ("slip_ratio", np.zeros((25, 6)), "must have rows of shape"),
     ],
 )
-def test_data_that_do_not_fit_the_rover_are_refused(
-    name: str, values: np.ndarray, reason: str, sound_run: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.h5"
-    path.write_bytes(sound_run.read_bytes())
-    with h5py.File(path, "r+") as file:
+def test_data_that_do_not_fit_the_rover_are_refused(name: str, values: np.ndarray, reason: str, copied: Path) -> None:
+    with h5py.File(copied, "r+") as file:
         if name in file:
             del file[name]
         file[name] = values
         file[name].attrs["unit"] = np.bytes_(b"1")
         without_checksum(file)
     with pytest.raises(RecordingError, match=reason) as caught:
-        read_run(path)
+        read_run(copied)
     assert name in str(caught.value.field)
 
 
-def test_a_rover_or_a_ground_that_is_none_is_a_recording_error(sound_run: Path, tmp_path: Path) -> None:
-    path = tmp_path / "run.h5"
-    path.write_bytes(sound_run.read_bytes())
-    with h5py.File(path, "r+") as file:
+def test_a_rover_or_a_ground_that_is_none_is_a_recording_error(sound_run: Path, copied: Path) -> None:
+    with h5py.File(copied, "r+") as file:
         file.attrs.create("scene", np.bytes_(b'{"model": {"solids": 3}}'))
         without_checksum(file)
     with pytest.raises(RecordingError, match=r"scene\.model"):
-        read_run(path)
-    path.write_bytes(sound_run.read_bytes())
-    with h5py.File(path, "r+") as file:
+        read_run(copied)
+    shutil.copy(sound_run, copied)
+    with h5py.File(copied, "r+") as file:
         file["terrain/plane_normal"][...] = 0.0
         without_checksum(file)
     with pytest.raises(RecordingError, match="is not a valid ground"):
-        read_run(path)
+        read_run(copied)
 
 
 def test_a_run_that_lasts_for_ages_is_filmed_at_once(sound_run: Path) -> None:

@@ -1,13 +1,13 @@
 """`rover drive`: episodes from the command line."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
 from commands import error_of, output_of, rover
+from films import film_of
 
 from rover_gym.drive.comparison import ENDING
 from rover_gym.record import read_run, read_trajectory
@@ -121,7 +121,7 @@ def test_a_film_has_the_size_and_the_camera_that_are_asked_for(tmp_path: Path) -
         path = tmp_path / f"{name}.mp4"
         arguments = ("drive", "--time-limit", "0.2", "--film", str(path), "--size", "320x180", *options)
         assert rover(*arguments).exit_code == 0
-        frames[name] = last_frame(path)
+        frames[name] = film_of(path)[1][-1]
         assert frames[name].shape == (180, 320, 3)
     difference = np.abs(frames["plain"].astype(int) - frames["other"])
     assert difference.mean() > 10.0
@@ -137,17 +137,10 @@ def test_a_recorded_drive_is_filmed_afterwards_as_it_was_filmed_while_it_drove(t
     assert f"film: {after}" in output_of("replay", tmp_path, "--film", after, "--fps", "20")
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(after))
     assert frames == 11  # the start and ten steps
-    one, other = (last_frame(path, 960, 540)[90:].astype(int) for path in (during, after))  # below the caption
+    one, other = (film_of(path)[1][-1][90:].astype(int) for path in (during, after))  # below the caption
     assert one.std() > 20.0
     assert np.abs(one - other).mean() < 2.0
     assert (np.abs(one - other).max(axis=2) > 40).mean() < 0.002
-
-
-def last_frame(path: Path, width: int = 320, height: int = 180) -> np.ndarray:
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    pixels = subprocess.run([*command, "-"], capture_output=True, check=True).stdout
-    frames = np.frombuffer(pixels, np.uint8).reshape(-1, height, width, 3)
-    return frames[-1]
 
 
 @pytest.mark.parametrize(

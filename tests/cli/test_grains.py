@@ -1,14 +1,13 @@
 """`rover grains`, and what `rover replay` and `rover plot` make of its runs."""
 
 import csv
-import subprocess
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 import pytest
 from balls import MovingBalls, RoverOnMovingBalls
 from commands import error_of, output_of
+from films import film_of
 from matplotlib.image import imread
 
 from rover_gym.record.saved_runs import open_run, record_run
@@ -97,10 +96,8 @@ def test_the_slip_of_rolling_wheels_is_small(runs: dict[str, Path]) -> None:
 def test_a_run_is_filmed(name: str, runs: dict[str, Path], tmp_path: Path) -> None:
     film = tmp_path / "run.mp4"
     output_of("replay", runs[name], "--film", film, "--fps", "5")
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(film), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
-    pixels = subprocess.run(command, capture_output=True, check=True).stdout
-    frames = np.frombuffer(pixels, np.uint8).astype(int).reshape(-1, 540, 960, 3)
-    assert len(frames) == 6
+    frames = film_of(film)[1].astype(int)
+    assert frames.shape == (6, 540, 960, 3)
     assert (np.abs(frames[0] - frames[-1]).max(axis=-1) > 40).mean() > 0.002  # it moves
 
 

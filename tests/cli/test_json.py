@@ -38,9 +38,7 @@ def told(command: str, folder: Path) -> dict[str, Any]:
     result = rover(*shlex.split(command.format(to=folder)), "--json", COLUMNS="80")
     assert result.exit_code == 0, result.output
     assert result.stderr == ""
-    report = json.loads(result.stdout, parse_constant=pytest.fail)
-    assert isinstance(report, dict)
-    return report
+    return json.loads(result.stdout, parse_constant=pytest.fail)
 
 
 OTHER_LAB = pytest.mark.nightly("tests/cli/test_json.py::test_a_table_is_one_object_as_json")

@@ -28,21 +28,9 @@ rover = partial(commands.rover, "live")
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "sigterm"])
 def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(ending: signal.Signals, tmp_path: Path) -> None:
     """SIGTERM left a recording without rows."""
-    command = [
-        sys.executable,
-        "-c",
-        RUN,
-        "live",
-        "--port",
-        "0",
-        "--no-open",
-        "--output",
-        str(tmp_path),
-        "--policy",
-        "pd",
-    ]
+    options = ["--port", "0", "--no-open", "--output", str(tmp_path), "--policy", "pd"]
     process = subprocess.Popen(
-        command,
+        [sys.executable, "-c", RUN, "live", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -50,7 +38,6 @@ def test_it_serves_its_page_and_keeps_the_recording_when_it_is_ended(ending: sig
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads run yet
     )
     try:
-        assert process.stdout is not None
         line = process.stdout.readline()
         found = re.fullmatch(r"live: (http://127\.0\.0\.1:\d+) \(Ctrl-C ends the drive\)\n", line)
         assert found, line

@@ -9,8 +9,11 @@ import pygltflib
 import pytest
 from commands import error_of, output_of, rover
 from forged import without_checksum
+from models.test_colliders import box
+from recordings import recorded
+from rovers import standing
 
-from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh, Union
+from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh
 from rover_gym.ground.terrain_parts import parts_of, surfaces_of, triangles_of
 from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
 from rover_gym.show.replay.scenery import first_view, goal_parts, spheres, surfaces
@@ -30,7 +33,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_drive_on_a_map_is_recorded_with_its_ground(folder: Path) -> None:
     run = read_run(folder / "run" / "episode-0.h5")
     (surface,) = surfaces_of(run.terrain)
-    assert isinstance(surface, HeightField)
     np.testing.assert_array_equal(surface.grid, np.load(folder / "map.npy"))
     assert run.model.name == RoverModel.named("four-steered").name
     assert run.goal == (5.0, 1.0)
@@ -57,9 +59,8 @@ def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) ->
     env = RoverEnv(terrain=HeightField(np.zeros((21, 21)), 0.5), goal_distance=(2.0, 3.0))
     env.reset(seed=0)
     sampler, info = RoverSampler(env.model), {"termination": ""}
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(env.simulation, "off"), terrain=env.simulation.terrain
-    ) as tape:
+    facts, ground = describe(env.simulation, "off"), env.simulation.terrain
+    with Recorder(tmp_path / "run.h5", sampler.channels, facts, terrain=ground) as tape:
         while not info["termination"]:
             *_, info = env.step(np.float32([1.0] * 6 + [0.0] * 6))
             solver = info["solver"]
@@ -76,18 +77,9 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
     heights[3, 4] = np.nan
     field = HeightField(heights, (0.5, 0.25), (-7.0, -2.0))
     spheres = SphereField([[9.0, 0.0, 9.0]], [0.3])
-    mesh = TriangleMesh(
-        [[5.0, -1.0, -1.0], [7.0, -1.0, -1.0], [6.0, -1.0, 1.0], [6.0, 1.5, 0.0]],
-        [[0, 2, 3], [2, 1, 3], [1, 0, 3], [0, 1, 2]],
-    )
-    simulation = Simulation(RoverModel(), [field, spheres, mesh])
-    sampler = RoverSampler(simulation.model)
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(simulation, "parts"), terrain=simulation.terrain
-    ) as tape:
-        tape.append(sampler.row(simulation, residual=0.0, iterations=0))
-    terrain = read_run(tmp_path / "run.h5").terrain
-    assert isinstance(terrain, Union)
+    corners = [[5.0, -1.0, -1.0], [7.0, -1.0, -1.0], [6.0, -1.0, 1.0], [6.0, 1.5, 0.0]]
+    mesh = TriangleMesh(corners, [[0, 2, 3], [2, 1, 3], [1, 0, 3], [0, 1, 2]])
+    terrain = recorded(Simulation(RoverModel(), [field, spheres, mesh]), tmp_path / "run.h5").terrain
     kinds = {type(part): part for part in parts_of(terrain)}
     np.testing.assert_array_equal(kinds[HeightField].grid, field.grid)
     assert (kinds[HeightField].spacing, kinds[HeightField].origin) == (field.spacing, field.origin)
@@ -99,36 +91,23 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["map", "mesh", "spheres"])
 def test_a_recorded_drive_replays_with_its_materials(kind: str, tmp_path: Path) -> None:
     """The file alone makes the simulation again: the ground with its materials, and the laws of their pairs."""
-    box = [[x, y, z] for x in (-9.0, 9.0) for y in (-1.0, 0.0) for z in (-9.0, 9.0)]
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = [(a, b, c) for a, b, c, _ in sides] + [(a, c, d) for a, _, c, d in sides]
     pebbles = SphereField([[0.5, 0.0, 0.3], [0.9, 0.0, -0.3]], [0.05, 0.04], Plane(), material="chalk")
     grounds = {
         "map": HeightField(np.zeros((31, 31)), 1.0, material="ice"),
-        "mesh": TriangleMesh(box, faces, material="ice"),
+        "mesh": TriangleMesh(*box((-9.0, -1.0, -9.0), (9.0, 0.0, 9.0)), material="ice"),
         "spheres": [pebbles, SphereField([[5.0, -1.0, 5.0]], [1.0], material="ice")],
     }
     laws = {("wheel", "ice"): (0.02, 0.0), ("wheel", "chalk"): (0.1, 0.0), ("wheel", "ground"): (0.9, 0.0)}
-    simulation = Simulation(RoverModel.named("skid-steered"), grounds[kind], materials=laws)
-    simulation.set_state(simulation.model.resting_pose(simulation.terrain, (0.0, 0.0), 0.0))
-    sampler, torques = RoverSampler(simulation.model), np.full(4, 12.0)
-    simulation.set_wheel_torques(torques)
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(simulation, "slippery"), terrain=simulation.terrain
-    ) as tape:
-        for _ in range(20):
-            simulation.step(10)
-            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
-    run = read_run(tmp_path / "run.h5")
+    simulation = standing(RoverModel.named("skid-steered"), grounds[kind], materials=laws)
+    simulation.set_wheel_torques(np.full(4, 12.0))
+    run = recorded(simulation, tmp_path / "run.h5", 20, 10)
     assert [part.material for part in parts_of(run.terrain)] == [part.material for part in parts_of(simulation.terrain)]
     scene = run.trajectory.attributes["scene"]
-    again = Simulation(run.model, run.terrain, **run.trajectory.attributes["solver"])
-    again.set_state(scene["q"])
-    again.set_wheel_torques(scene["wheel_torques"])
-    plain = Simulation(run.model, run.terrain)
-    plain.set_state(scene["q"])
-    plain.set_wheel_torques(scene["wheel_torques"])
-    for q in run.trajectory["q"]:
+    again, plain = (Simulation(run.model, run.terrain, **own) for own in (run.trajectory.attributes["solver"], {}))
+    for sim in (again, plain):
+        sim.set_state(scene["q"])
+        sim.set_wheel_torques(scene["wheel_torques"])
+    for q in run.trajectory["q"][1:]:
         again.step(10)
         plain.step(10)
         np.testing.assert_array_equal(again.q, q)
@@ -142,11 +121,8 @@ def test_damaged_materials_are_refused(tmp_path: Path) -> None:
         ("sphere_centres", "counts", [-1, 2]),
         ("sphere_centres", "materials", np.bytes_(b"rock")),
     ):
-        field = HeightField(np.zeros((5, 5)), 1.0)
-        simulation = Simulation(RoverModel(), [field, SphereField([[0.0, 0.0, 0.0]], [0.1])])
-        sampler, path = RoverSampler(simulation.model), tmp_path / "damaged.h5"
-        with Recorder(path, sampler.channels, describe(simulation, "x"), terrain=simulation.terrain) as tape:
-            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+        ground, path = [HeightField(np.zeros((5, 5)), 1.0), SphereField([[0.0] * 3], [0.1])], tmp_path / "damaged.h5"
+        recorded(Simulation(RoverModel(), ground), path)
         with h5py.File(path, "r+") as file:
             file["terrain"][name].attrs[key] = value
             without_checksum(file)
@@ -160,21 +136,14 @@ def test_a_flat_map_is_not_taken_for_a_trap(tmp_path: Path) -> None:
     with Recorder(tmp_path / "flat.h5", [Channel("time", "s", "time")], terrain=flat, rows_per_flush=1) as tape:
         tape.append({"time": 0.0})
     terrain = read_trajectory(tmp_path / "flat.h5").terrain
-    assert isinstance(terrain, HeightField)
     assert terrain.shape == flat.shape
 
 
 def test_a_replay_shows_the_goal_on_the_ground_and_no_rock_beside_the_map_that_it_shows(tmp_path: Path) -> None:
     field = HeightField(np.full((81, 81), 2.0), 0.5)
     rocks = SphereField([[1.0, 2.0, 1.0], [15.0, 2.0, 15.0]], [0.1, 0.2])
-    simulation = Simulation(RoverModel.named("open-rover"), [field, rocks])
-    simulation.set_state(simulation.model.resting_pose(field, (0.0, 0.0), 0.0))
-    sampler, scene = RoverSampler(simulation.model), {"goal": (3.0, -1.0)}
-    with Recorder(
-        tmp_path / "run.h5", sampler.channels, describe(simulation, "goal", scene), terrain=simulation.terrain
-    ) as tape:
-        tape.append(sampler.row(simulation, residual=0.0, iterations=0))
-    run = read_run(tmp_path / "run.h5")
+    simulation = standing(RoverModel.named("open-rover"), [field, rocks])
+    run = recorded(simulation, tmp_path / "run.h5", scene={"goal": (3.0, -1.0)})
     pole, _ = goal_parts(run)
     assert pole.position[1] - 0.5 * pole.size[1] == pytest.approx(2.0)
     np.testing.assert_array_equal(spheres(run)[1], [0.1])
@@ -223,12 +192,8 @@ def test_a_scene_on_a_map_has_a_plan(folder: Path) -> None:
     assert "face" in parts["steering"]["reason"]
     assert "not the same left and right" in parts["base"]["reason"]
     assert "4 joints" in parts["steering"]["built"]
-    for given, named in (
-        (("--slope", "3"), "--slope"),
-        (("--start", "90", "0"), "--start"),
-        (("--model", "nobody"), "--model"),
-    ):
-        assert error_of("scene", *place, *given).startswith(f"error: {named}: ")
+    for given in (("--slope", "3"), ("--start", "90", "0"), ("--model", "nobody")):
+        assert error_of("scene", *place, *given).startswith(f"error: {given[0]}: ")
 
 
 def test_a_drive_off_the_map_names_its_option(folder: Path) -> None:

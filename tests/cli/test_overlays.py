@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from commands import error_of, output_of
 
-from rover_gym import Plane
-from rover_gym.cli import app
 from rover_gym.drive import ScanPolicy
 from rover_gym.ground.terrain_parts import heights_of, surfaces_of
 from rover_gym.record import RoverRun, read_run
@@ -17,21 +15,21 @@ from rover_gym.show.replay.overlays import NO_PLAN, NO_SCAN, sensor_of
 from rover_gym.show.replay.rover_scene import rover_scene
 
 
-def rover(*arguments: str) -> Result:
-    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
-
-
 def driven(folder: Path, *arguments: str) -> RoverRun:
-    result = rover("drive", "--time-limit", "1", "--seed", "3", "--output", str(folder), *arguments)
-    assert result.exit_code == 0, result.output
+    output_of("drive", "--time-limit", "1", "--seed", "3", "--output", folder, *arguments)
     return read_run(folder / "episode-3.h5")
+
+
+def in_the_world(q: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Places x, z, m, of points ahead of and to the right of the rover."""
+    sine, cosine = math.sin(q[4]), math.cos(q[4])
+    return q[[0, 2]] + points @ [[cosine, -sine], [sine, cosine]]
 
 
 def test_a_laser_over_a_plane_measures_what_its_height_and_angle_say(tmp_path: Path) -> None:
     run = driven(tmp_path, "--sensor", "laser", "--sensor", "depth", "--heading", "0")
     sensor = sensor_of("laser", run.model)
     along = sensor.directions.reshape(-1, 3)
-    assert isinstance(run.terrain, Plane)
     for row in (0, 10, 20):
         turn = run.rotations[row, 0]
         height = (run.positions[row, 0] + turn @ np.array(sensor.mount.position))[1]
@@ -62,14 +60,12 @@ def test_the_scans_points_lie_on_the_ground_and_the_plan_is_one_of_the_arcs(tmp_
     grid = np.reshape(page.arrays["scan-grid"][1], (-1, 2))
     assert channels["scan"].shape == (run.n_frames, len(grid), 1)
     q = run.trajectory["q"][10]
-    sine, cosine = math.sin(q[4]), math.cos(q[4])
-    x, z = q[0] + cosine * grid[:, 0] + sine * grid[:, 1], q[2] - sine * grid[:, 0] + cosine * grid[:, 1]
-    assert channels["scan"][10, :, 0] == pytest.approx(heights_of(run.terrain, np.column_stack((x, z))))
+    assert channels["scan"][10, :, 0] == pytest.approx(heights_of(run.terrain, in_the_world(q, grid)))
     assert page.facts["missing"].keys() == {"laser", "depth"}
     assert page.facts["friction"] == 0.7
-    levels = np.array([channel.levels(slice(10, 11)) for channel in page.channels if channel.name == "mass"])
     (mass,) = (channel for channel in page.channels if channel.name == "mass")
-    assert levels.reshape(3) * mass.step + mass.low == pytest.approx(run.model.tags(q)["centre_of_mass"], abs=1e-4)
+    centre = np.reshape(mass.levels(slice(10, 11)), 3) * mass.step + mass.low
+    assert centre == pytest.approx(run.model.tags(q)["centre_of_mass"], abs=1e-4)
 
 
 def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
@@ -82,16 +78,11 @@ def test_the_plan_lies_on_the_heights_of_the_ground(tmp_path: Path) -> None:
     (field,) = surfaces_of(run.terrain)
     for row in (1, 20):
         q = run.trajectory["q"][row]
-        sine, cosine = math.sin(q[4]), math.cos(q[4])
         for points, heights in (
             (channels["path"][row, :, :2], channels["path"][row, :, 2]),
             (arcs, channels["arc-heights"][row, :, 0]),
         ):
-            x, z = (
-                q[0] + cosine * points[:, 0] + sine * points[:, 1],
-                q[2] - sine * points[:, 0] + cosine * points[:, 1],
-            )
-            assert heights == pytest.approx(field.heights(np.column_stack((x, z))))
+            assert heights == pytest.approx(field.heights(in_the_world(q, points)))
             assert np.ptp(heights) > 0.02
     assert channels["path"][0].tolist() == [[-1e5, -1e5, pytest.approx(run.trajectory["q"][0, 1])]] * 13
 
@@ -118,16 +109,14 @@ def test_what_a_run_does_not_hold_has_a_reason(tmp_path: Path) -> None:
 
 
 def test_an_unknown_sensor_is_refused_before_driving(tmp_path: Path) -> None:
-    result = rover("drive", "--sensor", "sonar", "--output", str(tmp_path / "run"))
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: --sensor: must be one of laser, depth")
+    error = error_of("drive", "--sensor", "sonar", "--output", tmp_path / "run")
+    assert error.startswith("error: --sensor: must be one of laser, depth")
     assert not (tmp_path / "run").exists()
 
 
 def test_a_ghost_drives_along_and_stays_where_it_ended(tmp_path: Path) -> None:
     first = driven(tmp_path / "a", "--difficulty", "0.5")
-    other = rover("drive", "--time-limit", "0.5", "--seed", "4", "--output", str(tmp_path / "b"))
-    assert other.exit_code == 0
+    output_of("drive", "--time-limit", "0.5", "--seed", "4", "--output", tmp_path / "b")
     ghost = read_run(tmp_path / "b" / "episode-4.h5")
     scene = rover_scene(first, follow=True, ghost=ghost)
     n = len(first.model.solid_names)
@@ -140,17 +129,15 @@ def test_a_ghost_drives_along_and_stays_where_it_ended(tmp_path: Path) -> None:
     assert chart["values"][1][5] is not None
     assert chart["values"][1][-1] is None  # it was over by then
     page = tmp_path / "page.html"
-    given = [str(tmp_path / "a"), "--ghost", str(tmp_path / "b"), "--html", str(page), "--no-open"]
-    assert rover("replay", *given).exit_code == 0
+    output_of("replay", tmp_path / "a", "--ghost", tmp_path / "b", "--html", page, "--no-open")
     assert page.stat().st_size > 100_000
 
 
 def test_a_ghost_beside_something_else_is_refused(tmp_path: Path) -> None:
-    assert rover("planar", "ball", "--duration", "0.1", "--output", str(tmp_path)).exit_code == 0
+    output_of("planar", "ball", "--duration", "0.1", "--output", tmp_path)
     driven(tmp_path / "rover")
-    result = rover("replay", str(tmp_path / "ball.h5"), "--ghost", str(tmp_path / "rover"), "--no-open")
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: --ghost: can only drive beside a rover's run")
+    error = error_of("replay", tmp_path / "ball.h5", "--ghost", tmp_path / "rover", "--no-open")
+    assert error.startswith("error: --ghost: can only drive beside a rover's run")
 
 
 def test_the_arcs_of_a_policy_begin_at_the_middle_of_its_wheelbase_and_fan_out() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import error_of, output_of
+from rovers import with_fields
 
 from rover_gym import HeightField, RoverModel, Simulation
 from rover_gym.cli.paths import Into, check_paths
@@ -119,9 +120,8 @@ def test_names_that_differ_by_case_are_compared_as_the_file_system_does(
 
 
 def test_what_is_checked_leaves_nothing_behind(tmp_path: Path) -> None:
-    check_paths(
-        {"the model": "rover"}, film=tmp_path / "new" / "film.mp4", output=Into(tmp_path / "deep" / "er", ("a",))
-    )
+    output = Into(tmp_path / "deep" / "er", ("a",))
+    check_paths({"the model": "rover"}, film=tmp_path / "new" / "film.mp4", output=output)
     assert not list(tmp_path.iterdir())
 
 
@@ -219,8 +219,7 @@ def test_an_error_on_the_way_leaves_the_older_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["a\x01b", "a\x0cb", "\ufffe"])
 def test_a_name_that_xml_cannot_hold_is_refused(name: str, tmp_path: Path) -> None:
     """A control character in a name made invalid XML."""
-    description = RoverModel.named("skid-steered").to_dict() | {"name": name}
-    model = RoverModel.from_dict(description)
+    model = with_fields(RoverModel.named("skid-steered"), name=name)
     for write in (model.to_urdf, model.to_mjcf):
         with pytest.raises(ModelError, match="must not hold the character"):
             write(tmp_path / "robot.xml")

@@ -1,8 +1,6 @@
 """Trajectory files: they describe themselves and survive a kill."""
 
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -16,16 +14,6 @@ from rover_gym.record.steady_file import SteadyFile
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
-
-KILLED = """
-import os, signal, sys
-from rover_gym.record import Channel, Recorder
-
-recorder = Recorder(sys.argv[1], [Channel("time", "s", "time")], {"title": "to be killed"}, rows_per_flush=10)
-for i in range(57):
-    recorder.append({"time": i})
-os.kill(os.getpid(), signal.SIGKILL)
-"""
 
 
 def test_rows_come_back_with_units_and_attributes(tmp_path: Path) -> None:
@@ -59,16 +47,6 @@ def test_every_data_set_of_a_simulation_says_what_it_is(tmp_path: Path) -> None:
         assert file["q"].attrs["columns"].astype(str).tolist() == sim.model.dof_names
         for name in ("rover_gym_version", "numpy_version", "python_version"):
             assert file.attrs[name]
-
-
-def test_a_killed_run_keeps_what_it_had(tmp_path: Path) -> None:
-    path = tmp_path / "killed.h5"
-    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
-    assert done.returncode == -signal.SIGKILL
-    trajectory = read_trajectory(path)
-    assert np.array_equal(trajectory["time"], np.arange(50.0))
-    assert not trajectory.attributes["complete"]
-    assert trajectory.attributes["title"] == "to be killed"
 
 
 def test_an_interrupt_waits_for_the_rows_that_are_being_written(

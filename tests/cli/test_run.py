@@ -1,54 +1,26 @@
 """Saved runs, read back with their rover and ground."""
 
-import signal
 import struct
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from commands import error_of, output_of
-from typer.testing import CliRunner
+from recordings import killed_run, recorded
+from rovers import placed
 
 from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
-from rover_gym.cli import app
 from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
 from rover_gym.record.saved_runs import record_run
 from rover_gym.scenes import inclined_plane, sphere_rug
 from rover_gym.scenes.report_scenes import GRAVITY, WHEEL_RADIUS, distance_to_siconos, reference_data
 from rover_gym.show.replay.rover_scene import rover_curves, rover_scene
 
-KILLED = """
-import os, signal, sys
-from rover_gym.scenes import inclined_plane
-from rover_gym.record import Recorder, RoverSampler, describe
-
-sim = inclined_plane.simulation()
-sampler = RoverSampler(sim.model)
-recorder = Recorder(
-    sys.argv[1], sampler.channels, describe(sim, "to be killed"), terrain=sim.terrain, rows_per_flush=10
-)
-for _ in range(57):
-    sim.step()
-    recorder.append(sampler.row(sim))
-os.kill(os.getpid(), signal.SIGKILL)
-"""
-
-
-def record(sim: Simulation, path: Path, steps: int = 20) -> Path:
-    sampler = RoverSampler(sim.model)
-    with Recorder(path, sampler.channels, describe(sim, "a test"), terrain=sim.terrain) as recorder:
-        recorder.append(sampler.row(sim))
-        for _ in range(steps):
-            sim.step()
-            recorder.append(sampler.row(sim))
-    return path
-
 
 def test_poses_are_those_of_the_simulation(tmp_path: Path) -> None:
     sim = inclined_plane.simulation()
-    run = read_run(record(sim, tmp_path / "run.h5"))
+    run = recorded(sim, tmp_path / "run.h5", 20)
     assert run.n_frames == 21
     assert run.positions.shape == (21, 16, 3)
     assert run.rotations.shape == (21, 16, 3, 3)
@@ -65,7 +37,7 @@ def test_poses_are_those_of_the_simulation(tmp_path: Path) -> None:
 
 def test_the_wheels_recorded_gaps_are_those_over_the_ground_that_is_read(tmp_path: Path) -> None:
     for name, sim in (("plane", inclined_plane.simulation()), ("rug", sphere_rug.simulation())):
-        run = read_run(record(sim, tmp_path / f"{name}.h5"))
+        run = recorded(sim, tmp_path / f"{name}.h5", 20)
         for q, gaps in zip(run.trajectory["q"], run.trajectory["wheel_gaps"], strict=True):
             assert run.model.wheel_gaps(q, run.terrain, "state") == pytest.approx(gaps, abs=1e-12)
 
@@ -73,7 +45,7 @@ def test_the_wheels_recorded_gaps_are_those_over_the_ground_that_is_read(tmp_pat
 @pytest.mark.parametrize("terrain", ["plane", "rocks"])
 def test_an_episode_is_read_back_with_its_goal(terrain: str, tmp_path: Path) -> None:
     arguments = ["drive", "--terrain", terrain, "--goal", "5", "1", "--time-limit", "1", "--output", str(tmp_path)]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
+    output_of(*arguments)
     run = read_run(tmp_path / "episode-0.h5")
     assert run.goal == (5.0, 1.0)
     assert isinstance(run.terrain, Plane if terrain == "plane" else SphereField)
@@ -90,10 +62,8 @@ def test_both_sections_of_the_report_are_read_back(tmp_path: Path) -> None:
 
 def test_a_killed_run_is_read_back_as_far_as_it_came(tmp_path: Path) -> None:
     path = tmp_path / "killed.h5"
-    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
-    assert done.returncode == -signal.SIGKILL
-    run = read_run(path)
-    assert run.n_frames == 50
+    run = killed_run(path)
+    assert (run.n_frames, run.title) == (50, "to be killed")
     assert not run.trajectory.attributes["complete"]
     sim = inclined_plane.simulation()
     sim.step(50)
@@ -108,7 +78,7 @@ def test_a_killed_run_is_read_back_as_far_as_it_came(tmp_path: Path) -> None:
 
 
 def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None:
-    run = read_run(record(inclined_plane.simulation(), tmp_path / "run.h5", steps=100))  # 0.5 s at 200 samples a second
+    run = recorded(inclined_plane.simulation(), tmp_path / "run.h5", 100)  # 0.5 s at 200 samples a second
     film = run.resample(30.0)
     assert film.n_frames == 16
     assert np.abs(film.time - np.arange(16) / 30.0).max() <= 0.0025 + 1e-12
@@ -121,10 +91,7 @@ def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None
 
 
 def dropped_rover() -> Simulation:
-    sim = Simulation(RoverModel(), Plane(), time_step=0.002)
-    q = np.zeros(sim.model.nq)
-    q[1] = 0.6
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), Plane(), time_step=0.002), y=0.6)
     sim.set_wheel_torques(np.full(6, 15.0))
     return sim
 
@@ -157,20 +124,17 @@ def test_a_run_without_rover_ground_or_samples_is_refused(tmp_path: Path) -> Non
     sim = Simulation(RoverModel())
     sampler = RoverSampler(sim.model)
 
-    def refusal(path: Path) -> str:
-        with pytest.raises(RecordingError) as caught:
-            read_run(path)
-        return str(caught.value)
-
-    with Recorder(tmp_path / "a.h5", sampler.channels, {"title": "no model"}, terrain=sim.terrain) as recorder:
-        recorder.append(sampler.row(sim))
-    assert "contains no rover" in refusal(tmp_path / "a.h5")
-    with Recorder(tmp_path / "b.h5", sampler.channels, describe(sim, "no ground")) as recorder:
-        recorder.append(sampler.row(sim))
-    assert "contains no ground" in refusal(tmp_path / "b.h5")
-    with Recorder(tmp_path / "c.h5", sampler.channels, describe(sim, "no samples"), terrain=sim.terrain):
-        pass
-    assert "contains no samples" in refusal(tmp_path / "c.h5")
+    whole = describe(sim, "whole")
+    for what, facts, terrain, rows in (
+        ("rover", {"title": "no model"}, sim.terrain, 1),
+        ("ground", whole, None, 1),
+        ("samples", whole, sim.terrain, 0),
+    ):
+        with Recorder(tmp_path / f"{what}.h5", sampler.channels, facts, terrain=terrain) as recorder:
+            for _ in range(rows):
+                recorder.append(sampler.row(sim))
+        with pytest.raises(RecordingError, match=f"contains no {what}"):
+            read_run(tmp_path / f"{what}.h5")
 
 
 FIGURES = (

@@ -2,16 +2,16 @@
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
-import numpy as np
 from artists import covered
+from commands import error_of, output_of
 from matplotlib.figure import Figure
-from typer.testing import CliRunner
+from rovers import placed
 
 from rover_gym import Plane, RoverModel, Simulation
-from rover_gym.cli import app
 from rover_gym.cli.console import figure, tidy
 from rover_gym.core import SoftGround
 from rover_gym.ground.sand import named_soil, with_wide_wheels
@@ -23,13 +23,7 @@ from rover_gym.show.figures.style import STYLE
 from rover_gym.show.frames.appearance import SAND_GROUND
 from rover_gym.show.replay.rover_scene import rover_curves, rover_scene
 
-RUNNER = CliRunner()
-
-
-def run(*words: str) -> str:
-    result = RUNNER.invoke(app, ["sand", *words])
-    assert result.exit_code == 0, result.output
-    return result.output
+run = partial(output_of, "sand")
 
 
 def test_soils_and_runs_are_listed() -> None:
@@ -72,10 +66,7 @@ def test_the_pull_of_a_rovers_wheel_is_drawn_with_soil_and_rover_in_the_title(tm
 def test_a_run_on_sand_shows_sinkage_and_the_colours_of_sand(tmp_path: Path) -> None:
     """The page of a rover on sand had gaps below zero, on red ground."""
     description = with_wide_wheels(RoverModel.named("open-rover"))
-    sim = Simulation(description, SoftGround(Plane(), named_soil("cmu-sand")), time_step=0.005)
-    q = np.zeros(len(sim.q))
-    q[1] = 0.245
-    sim.set_state(q)
+    sim = placed(Simulation(description, SoftGround(Plane(), named_soil("cmu-sand")), time_step=0.005), y=0.245)
     record_run(sim, 0.1, tmp_path / "run.h5", 50.0)
     saved = read_run(tmp_path / "run.h5")
     assert saved.on_sand
@@ -91,8 +82,7 @@ def test_a_run_on_sand_shows_sinkage_and_the_colours_of_sand(tmp_path: Path) -> 
 
 
 def test_an_unknown_soil_is_refused() -> None:
-    result = RUNNER.invoke(app, ["sand", "bed", "--soil", "mud"])
-    assert result.exit_code != 0
+    error_of("sand", "bed", "--soil", "mud")
 
 
 def test_a_rover_that_has_dug_itself_in_gets_free_and_climbs() -> None:

@@ -9,9 +9,7 @@ from commands import output_of, rover
 @pytest.mark.parametrize("terrain", ["plane", "rocks"])
 def test_json_adds_up(terrain: str) -> None:
     options = ["--num-envs", "3", "--threads", "2", "--rounds", "2", "--terrain", terrain, "--json"]
-    result = rover("speed", *options)
-    assert result.exit_code == 0, result.output
-    whole = json.loads(result.stdout)
+    whole = json.loads(output_of("speed", *options))
     assert whole["machine"]["cores"] > 0
     assert whole["machine"]["instruction_set"] in ("AVX-512", "AVX2", "baseline")
     assert list(whole["grounds"]) == [terrain]
@@ -30,14 +28,7 @@ def test_json_adds_up(terrain: str) -> None:
 
 def test_the_text_names_what_it_tells() -> None:
     output = output_of("speed", "--num-envs", "2", "--rounds", "1")
-    for words in (
-        "rover-steps/s",
-        "simulated s/s",
-        "plane",
-        "rocks",
-        "inside the physics",
-        "over SyncVectorEnv",
-    ):
+    for words in ("rover-steps/s", "simulated s/s", "plane", "rocks", "inside the physics", "over SyncVectorEnv"):
         assert words in output
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from episodes import spinning
 from forged import sealed
 from gymnasium.vector import AutoresetMode
 from refusals import refused
@@ -314,13 +315,6 @@ def test_restore_had_moved_the_rover_before_it_refused_the_random_state(
     assert random_state(env.np_random) == random_state(twin.np_random)
     assert env.step(FORWARD)[0].tobytes() == twin.step(FORWARD)[0].tobytes()
     env.restore(snapshot)
-
-
-def spinning() -> dict[str, Any]:
-    """A start from which no step can be taken: the trunk turns at 1e30 rad/s."""
-    q, v = np.zeros(21), np.zeros(21)
-    q[1], v[3] = 0.5, 1e30
-    return {"q": q, "v": v}
 
 
 @pytest.mark.parametrize("mode", [mode.value for mode in AutoresetMode])

@@ -233,13 +233,10 @@ def test_arguments_of_the_environment(name: str, terrain: str) -> None:
 
 def test_pairs_of_arguments_that_divide_by_zero() -> None:
     # `control_frequency=5e-324` was a ZeroDivisionError, alone too.
-    for arguments in (
-        {"time_step": 1e-300, "control_frequency": 1e300},
-        {"time_step": 5e-324, "control_frequency": 5e-324},
-    ):
+    for pair in ((1e-300, 1e300), (5e-324, 5e-324)):
         with pytest.raises(RoverGymError) as caught:
-            RoverEnv(**arguments)  # type: ignore[arg-type]
-        assert caught.value.field in arguments
+            RoverEnv(time_step=pair[0], control_frequency=pair[1])
+        assert caught.value.field in ("time_step", "control_frequency")
 
 
 @pytest.mark.parametrize("name", SOLVER_OPTIONS)
@@ -275,17 +272,13 @@ def test_names_that_are_no_names(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["num_envs", "threads", "max_episode_steps", "autoreset_mode", "friction"])
 def test_arguments_of_the_vector_environment(name: str) -> None:
-    never = {
-        "num_envs": (0,),
-        "threads": (0, 1.5),
-        "max_episode_steps": (0,),
-        "autoreset_mode": ("sometimes",),
-        "friction": (-1.0,),
-    }[name]
-    arguments, fields = {"num_envs": 1, "threads": 1}, (name, *OTHER_FIELDS.get(name, ()))
-    assert (
-        throw(lambda value: RoverVectorEnv(**{**arguments, name: value}), *fields, error=OptionError, never=never) > 50
-    )
+    never = {"threads": (0, 1.5), "autoreset_mode": ("sometimes",), "friction": (-1.0,)}.get(name, (0,))
+    fields = (name, *OTHER_FIELDS.get(name, ()))
+
+    def use(value: Any) -> None:
+        RoverVectorEnv(**{"num_envs": 1, "threads": 1, name: value})
+
+    assert throw(use, *fields, error=OptionError, never=never) > 50
 
 
 @pytest.mark.parametrize("name", ["n_envs", "threads", "max_episode_steps", "friction"])

@@ -477,7 +477,6 @@ def test_what_was_seen_stays_when_the_map_moves() -> None:
 
 def test_a_rover_remembers_the_ground_of_its_own_episode() -> None:
     env = gym.make("RoverRocks-v0", difficulty=1.0, **ScanPolicy.arguments())
-    assert isinstance(env.unwrapped, RoverEnv)
     policy = ScanPolicy(env, map=MapOptions(cells=100))
     observation, _ = env.reset(seed=3)
     action, state = policy.predict(observation)

@@ -3,6 +3,7 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from episodes import last_step
 from pursuit import pursuit
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, SphereField, StateError
@@ -55,9 +56,7 @@ def test_a_grid_too_fine_is_refused() -> None:
 def planar() -> RoverEnv:
     env = gym.make("Rover-v0", goal_distance=6.0, goal_bearing_deg=20.0)
     env.reset(seed=1)
-    rover = env.unwrapped
-    assert isinstance(rover, RoverEnv)
-    return rover
+    return env.unwrapped
 
 
 def test_a_future_ends_where_the_rover_would() -> None:
@@ -114,15 +113,11 @@ def test_the_planner_backs_out_of_a_dead_end() -> None:
     """Three rocks stand around the rover's front; the goal lies behind them."""
     centres = [[1.35, 0.0, -0.9], [1.6, 0.0, 0.0], [1.35, 0.0, 0.9]]
     env = gym.make("Rover-v0", terrain=SphereField(centres, [0.5, 0.5, 0.5], Plane()), heading_deg=0.0)
-    seen, _ = env.reset(seed=0, options={"position": (0.0, 0.0), "goal": (4.0, 0.0)})
+    env.reset(seed=0)
     policy = PlannerPolicy(env, PlannerOptions(samples=48), threads=1)
-    ended = ""
-    for _ in range(600):
-        seen, _, over, _, info = env.step(policy.predict(seen)[0])
-        if over:
-            ended = info["termination"]
-            break
-    assert ended == "goal"
+    start = {"position": (0.0, 0.0), "goal": (4.0, 0.0)}
+    *_, info = last_step(env, lambda seen: policy.predict(seen)[0], 600, seed=0, options=start)
+    assert info["termination"] == "goal"
 
 
 @pytest.mark.parametrize(
@@ -156,9 +151,7 @@ def test_raw_actions_drive_to_the_goal() -> None:
 
 
 def scanning(terrain: SphereField) -> RoverEnv:
-    env = gym.make("Rover-v0", terrain=terrain, heading_deg=0.0, **ScanPolicy.arguments()).unwrapped
-    assert isinstance(env, RoverEnv)
-    return env
+    return gym.make("Rover-v0", terrain=terrain, heading_deg=0.0, **ScanPolicy.arguments()).unwrapped
 
 
 def test_a_planner_that_sees_by_scan_knows_what_was_scanned() -> None:

@@ -87,7 +87,6 @@ def test_the_window_shows_the_rover(name: str) -> None:
     env.reset(seed=6)
     env.step(env.action_space.sample())
     screen = pygame.display.get_surface()
-    assert screen is not None
     assert screen.get_size() == (64, 48)
     assert np.ptp(pygame.surfarray.array3d(screen)) > 50
     env.close()

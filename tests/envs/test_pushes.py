@@ -76,15 +76,19 @@ def test_a_seed_repeats_the_pushes_and_changes_nothing_else():
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_a_vector_is_pushed_as_each_rover_alone(mode):
-    arguments = {"max_episode_steps": 25}
+@pytest.mark.parametrize("repeat", [None, 4], ids=["actions", "commands"])
+def test_a_vector_is_pushed_as_each_rover_alone(mode, repeat):
+    arguments = {"max_episode_steps": 26}  # ends within a command
     envs = RandomPushesVector(gym.make_vec("Rover-v0", 3, autoreset_mode=mode, **arguments), **OPTIONS)
     alone = [RandomPushes(gym.make("Rover-v0", **arguments), **OPTIONS) for _ in range(3)]
+    if repeat:
+        envs = CommandVectorEnv(envs, repeat=repeat)
+        alone = [DriveByCommand(env, repeat=repeat) for env in alone]
     envs.reset(seed=7)
     for i, env in enumerate(alone):
         env.reset(seed=7 + i)
     over, seen = [False] * 3, 0
-    for k in range(70):
+    for k in range(30 if repeat else 70):
         actions = np.random.default_rng(k).uniform(-0.5, 0.5, envs.action_space.shape).astype(np.float32)
         observations, rewards, *_, infos = envs.step(actions)
         for i, env in enumerate(alone):
@@ -97,36 +101,8 @@ def test_a_vector_is_pushed_as_each_rover_alone(mode):
                 over[i] = terminated or truncated
             np.testing.assert_array_equal(infos["push"][i], info["push"])
             if over[i] and mode == "SameStep":
-                observation, _ = env.reset()
-            np.testing.assert_array_equal(observations[i], observation)
-            seen += bool(info["push"].any())
-    assert seen > 10
-
-
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_rovers_that_are_driven_by_commands_are_pushed_as_each_alone(mode):
-    arguments = {"max_episode_steps": 26}  # ends within a command
-    pushed_envs = RandomPushesVector(gym.make_vec("Rover-v0", 3, autoreset_mode=mode, **arguments), **OPTIONS)
-    envs = CommandVectorEnv(pushed_envs, repeat=4)
-    alone = [DriveByCommand(RandomPushes(gym.make("Rover-v0", **arguments), **OPTIONS), repeat=4) for _ in range(3)]
-    envs.reset(seed=7)
-    for i, env in enumerate(alone):
-        env.reset(seed=7 + i)
-    over, seen = [False] * 3, 0
-    for k in range(30):
-        commands = np.random.default_rng(k).uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
-        observations, rewards, *_, infos = envs.step(commands)
-        for i, env in enumerate(alone):
-            if over[i] and mode == "NextStep":
-                observation, info = env.reset()
-                over[i] = False
-            else:
-                observation, reward, terminated, truncated, info = env.step(commands[i])
-                assert rewards[i] == reward
-                over[i] = terminated or truncated
-            np.testing.assert_array_equal(infos["push"][i], info["push"])
-            if over[i] and mode == "SameStep":
-                np.testing.assert_array_equal(infos["final_info"]["push"][i], info["push"])
+                told = infos["final_info"] if repeat else infos
+                np.testing.assert_array_equal(told["push"][i], info["push"])
                 observation, _ = env.reset()
             np.testing.assert_array_equal(observations[i], observation)
             seen += bool(info["push"].any())

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from episodes import spinning
 from gymnasium.utils.env_checker import data_equivalence
 from refusals import refused
 
@@ -71,14 +72,8 @@ def test_a_term_sees_the_period_and_counts() -> None:
 def test_a_vector_is_one_of_single_rovers(mode: str) -> None:
     ours: Any = gym.make_vec("Rover-v0", 3, max_episode_steps=LIMIT, autoreset_mode=mode, threads=2, **ARGUMENTS)
     assert type(ours) is RoverVectorEnv
-    theirs: Any = gym.make_vec(
-        "Rover-v0",
-        3,
-        vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": ours.autoreset_mode},
-        max_episode_steps=LIMIT,
-        **ARGUMENTS,
-    )
+    sync: dict[str, Any] = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": ours.autoreset_mode}}
+    theirs: Any = gym.make_vec("Rover-v0", 3, max_episode_steps=LIMIT, **sync, **ARGUMENTS)
     assert data_equivalence(ours.reset(seed=4), theirs.reset(seed=4), exact=True)
     goals = 0
     for k in range(40):
@@ -125,8 +120,7 @@ def test_the_vector_of_stable_baselines3_tells_them_at_the_end() -> None:
 
 def test_a_failed_step_earns_nothing_from_them() -> None:
     env = RoverEnv(reward_terms={"always": lambda *_: 3.0})
-    env.reset(seed=0)
-    env.reset(options={"q": env.simulation.q, "v": np.full(21, 1e30)})
+    env.reset(seed=0, options=spinning())
     *_, info = env.step(np.zeros(12, np.float32))
     assert info["termination"] == "step_failed"
     assert info["reward_terms"]["always"] == 0.0

@@ -60,7 +60,6 @@ def test_a_wheel_in_sand_is_observed_as_a_contact() -> None:
         observation, _, _, _, info = env.step(action)
     values = env.observation_layout.split(observation)
     sand = env.simulation.sand()
-    assert sand is not None
     assert (sand["sinkage"] > 1e-3).all()
     np.testing.assert_allclose(values["wheel_gap"], -sand["sinkage"], atol=2e-3)
     assert (values["wheel_contact"] == 1.0).all()
@@ -130,7 +129,6 @@ def test_the_memory_of_one_rover_is_not_anothers() -> None:
         together, state = policy.predict(np.stack([first, second]), state)
         single, alone = policy.predict(second, alone)
         np.testing.assert_array_equal(single, together[1])
-    assert state is not None
     assert (state[0][:, 1] > 0.0).all(), "a rover that does not move is stuck"
     _, state = policy.predict(np.stack([first, second]), state, np.array([True, False]))
     assert state[0][0, 1] == 0.0 < state[0][1, 1]
@@ -159,6 +157,5 @@ def test_a_soil_of_ones_own_and_a_list_are_taken() -> None:
     names = set()
     for seed in range(8):
         env.reset(seed=seed)
-        assert env.soil is not None
         names.add(env.soil.name)
     assert names == {"mine", "grc-1"}

@@ -6,10 +6,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from equal_bits import bits
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 from rover_gym import OptionError, PDPolicy, RoverEnv
 from rover_gym.drive import CommandController, Features
@@ -31,10 +32,6 @@ def actions(n: int, steps: int = 30) -> Any:
     return np.random.default_rng(0).uniform(-1.0, 1.0, (steps, n, 12)).astype(np.float32)
 
 
-def without(info: dict[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in info.items() if name != key}
-
-
 @pytest.mark.parametrize("arguments", SCENES, ids=["plane", "rocks"])
 @pytest.mark.parametrize("threads", [1, 2])
 def test_it_is_dummy_vec_env_bit_for_bit(arguments: dict[str, Any], threads: int) -> None:
@@ -46,14 +43,11 @@ def test_it_is_dummy_vec_env_bit_for_bit(arguments: dict[str, Any], threads: int
     ends = set()
     for action in actions(3):
         one, other = ours.step(action), theirs.step(action)
-        for array, expected in zip(one[:3], other[:3], strict=True):
-            assert (array.dtype, array.tobytes()) == (expected.dtype, expected.tobytes())
+        assert bits(one[:3]) == bits(other[:3])
         for done, info, expected in zip(one[2], one[3], other[3], strict=True):
             assert info["TimeLimit.truncated"] == expected["TimeLimit.truncated"]
             if done:
-                key = "terminal_observation"
-                assert info[key].tobytes() == expected[key].tobytes()
-                assert without(info, key) == without(expected, key)
+                assert bits(info) == bits(expected)
                 ends.add(info["termination"] or "time")
             else:
                 assert set(info) == {"TimeLimit.truncated"}
@@ -159,24 +153,13 @@ def test_ppo_learns_from_it_without_complaint() -> None:
 SCANNED: dict[str, Any] = {"terrain": "rocks", "height_scan": (6, 4, 0.3), "difficulty": 1.0}
 
 
-class Opaque(VecEnvWrapper):
+class Opaque(VecMonitor):
     """Hides what it wraps, so that every step takes its scan."""
-
-    def __init__(self, venv: RoverVecEnv) -> None:
-        super().__init__(venv)
 
     @property
     def unwrapped(self) -> Any:
         """Nothing that a command would know."""
         return self
-
-    def reset(self) -> Any:
-        """As the wrapped."""
-        return self.venv.reset()
-
-    def step_wait(self) -> Any:
-        """As the wrapped."""
-        return self.venv.step_wait()
 
 
 def test_training_takes_a_scan_once_a_command() -> None:
@@ -191,8 +174,7 @@ def test_training_takes_a_scan_once_a_command() -> None:
     assert rare.reset().tobytes() == often.reset().tobytes()
     for _ in range(6):
         ours, theirs = rare.step(commands), often.step(commands)
-        for one, other in zip(ours[:3], theirs[:3], strict=True):
-            assert one.tobytes() == other.tobytes()
+        assert bits(ours[:3]) == bits(theirs[:3])
         for info, expected in zip(ours[3], theirs[3], strict=True):
             if "terminal_observation" in expected:
                 assert info["terminal_observation"].tobytes() == expected["terminal_observation"].tobytes()

@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from refusals import refused
+from rovers import with_fields
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverModel, SphereField, StateError
 from rover_gym.drive import FORECAST_FILE, ForesightCosts, Network, PathCosts, PolicyError, ScanGains, ScanPolicy
@@ -130,10 +131,7 @@ def test_the_underside_is_the_models() -> None:
 
 
 def test_a_model_without_colliding_shapes_has_no_underside() -> None:
-    description = RoverModel().to_dict()
-    for solid in description["solids"]:
-        solid["collides"] = False
-    model = RoverModel.from_dict(description)
+    model = with_fields(RoverModel(), {name: {"collides": False} for name in RoverModel().solid_names})
     assert RoverOutline.of(model, 0.1).underside.shape == (0, 2)
     env = RoverEnv(terrain="rocks", model=model, **ARGUMENTS)
     observation, _ = env.reset(seed=0)
@@ -227,12 +225,16 @@ def test_a_smaller_scan_will_do() -> None:
 
 def constant(size: int, outputs: Any) -> Network:
     """A network whose prediction does not depend on its input."""
-    return Network(
-        mean=np.zeros(size, np.float32),
-        deviation=np.ones(size, np.float32),
-        weights=(np.zeros((len(outputs), size), np.float32),),
-        biases=(np.asarray(outputs, dtype=np.float32),),
-    )
+    zero, weights = np.zeros(size, np.float32), np.zeros((len(outputs), size), np.float32)
+    return Network(zero, zero + 1.0, (weights,), (np.asarray(outputs, dtype=np.float32),))
+
+
+def foretelling(env: RoverEnv, outputs: list[float], folder: Path, by_speed: float = 0.0) -> Path:
+    """The folder of a forecast that is the same for all, but for the first output by the speed."""
+    network = constant(ArcFeatures(env, ScanPolicy(env)).size + 1, outputs)
+    network.weights[0][0, -1] = by_speed
+    network.save(folder / FORECAST_FILE)
+    return folder
 
 
 def in_front_of_a_rock(radius: float) -> tuple[RoverEnv, np.ndarray]:
@@ -257,7 +259,6 @@ def test_the_features_see_the_rock_on_the_arcs_that_lead_over_it() -> None:
 
 
 def foreseen_by(policy: ScanPolicy, row: Any) -> Outcomes:
-    assert policy.forecast is not None
     return policy.forecast(row, *policy.ground(row))
 
 
@@ -305,9 +306,7 @@ def test_what_is_foreseen_costs_in_proportion_to_the_way(tmp_path: Path) -> None
     for model in (RoverModel(), open_model("open-rover")):
         env = RoverEnv(terrain="plane", model=model, **ScanPolicy.arguments(model))
         row = env.reset(seed=1)[0].astype(np.float64)
-        size = ArcFeatures(env, ScanPolicy(env)).size + 1
-        constant(size, [0.0, 0.5, 0.0]).save(tmp_path / FORECAST_FILE)
-        policy = ScanPolicy(env, forecast=tmp_path)
+        policy = ScanPolicy(env, forecast=foretelling(env, [0.0, 0.5, 0.0], tmp_path))
         costs, fast = policy._outlook(row, *policy.ground(row), 1.0)
         assert costs == pytest.approx(policy.cruise_speed / 1.2 * (2.0 * 0.85 * 1.2 + 10.0 * 0.5))
         assert not fast.any()
@@ -316,15 +315,11 @@ def test_what_is_foreseen_costs_in_proportion_to_the_way(tmp_path: Path) -> None
 def test_costs_of_what_is_foreseen_choose_arc_and_speed(tmp_path: Path) -> None:
     """If a forecast predicts progress only at high speed, the rover drives fast; a uniform forecast changes nothing."""
     env, row = in_front_of_a_rock(0.1)
-    size = ArcFeatures(env, ScanPolicy(env)).size + 1
-    calm = constant(size, [1.0, 0.0, 0.0])
-    calm.save(tmp_path / FORECAST_FILE)
+    foretelling(env, [1.0, 0.0, 0.0], tmp_path)
     alike = ScanPolicy(env, forecast=tmp_path, foresight=ForesightCosts(caution=1.0))
     observation = row.astype(np.float32)
     np.testing.assert_array_equal(alike.predict(observation)[0], ScanPolicy(env).predict(observation)[0])
-    held = constant(size, [-0.5, 0.0, 0.0])
-    held.weights[0][0, -1] = 1.0  # fast arcs get on
-    held.save(tmp_path / FORECAST_FILE)
+    foretelling(env, [-0.5, 0.0, 0.0], tmp_path, by_speed=1.0)
     command = ScanPolicy(env, forecast=tmp_path).predict(observation)[1][0][0]
     assert command[0] == pytest.approx(1.0)
     slow = ScanPolicy(env, forecast=tmp_path, foresight=ForesightCosts(push=100.0)).predict(observation)[1][0][0]
@@ -354,18 +349,14 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     constant(5, [0.0, 0.0, 0.0]).save(tmp_path / FORECAST_FILE)
     with pytest.raises(PolicyError, match="must have 139 inputs, got 5"):
         ScanPolicy(env, forecast=tmp_path)
-    size = ArcFeatures(env, ScanPolicy(env)).size + 1
-    constant(size, [0.0, 0.0]).save(tmp_path / FORECAST_FILE)
     with pytest.raises(PolicyError, match="3 outputs"):
-        ScanPolicy(env, forecast=tmp_path)
+        ScanPolicy(env, forecast=foretelling(env, [0.0, 0.0], tmp_path))
 
 
 def test_a_name_and_a_folder_lead_to_it(tmp_path: Path) -> None:
     env, _ = in_front_of_a_rock(0.1)
     named = named_policy("foresight")
     assert getattr(named.make(env), "forecast", None) is not None
-    size = ArcFeatures(env, ScanPolicy(env)).size + 1
-    constant(size, [0.0, 0.0, 0.0]).save(tmp_path / FORECAST_FILE)
-    own = named_policy(str(tmp_path))
+    own = named_policy(str(foretelling(env, [0.0, 0.0, 0.0], tmp_path)))
     assert own.arguments == ARGUMENTS
     assert getattr(own.make(env), "forecast", None) is not None

@@ -70,7 +70,6 @@ class OwnSensor(HeadingSensor):
 
 
 def through_json(spec: EnvSpec | None) -> EnvSpec:
-    assert spec is not None
     return EnvSpec.from_json(spec.to_json())
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from episodes import spinning
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from refusals import refused
 
@@ -111,7 +112,6 @@ def test_a_state_of_ones_own_is_a_trap_without_a_drive(env: RoverTrapEnv) -> Non
     env.reset(seed=0)
     q, goal = env.simulation.q, env.goal
     field = env.rocks
-    assert field is not None
     slope = env.start
     options = {
         "q": q,
@@ -333,8 +333,7 @@ def test_rewards_of_relabelled_goals_are_vectorised() -> None:
 def test_a_failed_step_keeps_the_last_place() -> None:
     env = GoalObservation(gym.make("Rover-v0"))
     env.reset(seed=0)
-    q = env.unwrapped.simulation.q  # type: ignore[attr-defined]
-    env.reset(options={"q": q, "v": np.full(21, 1e30)})
+    env.reset(options=spinning())
     seen, reward, terminated, _, info = env.step(np.zeros(12, np.float32))
     assert info["termination"] == "step_failed"
     assert terminated

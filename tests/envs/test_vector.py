@@ -1,4 +1,4 @@
-"""The native vector environment: resets follow the rules, neither threads nor neighbours have an effect."""
+"""The native vector environment: resets follow the rules, and what its snapshots keep."""
 
 import dataclasses
 import pickle
@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from episodes import last_step, spinning
 from equal_bits import bits
 from gymnasium.error import ResetNeeded
 from refusals import refused
@@ -29,29 +30,6 @@ def native(name: str, n: int, **arguments: Any) -> RoverVectorEnv:
 
 def actions(n: int, steps: int = 30, seed: int = 0) -> Any:
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, n, 12)).astype(np.float32)
-
-
-@pytest.mark.parametrize("threads", [1, 2, 5])
-@pytest.mark.parametrize("n", [1, 4, 9])
-def test_neither_threads_nor_neighbours_show(n: int, threads: int) -> None:
-    arguments: dict[str, Any] = {"terrain": "rocks", "difficulty": 0.5}
-    batch = native("Rover-v0", n, threads=threads, **arguments)
-    batch.reset(seed=0)
-    alone = gym.wrappers.TimeLimit(RoverEnv(**arguments), LIMIT)
-    alone.reset(seed=n - 1)
-    over = False
-    for action in actions(9, steps=20):
-        result = batch.step(action[:n])
-        if over:
-            observation, info = alone.reset()
-            reward, terminated, truncated = 0.0, False, False
-        else:
-            observation, reward, terminated, truncated, info = alone.step(action[n - 1])
-        assert result[0][-1].tobytes() == observation.tobytes()
-        assert (result[1][-1], result[2][-1], result[3][-1]) == (reward, terminated, truncated)
-        assert result[4]["distance_to_goal"][-1] == info["distance_to_goal"]
-        over = terminated or truncated
-    assert batch.batch.episodes.threads == min(threads, n)
 
 
 def test_without_a_limit_nothing_is_truncated() -> None:
@@ -79,23 +57,6 @@ def test_disabled_autoreset_waits_for_the_mask() -> None:
         env.step(actions(3)[0])
     env.reset(options={"reset_mask": ~mask})
     assert not env.step(actions(3)[0])[3].any()
-
-
-def test_seeds_count_up_or_are_given() -> None:
-    env = native("Rover-v0", 3)
-    counted, _ = env.reset(seed=7)
-    listed, _ = env.reset(seed=[7, 8, 9])
-    assert counted.tobytes() == listed.tobytes()
-    assert env.np_random_seed == (7, 8, 9)
-    with pytest.raises(OptionError):
-        env.reset(seed=[1, 2])
-
-
-def test_options_are_every_rovers() -> None:
-    env = native("RoverRocks-v0", 3)
-    _, infos = env.reset(seed=0, options={"difficulty": 0.25, "goal": (3.0, 1.0)})
-    np.testing.assert_array_equal(infos["difficulty"], 0.25)
-    assert env.get_attr("goal") == ((3.0, 1.0),) * 3
 
 
 def test_options_are_each_rovers() -> None:
@@ -179,13 +140,6 @@ def test_difficulty_is_set_from_the_next_reset_on() -> None:
 def test_step_before_reset_is_refused() -> None:
     with pytest.raises(ResetNeeded):
         native("Rover-v0", 2).step(actions(2)[0])
-
-
-def spinning() -> dict[str, Any]:
-    """A start from which no step can be taken: the trunk turns at 1e30 rad/s."""
-    q, v = np.zeros(21), np.zeros(21)
-    q[1], v[3] = 0.5, 1e30
-    return {"q": q, "v": v}
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -329,15 +283,10 @@ def test_one_rover_of_a_snapshot_goes_on_alone() -> None:
 def test_an_episode_keeps_its_end_through_a_pickle() -> None:
     """A copy of an ended episode continued, because the copy did not include the end."""
     env = RoverEnv(goal_distance=0.6, goal_bearing_deg=0.0, goal_tolerance=0.59)
-    env.reset(seed=0)
-    for _ in range(200):
-        *_, terminated, _, info = env.step(np.array([0.5] * 6 + [0.0] * 6, np.float32))
-        if terminated:
-            break
+    *_, info = last_step(env, lambda _: np.array([0.5] * 6 + [0.0] * 6, np.float32), 200, seed=0)
     assert info["termination"] == "goal"
     progress: bytes = copied(env.snapshot()).progress
     again = copied(EpisodeRun.from_bytes(env.task.rules, progress))
-    assert isinstance(again, EpisodeRun)
     assert info.pop("clipped_actions") == 0
     assert again.info() == info
     twin = RoverEnv(goal_distance=0.6, goal_bearing_deg=0.0, goal_tolerance=0.59)

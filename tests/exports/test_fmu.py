@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import error_of, output_of
+from rovers import placed, with_fields
 
 from rover_gym import HeightField, OptionError, Plane, RoverModel, Simulation, SphereField, Terrain, TriangleMesh, Union
 from rover_gym.exports import fmu as units, write_fmu
@@ -27,25 +28,22 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from scipy.spatial.transform import Rotation
 
+AXES = ("rep103", "world")
 ERROR = 3  # fmi3Error
 BUMPS = np.random.default_rng(4).uniform(0.0, 0.05, (40, 40)).astype(np.float32)
 BUMPS[0, 0] = np.nan
+CORNERS = [[-9.0, 0.0, -9.0], [-9.0, 0.0, 9.0], [9.0, 1.0, 9.0], [9.0, 1.0, -9.0]]
 GROUNDS: dict[str, Terrain] = {
     "slope": Plane((-0.1, 1.0, 0.05), 0.2),
     "rocks": SphereField([[0.9, -0.1, -0.4], [1.2, 0.0, 0.4]], [0.2, 0.25], Plane(), "granite"),
     "map": HeightField(BUMPS, 0.5),
-    "mesh": TriangleMesh(
-        [[-9.0, 0.0, -9.0], [-9.0, 0.0, 9.0], [9.0, 1.0, 9.0], [9.0, 1.0, -9.0]], [[0, 1, 2], [0, 2, 3]]
-    ),
+    "mesh": TriangleMesh(CORNERS, [[0, 1, 2], [0, 2, 3]]),
     "union": Union([SphereField([[0.9, 0.0, -0.4]], [0.1]), HeightField(BUMPS, 0.5)]),
 }
 
 
 def simulation_on(terrain: Terrain, **options: Any) -> Simulation:
-    sim = Simulation(RoverModel(), terrain, **options)
-    q = np.zeros(21)
-    q[1] = 1.0
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), terrain, **options), y=1.0)
     sim.set_steering(np.zeros(6))
     sim.set_wheel_torques(np.full(6, 1.5))
     sim.step(30)
@@ -60,18 +58,17 @@ def unpacked(path: Path, folder: Path) -> Unit:
     return read_model_description(str(path)), extract(str(path), str(folder))
 
 
+Misuse = tuple[Callable[["Master"], Any], str]
+
+
 class Master:
     """A unit in FMPy, with its variables by name and its messages."""
 
     def __init__(self, unit: Unit) -> None:
         description, folder = unit
         self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.fmu = FMU3Slave(
-            guid=description.guid,
-            unzipDirectory=folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="one",
-        )
+        library = {"unzipDirectory": folder, "modelIdentifier": description.coSimulation.modelIdentifier}
+        self.fmu = FMU3Slave(guid=description.guid, instanceName="one", **library)
         self.fmu.instantiate(logMessage=None)
         self.time = 0.0
 
@@ -198,10 +195,7 @@ def test_a_unit_in_the_axes_of_rep_103_turns_every_vector_and_pose(tmp_path: Pat
     path = write_fmu(sim, tmp_path / "a.fmu", axes="rep103")
     starts = {one.name: one.start for one in read_model_description(str(path)).modelVariables}
     assert [float(starts[f"gravity.{axis}"]) for axis in "xyz"] == [0.1, -0.2, -3.7]
-    unit, own = (
-        Master(unpacked(write_fmu(sim, tmp_path / f"{axes}.fmu", axes=axes), tmp_path / axes))
-        for axes in ("rep103", "world")
-    )
+    unit, own = (Master(unpacked(write_fmu(sim, tmp_path / f"{a}.fmu", axes=a), tmp_path / a)) for a in AXES)
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     unit.start(gravity__y=-0.3, gravity__z=-1.6)
     own.start(gravity__y=-1.6, gravity__z=0.3)
@@ -251,9 +245,8 @@ def test_parameters_are_those_of_a_simulation(master: Callable[[Simulation], Mas
     sim = simulation_on(GROUNDS["rocks"])
     unit = master(sim)
     unit.start(friction=0.2, gravity__y=-1.6, time_step=0.01)
-    other = Simulation(
-        sim.model, sim.terrain, **{**sim.settings, "friction": 0.2, "gravity": (0.0, -1.6, 0.0), "time_step": 0.01}
-    )
+    settings = {**sim.settings, "friction": 0.2, "gravity": (0.0, -1.6, 0.0), "time_step": 0.01}
+    other = Simulation(sim.model, sim.terrain, **settings)
     other.restore(sim.snapshot())
     unit.step(0.5)
     other.step(50)
@@ -263,9 +256,7 @@ def test_parameters_are_those_of_a_simulation(master: Callable[[Simulation], Mas
 def test_a_model_can_be_replaced(master: Callable[[Simulation], Master]) -> None:
     sim = simulation_on(Plane())
     unit = master(sim)
-    heavy = sim.model.to_dict()
-    heavy["solids"][0]["mass"] *= 2.0
-    model = RoverModel.from_dict(heavy)
+    model = with_fields(sim.model, {"trunk": {"mass": 2.0 * sim.model.to_dict()["solids"][0]["mass"]}})
     unit.fmu.setString([unit.references["model"]], [model.to_text()])
     unit.start()
     assert unit.fmu.getString([unit.references["model"]])[0] == model.to_text()
@@ -333,7 +324,9 @@ def test_another_instance_takes_the_state(master: Callable[[Simulation], Master]
         other.fmu.deserializeFMUState(two.fmu.serializeFMUState(state))
 
 
-MISUSES: list[tuple[Callable[[Master], Any], str]] = [
+NOT_NOW = "is not allowed in the state StepMode"
+#: What is refused after the first step, and what before the start.
+LATE: list[Misuse] = [
     (lambda unit: unit.set(wheel_torque__FL=np.nan), "wheel_torque.FL: must be finite, is NaN"),
     (lambda unit: unit.set(wheel_torque__FR=1.0, steering__FL=np.inf), "steering.FL: must be finite, is inf"),
     (lambda unit: unit.set(steering__BR=3.0), "steering.BR: must be within ±0.7 rad, is 3"),  # was set_points[5]
@@ -349,69 +342,50 @@ MISUSES: list[tuple[Callable[[Master], Any], str]] = [
     (lambda unit: unit.step(np.nan), "communicationStepSize: must be a positive whole number"),
     (lambda unit: unit.fmu.doStep(0.3, 0.05), "currentCommunicationPoint: must be where the last step ended, 0.05"),
     (lambda unit: unit.fmu.doStep(np.nan, 0.05), "currentCommunicationPoint: must be where the last step ended"),
-    (
-        lambda unit: unit.fmu.enterInitializationMode(),
-        "fmi3EnterInitializationMode: is not allowed in the state StepMode",
-    ),
-    (
-        lambda unit: unit.fmu.exitInitializationMode(),
-        "fmi3ExitInitializationMode: is not allowed in the state StepMode",
-    ),
+    (lambda unit: unit.fmu.enterInitializationMode(), f"fmi3EnterInitializationMode: {NOT_NOW}"),
+    (lambda unit: unit.fmu.exitInitializationMode(), f"fmi3ExitInitializationMode: {NOT_NOW}"),
     (lambda unit: unit.fmu.enterEventMode(), "fmi3EnterEventMode: is not supported"),
     (lambda unit: unit.fmu.setString([unit.references["model"]], [""]), "model: cannot be set in the state StepMode"),
 ]
+OTHER = RoverModel.named("skid-steered").to_text()
+EARLY: list[Misuse] = [
+    (lambda unit: unit.step(), "fmi3DoStep: is not allowed in the state Instantiated"),
+    (lambda unit: unit.get("q"), "fmi3GetFloat64: is not allowed in the state Instantiated"),
+    (lambda unit: unit.fmu.terminate(), "fmi3Terminate: is not allowed in the state Instantiated"),
+    (lambda unit: unit.start(friction=-1.0), "friction: must be finite and not negative, is -1"),
+    (lambda unit: unit.start(time_step=np.nan), "time_step: must be finite, is NaN"),
+    (lambda unit: unit.fmu.setString([unit.references["model"]], ["solids ="]), "model: "),
+    (lambda unit: unit.fmu.setString([unit.references["model"]], [OTHER]), "model: must have the joints"),
+    (lambda unit: unit.fmu.enterInitializationMode(startTime=np.nan), "startTime: must be finite"),
+    (lambda unit: unit.fmu.enterInitializationMode(startTime=1.0, stopTime=0.0), "stopTime: must be"),
+]
+MISUSES = [(*row, True) for row in LATE] + [(*row, False) for row in EARLY]
 
 
-@pytest.mark.parametrize(("misuse", "message"), MISUSES, ids=[message[:40] for _, message in MISUSES])
+@pytest.mark.parametrize(("misuse", "message", "late"), MISUSES, ids=[message[:40] for _, message, _ in MISUSES])
 def test_a_refused_call_says_why_and_changes_nothing(
     misuse: Callable[[Master], Any],
     message: str,
+    late: bool,
     on_plane: tuple[Master, Simulation],
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     unit, sim = on_plane
-    unit.start()
-    unit.step()
+    if late:
+        unit.start()
+        unit.step()
     capfd.readouterr()
     with pytest.raises(FMICallException) as refusal:
         misuse(unit)
-    assert refusal.value.status == 3
+    assert refusal.value.status == ERROR
     assert message in capfd.readouterr().out
-    unit.time = 0.05
-    unit.step()
-    sim.step(20)
-    assert_same(unit, sim)
-
-
-@pytest.mark.parametrize(
-    ("misuse", "message"),
-    [
-        (lambda unit: unit.step(), "fmi3DoStep: is not allowed in the state Instantiated"),
-        (lambda unit: unit.get("q"), "fmi3GetFloat64: is not allowed in the state Instantiated"),
-        (lambda unit: unit.fmu.terminate(), "fmi3Terminate: is not allowed in the state Instantiated"),
-        (lambda unit: unit.start(friction=-1.0), "friction: must be finite and not negative, is -1"),
-        (lambda unit: unit.start(time_step=np.nan), "time_step: must be finite, is NaN"),
-        (lambda unit: unit.fmu.setString([unit.references["model"]], ["solids ="]), "model: "),
-        (
-            lambda unit: unit.fmu.setString([unit.references["model"]], [RoverModel.named("skid-steered").to_text()]),
-            "model: must have the joints",
-        ),
-        (lambda unit: unit.fmu.enterInitializationMode(startTime=np.nan), "startTime: must be finite"),
-        (lambda unit: unit.fmu.enterInitializationMode(startTime=1.0, stopTime=0.0), "stopTime: must be"),
-    ],
-)
-def test_before_the_start_too(
-    misuse: Callable[[Master], Any],
-    message: str,
-    on_plane: tuple[Master, Simulation],
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    unit, sim = on_plane
-    with pytest.raises(FMICallException):
-        misuse(unit)
-    assert message in capfd.readouterr().out
-    unit.time = 0.0
-    unit.start()
+    if late:
+        unit.time = 0.05
+        unit.step()
+        sim.step(20)
+    else:
+        unit.time = 0.0
+        unit.start()
     assert_same(unit, sim)
 
 
@@ -436,9 +410,8 @@ def test_the_checker_finds_nothing(model: str, tmp_path: Path) -> None:
     path = write_fmu(sim, tmp_path / "a.fmu", name=model)
     assert validate_fmu(str(path)) == []
     found = read_model_description(str(path), validate=True, validate_model_structure=True)
-    assert {(one.name, one.valueReference) for one in found.modelVariables} == {
-        (one.name, one.reference) for one in unit_variables(sim)
-    }
+    declared = {(one.name, one.reference) for one in unit_variables(sim)}
+    assert {(one.name, one.valueReference) for one in found.modelVariables} == declared
     outputs = {one.variable.name for one in found.outputs}
     assert outputs == {one.name for one in unit_variables(sim) if one.causality == "output"}
 

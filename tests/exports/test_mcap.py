@@ -14,9 +14,11 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from commands import error_of, output_of
+from recordings import recorded
+from rovers import placed, standing
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
+from rover_gym.record import RecordingError, RoverSampler, read_run
 
 pytest.importorskip("mcap.reader")
 pytest.importorskip("foxglove_schemas_protobuf")
@@ -55,17 +57,10 @@ for i in range(2000):
 
 
 def quick_run(path: Path, n: int = 30) -> Path:
-    sim = Simulation(RoverModel(), GROUND, gravity=(0.0, -3.7, 0.0))
-    q = np.zeros(21)
-    q[1] = 0.5
-    sim.set_state(q)
+    sim = placed(Simulation(RoverModel(), GROUND, gravity=(0.0, -3.7, 0.0)), y=0.5)
     sim.set_wheel_torques(np.arange(6.0))
-    sampler = RoverSampler(sim.model)
-    attributes = describe(sim, "a test", {"goal": (3.0, -1.0)})
-    with Recorder(path, sampler.channels, attributes, terrain=sim.terrain) as recorder:
-        for _ in range(n):
-            sim.step()
-            recorder.append(sampler.row(sim))
+    sim.step()
+    recorded(sim, path, n - 1, scene={"goal": (3.0, -1.0)})
     return path
 
 
@@ -110,8 +105,7 @@ def rep_103(vector: Any) -> Any:
 def test_frames_have_x_forward_and_z_up(tmp_path: Path) -> None:
     """Frames of solids had y up. ROS programs expect REP 103, where y is left and z up."""
     model = RoverModel()
-    sim = Simulation(model)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim = standing(model)
     sampler = RoverSampler(model)
     with McapWriter(tmp_path / "rest.mcap", model, sim.terrain) as log:
         for _ in range(40):
@@ -131,15 +125,8 @@ def test_frames_have_x_forward_and_z_up(tmp_path: Path) -> None:
     turn = found["/imu/sensor"][0][1]
     assert turn.angular_velocity.z == 0.2
     assert turned(turn.orientation, np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 0.0, 1.0])
-    points = np.array(
-        [
-            [p.x, p.y, p.z]
-            for e in found["/scene"][0][1].entities
-            if e.id == "rover/trunk"
-            for t in e.triangles
-            for p in t.points
-        ]
-    )
+    (trunk,) = (entity for entity in found["/scene"][0][1].entities if entity.id == "rover/trunk")
+    points = np.array([[p.x, p.y, p.z] for part in trunk.triangles for p in part.points])
     assert np.ptp(points[:, 2]) < np.ptp(points[:, 0])
 
 

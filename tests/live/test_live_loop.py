@@ -28,7 +28,7 @@ from rover_gym.show.live import (
     SingleStep,
     ThrowRock,
 )
-from rover_gym.show.live.live_commands import command_of, read_message
+from rover_gym.show.live.live_commands import Command, command_of, read_message
 from rover_gym.show.live.live_loop import HOLD, MOST_WAITING
 from rover_gym.show.live.live_view import HEAD, LiveView
 from rover_gym.show.replay import write_vrml
@@ -45,14 +45,15 @@ class Clock:
         return self.time
 
 
-def stepped(loop: LiveLoop, clock: Clock, periods: int, *, holding: Drive | None = None) -> LiveLoop:
-    """Periods of a loop that no thread runs; a command by hand is renewed in each, as a page does."""
+def stepped(loop: LiveLoop, clock: Clock, periods: int, *commands: Command, holding: Drive | None = None) -> None:
+    """Periods of a loop that no thread runs, after commands; one by hand is renewed in each, as a page does."""
+    for command in commands:
+        loop.send(command)
     for _ in range(periods):
         if holding is not None:
             loop.send(holding)
         loop.advance()
         clock.time += loop.state.period
-    return loop
 
 
 def paused(folder: Path, scene: LiveScene | None = None, *, mcap: bool = False) -> tuple[LiveLoop, Clock]:
@@ -82,25 +83,19 @@ def test_pause_single_step_rewind_and_restart(tmp_path: Path) -> None:
     loop, clock = paused(tmp_path)
     stepped(loop, clock, 40, holding=Drive(1.0))
     at = loop.state.time
-    loop.send(Pause())
-    stepped(loop, clock, 10)
+    stepped(loop, clock, 10, Pause())
     assert loop.state.is_paused
     assert loop.state.time == at
-    loop.send(SingleStep())
-    loop.send(SingleStep())
-    stepped(loop, clock, 5)
+    stepped(loop, clock, 5, SingleStep(), SingleStep())
     assert loop.state.time == pytest.approx(at + 0.1)
     world = loop.state.world
-    loop.send(Rewind(1.1))
-    stepped(loop, clock, 1)
+    stepped(loop, clock, 1, Rewind(1.1))
     assert loop.state.time == pytest.approx(at - 1.0)
     assert loop.state.is_paused
     assert loop.state.world > world
-    loop.send(Pause(on=False))
-    stepped(loop, clock, 2)
+    stepped(loop, clock, 2, Pause(on=False))
     assert loop.state.time == pytest.approx(at - 0.9)
-    loop.send(Restart())
-    stepped(loop, clock, 1)
+    stepped(loop, clock, 1, Restart())
     assert loop.state.time == pytest.approx(0.05)
     assert loop.state.reach == pytest.approx(0.05)
 
@@ -113,8 +108,7 @@ def test_a_refused_command_is_told_and_the_drive_goes_on(tmp_path: Path) -> None
         (ThrowRock(9.0), "radius: must be at most 0.6"),
     ):
         notices, at = loop.state.notices, loop.state.time
-        loop.send(command)
-        stepped(loop, clock, 1)
+        stepped(loop, clock, 1, command)
         assert message in loop.state.notice
         assert loop.state.notices == notices + 1
         assert loop.state.time == pytest.approx(at + 0.05)
@@ -136,13 +130,10 @@ def test_too_many_commands_and_late_ones_are_refused(tmp_path: Path) -> None:
 
 def test_a_recording_is_replayed(tmp_path: Path) -> None:
     loop, clock = paused(tmp_path)
-    loop.send(Record())
-    stepped(loop, clock, 30, holding=Drive(1.0))
+    stepped(loop, clock, 30, Record(), holding=Drive(1.0))
     assert loop.state.recording.endswith("live-1.h5")
-    loop.send(Change("friction", 0.3))
-    stepped(loop, clock, 10)
-    loop.send(Record(on=False))
-    stepped(loop, clock, 1)
+    stepped(loop, clock, 10, Change("friction", 0.3))
+    stepped(loop, clock, 1, Record(on=False))
     assert loop.state.recording == ""
     run = read_run(tmp_path / "live-1.h5")
     assert run.trajectory.attributes["complete"]
@@ -156,12 +147,9 @@ def test_a_recording_is_replayed(tmp_path: Path) -> None:
 def test_a_recording_goes_on_in_another_file_where_time_or_ground_change(tmp_path: Path) -> None:
     (tmp_path / "live-1.h5").write_text("of another day")
     loop, clock = paused(tmp_path)
-    loop.send(Record())
-    stepped(loop, clock, 10)
+    stepped(loop, clock, 10, Record())
     for command in (ThrowRock(), Rewind(0.3), Change("ground", "rocks"), Restart()):
-        loop.send(command)
-        loop.send(Pause(on=False))
-        stepped(loop, clock, 10)
+        stepped(loop, clock, 10, command, Pause(on=False))
     loop.stop()
     assert (tmp_path / "live-1.h5").read_text() == "of another day"
     runs = [read_run(tmp_path / f"live-{number}.h5") for number in range(2, 7)]
@@ -175,12 +163,10 @@ def test_a_recording_holds_what_the_page_shows_of_plan_and_sensors(tmp_path: Pat
     """A live drive showed plan, scan, laser and depth, and its recording held none of them."""
     loop, clock = paused(tmp_path, LiveScene(ground="rocks", driver="scan"))
     view = LiveView()
-    loop.send(Record())
-    stepped(loop, clock, 20)
+    stepped(loop, clock, 20, Record())
     view.follow(loop.state)
     seen = loop.state.overlays
-    loop.send(Drive(1.0))  # the hand takes over, and intends nothing that can be drawn
-    stepped(loop, clock, 5)
+    stepped(loop, clock, 5, Drive(1.0))  # the hand takes over, and intends nothing that can be drawn
     by_hand = LiveView()
     by_hand.follow(loop.state)
     loop.stop()
@@ -195,8 +181,6 @@ def test_a_recording_holds_what_the_page_shows_of_plan_and_sensors(tmp_path: Pat
     channels = {channel.name: channel.values for channel in rover_scene(runs[0], follow=True).channels}
     for name in ("laser", "depth"):
         assert channels[name][20, :, 0] == pytest.approx(seen.readings[name][0])
-    assert seen.path is not None
-    assert seen.heights is not None
     assert np.isfinite(seen.path).all()
     assert channels["path"][20, :, :2] == pytest.approx(seen.path[0])
     assert channels["scan"][20, :, 0] == pytest.approx(seen.heights[0])
@@ -222,10 +206,8 @@ def rows_logged(path: Path) -> dict[str, list[Any]]:
 def test_a_log_for_viewers_gets_the_rows_of_the_recording(tmp_path: Path) -> None:
     (tmp_path / "live-1.mcap").write_text("of another day")
     loop, clock = paused(tmp_path, LiveScene(ground="rocks"), mcap=True)
-    loop.send(Record())
-    stepped(loop, clock, 20, holding=Drive(1.0))
-    loop.send(Restart())
-    stepped(loop, clock, 5)
+    stepped(loop, clock, 20, Record(), holding=Drive(1.0))
+    stepped(loop, clock, 5, Restart())
     loop.stop()
     assert (tmp_path / "live-1.mcap").read_text() == "of another day"
     assert [path.name for path in loop.recorded] == ["live-2.h5", "live-2.mcap", "live-3.h5", "live-3.mcap"]
@@ -239,8 +221,7 @@ def test_a_log_for_viewers_gets_the_rows_of_the_recording(tmp_path: Path) -> Non
 
 def test_a_log_that_fails_ends_its_recording_which_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     loop, clock = paused(tmp_path, mcap=True)
-    loop.send(Record())
-    stepped(loop, clock, 10)
+    stepped(loop, clock, 10, Record())
 
     def full(_log: McapWriter, _row: object) -> None:
         raise RecordingError("No space left on device")
@@ -269,12 +250,10 @@ def test_a_full_disk_ends_the_recording_and_not_the_drive(tmp_path: Path, monkey
     assert loop.state.speed > 1.0
     assert loop.state.time == pytest.approx(170 * 0.05)
     assert read_run(tmp_path / "live-1.h5").n_frames >= 50
-    loop.send(Record())  # as long as the disk is full
-    stepped(loop, clock, 1)
+    stepped(loop, clock, 1, Record())  # as long as the disk is full
     assert "No space left" in loop.state.notice
     monkeypatch.undo()
-    loop.send(Record())
-    stepped(loop, clock, 10)
+    stepped(loop, clock, 10, Record())
     loop.stop()
     assert [path.name for path in sorted(tmp_path.glob("*.h5"))][-1] == Path(loop.state.notice.split()[1][:-1]).name
 
@@ -282,8 +261,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_drive(tmp_path: Path, monkey
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     loop, clock = paused(tmp_path / "file")
-    loop.send(Record())
-    stepped(loop, clock, 1)
+    stepped(loop, clock, 1, Record())
     assert loop.state.recording == ""
     assert "file" in loop.state.notice
 
@@ -333,12 +311,9 @@ def test_a_rover_that_has_ended_pauses_and_says_why(tmp_path: Path) -> None:
     stepped(loop, clock, 1)
     assert loop.state.ended == "roll_over"
     assert "rolled over" in loop.state.notice
-    loop.send(Pause(on=False))
-    loop.send(SingleStep())
-    stepped(loop, clock, 3)
+    stepped(loop, clock, 3, Pause(on=False), SingleStep())
     assert loop.state.is_paused
-    loop.send(Restart())
-    stepped(loop, clock, 3)
+    stepped(loop, clock, 3, Restart())
     assert loop.state.ended == ""
     assert not loop.state.is_paused
 

@@ -28,28 +28,16 @@ def machine(name: str, wheels: list[tuple[str, float, float]], steered: tuple[st
 
 def steering(name: str, position: list[float]) -> dict[str, Any]:
     """A joint that turns about the vertical, held by a PD."""
-    return {
-        "name": name,
-        "parent": "trunk",
-        "position": position,
-        "axis": [0, 1, 0],
-        "mass": 1.0,
-        "shape": {"kind": "box", "size": [0.05, 0.1, 0.05]},
-        "hold": {"stiffness": 200.0, "damping": 5.0},
-    }
+    place = {"name": name, "parent": "trunk", "position": position, "axis": [0, 1, 0]}
+    body = {"mass": 1.0, "shape": {"kind": "box", "size": [0.05, 0.1, 0.05]}}
+    return place | body | {"hold": {"stiffness": 200.0, "damping": 5.0}}
 
 
 def rim(name: str, parent: str, position: list[float]) -> dict[str, Any]:
     """A driven disc."""
-    return {
-        "name": name,
-        "parent": parent,
-        "position": position,
-        "axis": [0, 0, 1],
-        "mass": 2.0,
-        "shape": {"kind": "disc", "radius": RADIUS},
-        "hold": {"stiffness": 500.0, "damping": 10.0},
-    }
+    place = {"name": name, "parent": parent, "position": position, "axis": [0, 0, 1]}
+    body = {"mass": 2.0, "shape": {"kind": "disc", "radius": RADIUS}}
+    return place | body | {"hold": {"stiffness": 500.0, "damping": 10.0}}
 
 
 FOUR = [("FL", 0.3, -0.3), ("FR", 0.3, 0.3), ("BL", -0.3, -0.3), ("BR", -0.3, 0.3)]

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from rovers import goes_on_alike, standing, with_fields
 
 from machines import FOUR, RADIUS, machine
 from rover_gym import Plane, RoverModel, Simulation
@@ -21,12 +22,6 @@ def platform(angles=ANGLES) -> RoverModel:
     for wheel, angle in zip(description["wheels"], angles, strict=True):
         wheel["rollers"] = float(angle)
     return RoverModel.from_dict(description)
-
-
-def standing(model: RoverModel, ground: Plane | None = None, **options) -> Simulation:
-    sim = Simulation(model, ground or Plane(), **options)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
-    return sim
 
 
 def rolling(sim: Simulation) -> np.ndarray:
@@ -87,11 +82,9 @@ def test_rollers_carry_no_force_across_their_axis():
 def test_a_braked_platform_stands_across_a_slope_up_to_its_rollers_share_of_friction(share, holds):
     """Forces along the rollers, μ N each at 45 degrees, hold μ W cos α cos 45° across: tan α = μ / √2."""
     slope = math.atan(share * 0.7 / math.sqrt(2.0))
-    description = platform().to_dict()
-    description["solids"][0]["centre_of_mass"] = [0.0, -0.15, 0.0]  # low, so that all wheels keep their loads
-    for wheel in description["wheels"]:
-        wheel |= {"stiffness": 4e6, "damping": 1.4e4}
-    sim = standing(RoverModel.from_dict(description), Plane([0.0, math.cos(slope), math.sin(slope)], 0.0))
+    low = {"trunk": {"centre_of_mass": [0.0, -0.15, 0.0]}}  # so that all wheels keep their loads
+    model = with_fields(platform(), low, {"stiffness": 4e6, "damping": 1.4e4})
+    sim = standing(model, Plane([0.0, math.cos(slope), math.sin(slope)], 0.0))
     sim.hold(sim.model.joint_names, stiffness=1e7, damping=1e5)
     assert sim.step(200).is_converged
     down = sim.v[:3] @ np.array([0.0, -math.sin(slope), math.cos(slope)])
@@ -103,9 +96,7 @@ def test_a_braked_platform_stands_across_a_slope_up_to_its_rollers_share_of_fric
 
 def test_omni_wheels_let_a_platform_drift_sideways():
     sim = standing(platform([math.pi / 2] * 4))
-    v = np.zeros(10)
-    v[2] = 0.5
-    sim.set_state(sim.q, v)
+    sim.set_state(sim.q, 0.5 * np.eye(10)[2])
     sim.step(200)
     assert sim.v[2] == pytest.approx(0.5, abs=1e-9)
     sim.set_wheel_torques([4.0] * 4)
@@ -121,12 +112,7 @@ def test_rollers_are_data_and_steps_with_them_fast_ones():
     sim = standing(model)
     sim.set_wheel_torques([3.0, -3.0, -3.0, 3.0])
     sim.step(20)
-    snapshot = sim.snapshot()
-    sim.step(20)
-    end = sim.q
-    sim.restore(snapshot)
-    sim.step(20)
-    np.testing.assert_array_equal(sim.q, end)
+    assert goes_on_alike(sim, 20)
 
 
 def test_steps_on_rollers_have_derivatives():

@@ -5,6 +5,7 @@ import math
 import gymnasium as gym
 import numpy as np
 import pytest
+from rovers import standing
 from scipy.optimize import brentq
 
 from rover_gym import PDPolicy, Plane, RoverModel, Simulation, SphereField, TriangleMesh
@@ -38,9 +39,8 @@ def tracked(wheels: int = 9, **changes) -> RoverModel:
     return RoverModel.from_dict(description(wheels, **changes))
 
 
-def standing(model: RoverModel, **options) -> Simulation:
-    sim = Simulation(model, Plane(), friction=FRICTION, **options)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+def settled(model: RoverModel, **options) -> Simulation:
+    sim = standing(model, Plane(), friction=FRICTION, **options)
     sim.step(40)
     return sim
 
@@ -61,14 +61,14 @@ def test_a_track_is_a_row_of_wheels_that_turn_together():
     assert "tracks" not in model.to_dict()
     tags = model.tags(np.zeros(8))
     np.testing.assert_allclose(tags["right_5"], [0.0, -0.05, 0.4], atol=1e-12)
-    sim = standing(model)
+    sim = settled(model)
     # The ends have half of the stiffness, so that the load is that of a uniform belt.
     loads = sim.wheel_forces[:9, 0] / (model.mass * GRAVITY / 2)
     np.testing.assert_allclose(loads, [1 / 16, *[1 / 8] * 7, 1 / 16], rtol=1e-3)
 
 
 def test_a_track_drives_straight_with_the_mass_of_its_belt():
-    sim, torque = standing(tracked()), 30.0
+    sim, torque = settled(tracked()), 30.0
     v = sim.v
     sim.set_wheel_torques(torques(sim.model, torque, torque))
     sim.step(100)
@@ -77,7 +77,7 @@ def test_a_track_drives_straight_with_the_mass_of_its_belt():
     assert sim.v[0] - v[0] == pytest.approx(expected, rel=1e-4)
     assert sim.v[2] == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(sim.motor_torques, torque / 9, rtol=1e-12)
-    alone = standing(tracked(torque_limit=9 * torque))
+    alone = settled(tracked(torque_limit=9 * torque))
     alone.set_wheel_torques(np.eye(18)[3] * torque + np.eye(18)[9] * torque)
     alone.step(100)
     np.testing.assert_allclose(alone.q, sim.q, atol=1e-12)
@@ -85,7 +85,7 @@ def test_a_track_drives_straight_with_the_mass_of_its_belt():
 
 @pytest.mark.parametrize("share", [0.97, 1.05])
 def test_turning_with_free_belts_takes_a_quarter_of_mu_w_l(share):
-    sim = standing(tracked())
+    sim = settled(tracked())
     weight = sim.model.mass * GRAVITY
     resistance = FRICTION * weight * LENGTH / 4
     sim.apply_wrench("hull", moment=[0.0, share * resistance, 0.0])
@@ -99,7 +99,7 @@ def test_turning_with_free_belts_takes_a_quarter_of_mu_w_l(share):
 def test_turning_in_place_is_as_fast_as_slip_along_and_across_allow():
     """Forces against the slip (σ, ψ' x) of each wheel, whose moments balance, give ψ' = v / (B/2 + σ/ψ')."""
     motor = {"stall_torque": 1e5, "no_load_speed": 4.0}
-    sim = standing(tracked(motor=motor, torque_limit=1e5), time_step=2e-3)
+    sim = settled(tracked(motor=motor, torque_limit=1e5), time_step=2e-3)
     sim.set_wheel_torques(torques(sim.model, -1e5, 1e5))
     sim.step(1000)
     before = sim.q[4]
@@ -136,8 +136,7 @@ def test_tracks_climb_a_step_on_which_end_wheels_alone_are_high_centred(wheels, 
     low = description(wheels, motor=motor)
     low["solids"][0]["shape"]["size"][1] = 0.32  # 4 cm over the ground
     model = RoverModel.from_dict(low)
-    sim = Simulation(model, step_of(height), friction=0.9)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim = standing(model, step_of(height), friction=0.9)
     sim.set_wheel_torques(torques(model, 150.0, 150.0))
     start = sim.q[1]
     sim.step(1200)
@@ -212,8 +211,7 @@ def test_a_commercial_vehicle_climbs_at_the_speed_of_its_motors(tmp_path, name, 
     """On the motors' line at the torque that the slope takes, v = v_top (1 - W sin α R / τ)."""
     pytest.importorskip("yourdfpy")
     model, slope = vehicle(name, tmp_path), math.radians(degrees)
-    sim = Simulation(model, Plane([-math.sin(slope), math.cos(slope), 0.0], 0.0), friction=FRICTION)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim = standing(model, Plane([-math.sin(slope), math.cos(slope), 0.0], 0.0), friction=FRICTION)
     sim.set_wheel_torques(torques(model, 1e4, 1e4))
     assert sim.step(1000).is_converged
     assert np.hypot(*sim.v[:2]) == pytest.approx(TOP_SPEED * (1.0 - math.sin(slope) / 1.8), rel=1e-3)
@@ -226,7 +224,7 @@ def test_a_commercial_vehicle_turns_as_slip_along_and_across_allow(tmp_path, nam
     """Slow belts slip by the same σ along: ψ' = (v_r - v_l) / (B + 2 σ / ψ'), whatever their mean speed."""
     pytest.importorskip("yourdfpy")
     _, (_, gauge, length, radius, wheels) = VEHICLES[name]
-    sim = standing(vehicle(name, tmp_path), time_step=2e-3)
+    sim = settled(vehicle(name, tmp_path), time_step=2e-3)
     gain = 50.0 * sim.model.mass * radius**2
     x = np.linspace(-length / 2, length / 2, wheels)
     rates = []
@@ -256,8 +254,7 @@ def test_a_commercial_vehicle_drives_and_turns_over_rocks(tmp_path, name):
     centres, radii = np.zeros((600, 3)), rng.uniform(0.03, 0.1, 600)
     centres[:, 0], centres[:, 2] = rng.uniform(0.8, 6.0, 600), rng.uniform(-1.5, 1.5, 600)
     centres[:, 1] = -0.5 * radii
-    sim = Simulation(model, SphereField(centres, radii, Plane()), friction=0.8)
-    sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+    sim = standing(model, SphereField(centres, radii, Plane()), friction=0.8)
     sim.set_wheel_torques(torques(model, 1e4, 1e4))
     assert sim.step(600).is_converged
     assert sim.q[0] > 3.5

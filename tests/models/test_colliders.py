@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from models.robot_files import rover, write
 from models.test_writers import assert_same_machine, written_and_read
+from rovers import placed
 
 from rover_gym import ModelError, RoverModel, Simulation, SphereField
 from rover_gym.core import Plane
@@ -52,32 +53,24 @@ def chassis_of(tmp_path, vertices, faces, **options):
     """A small rover whose chassis collides as a mesh."""
     trimesh = pytest.importorskip("trimesh")
     trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "hull.stl")
-    box_text = '<box size="1 0.6 0.2"/>'
-    path = write(tmp_path, rover().replace(box_text, '<mesh filename="hull.stl" scale="1 1 1"/>'))
-    return RoverModel.from_urdf(path, **options)
+    text = rover().replace('<box size="1 0.6 0.2"/>', '<mesh filename="hull.stl" scale="1 1 1"/>')
+    return RoverModel.from_urdf(write(tmp_path, text), **options)
 
 
 def test_the_geoms_of_a_body_are_its_shapes(tmp_path):
     pytest.importorskip("mujoco")
     model = RoverModel.from_mjcf(write(tmp_path, TEXT, "stone.xml"), wheels=[])
-    cylinder, capsule, ellipsoid, hull = link_shapes(model, "stone")
-    assert [shape["kind"] for shape in (cylinder, capsule, ellipsoid, hull)] == [
-        "cylinder",
-        "capsule",
-        "ellipsoid",
-        "hull",
-    ]
-    assert all(shape["collides"] for shape in (cylinder, capsule, ellipsoid, hull))
+    shapes = cylinder, capsule, ellipsoid, hull = link_shapes(model, "stone")
+    assert [shape["kind"] for shape in shapes] == ["cylinder", "capsule", "ellipsoid", "hull"]
+    assert all(shape["collides"] for shape in shapes)
     assert (cylinder["radius"], cylinder["height"]) == (0.1, 0.6)
     assert (capsule["radius"], capsule["height"]) == (0.2, 0.8)
     assert ellipsoid["radii"] == [0.1, 0.3, 0.2]  # our y is the file's z
     volume, _, _ = hull_properties(hull["points"])
     assert volume == pytest.approx(1.0 / 6.0)
     # Turned by 90 degrees about z and raised by 2 in the file: x to y, y to -x.
-    placed = {
-        tuple(np.round(point, 6) + 0.0) for point in np.array(hull["points"]) @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
-    }
-    assert placed == {(0, 0, 2), (0, 1, 2), (-1, 0, 2), (0, 0, 3)}
+    corners = np.array(hull["points"]) @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    assert {tuple(np.round(point, 6) + 0.0) for point in corners} == {(0, 0, 2), (0, 1, 2), (-1, 0, 2), (0, 0, 3)}
     assert "its convex hull of 4 vertices, volume +0.0 %" in str(model.import_report)
 
 
@@ -96,10 +89,8 @@ def test_a_concave_mesh_is_divided_and_the_report_states_the_error(tmp_path):
     volumes = [hull_properties(hull["points"])[0] for hull in hulls]
     assert 3 <= len(hulls) <= 8
     assert sum(volumes) == pytest.approx(0.28, rel=0.03)
-    error = 100.0 * (sum(volumes) / 0.28 - 1.0)
-    assert f"a mesh collides as {len(hulls)} convex parts, volume {error:+.1f} %: link[chassis]" in str(
-        model.import_report
-    )
+    told = f"{len(hulls)} convex parts, volume {100.0 * (sum(volumes) / 0.28 - 1.0):+.1f} %: link[chassis]"
+    assert f"a mesh collides as {told}" in str(model.import_report)
     whole = chassis_of(tmp_path, vertices, faces, mesh_parts=1)
     (hull,) = link_shapes(whole, "chassis")
     assert hull_properties(hull["points"])[0] == pytest.approx(0.6)
@@ -146,10 +137,7 @@ def test_the_chassis_mesh_of_an_imported_robot_hits_a_rock(tmp_path):
     lowest = {}
     for parts in (0, 8):
         model = chassis_of(tmp_path, vertices, faces, mesh_parts=parts)
-        simulation = Simulation(model, rock, time_step=0.005)
-        q = np.zeros(model.nv)
-        q[1] = 0.9
-        simulation.set_state(q, np.zeros(model.nv))
+        simulation = placed(Simulation(model, rock, time_step=0.005), y=0.9)
         touched = set()
         for _ in range(100):
             report = simulation.step()

@@ -24,19 +24,17 @@ def solid(name: str, parent: str | None = None, joint: str = "revolute", **more:
 
 
 MOTOR = {"stall_torque": 0.008, "no_load_speed": 5.0}
+WHEEL = {"name": "W", "solid": "turret", "axle": [0.0, 0.0, 1.0], "radius": 0.1, "torque_limit": 1.0, "drive_sign": 1.0}
 SHAPES = [
-    {
-        "kind": "box",
-        "size": [0.5, 0.2, 0.3],
-        "position": [0.1, 0.0, 0.0],
-        "rotation": [0.3, 0.1, -0.2],
-        "collides": True,
-    },
+    {"kind": "box", "size": [0.5, 0.2, 0.3], "collides": True}
+    | {"position": [0.1, 0.0, 0.0], "rotation": [0.3, 0.1, -0.2]},
     {"kind": "sphere", "radius": 0.1, "mass": 0.5, "collides": True, "visible": False},
 ]
 CAPSULE = {"kind": "capsule", "radius": 0.1, "height": 0.2, "collides": True}
 CORNERS = [[x, y, z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)]
+FLAT = [[x, y, 0.1] for x, y, _ in CORNERS]
 HULL = {"kind": "hull", "points": CORNERS}
+ROUND = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
 DISC = {"kind": "disc", "radius": 0.1}
 FOLLOWS_ARM = {"joint": "arm", "ratio": 1.0, "offset": 0.0}
 
@@ -58,10 +56,7 @@ MACHINES: dict[str, list[dict[str, Any]]] = {
     ],
     "chain": [solid("body", joint="fixed"), solid("a", "body"), solid("b", "a"), solid("c", "body"), solid("d", "b")],
     "trees": [solid("a", joint="free"), solid("b", joint="free")],
-    "turret": [
-        solid("turret", drive={"torque_limit": 0.01, "motor": MOTOR}),
-        solid("slide", "turret", "prismatic"),
-    ],
+    "turret": [solid("turret", drive={"torque_limit": 0.01, "motor": MOTOR}), solid("slide", "turret", "prismatic")],
     "shapes": [{"name": "body", "mass": 3.0, "shapes": SHAPES}],
 }
 
@@ -141,15 +136,10 @@ CASES: list[tuple[Any, ...]] = [
     ("joints", "solids[2].armature", 1.0),
     ("joints", "solids[3].axis", None),
     ("joints", "solids[4].locked", 0.0),
-    *(
-        ("limits", "solids[1].limits", {"lower": lower, "upper": upper}, f"solids[1].limits.{side}")
-        for lower, upper, side in (
-            (0.5, 0.5, "lower"),
-            (0.5, -0.5, "lower"),
-            (NAN, 0.5, "lower"),
-            (-0.5, INFINITE, "upper"),
-        )
-    ),
+    ("limits", "solids[1].limits", {"lower": 0.5, "upper": 0.5}, "solids[1].limits.lower"),
+    ("limits", "solids[1].limits", {"lower": 0.5, "upper": -0.5}, "solids[1].limits.lower"),
+    ("limits", "solids[1].limits", {"lower": NAN, "upper": 0.5}, "solids[1].limits.lower"),
+    ("limits", "solids[1].limits", {"lower": -0.5, "upper": INFINITE}, "solids[1].limits.upper"),
     *(("limits", f"solids[{k}].limits", {"lower": -0.5, "upper": 0.5}) for k in (0, 2, 3, 4)),
     ("chain", "solids[3].coupled", follows("b"), "solids[3].coupled.joint"),  # on another branch, farther from the root
     ("chain", {"solids[2].coupled": follows("a"), "solids[4].coupled": follows("b")}, "solids[4].coupled.joint"),
@@ -161,27 +151,13 @@ CASES: list[tuple[Any, ...]] = [
     ("turret", "solids[0].drive.torque_limit", -1.0),
     ("turret", "solids[0].drive.motor.stall_torque", 0.0),
     ("turret", "solids[1].drive", {"torque_limit": 1.0}),
-    (
-        "turret",
-        "wheels",
-        [
-            {
-                "name": "W",
-                "solid": "turret",
-                "axle": [0.0, 0.0, 1.0],
-                "radius": 0.1,
-                "torque_limit": 1.0,
-                "drive_sign": 1.0,
-            }
-        ],
-        "solids[0].drive",
-    ),
+    ("turret", "wheels", [WHEEL], "solids[0].drive"),
     ("shapes", "solids[0].shape", {"kind": "sphere", "radius": 1.0}),
     ("shapes", "solids[0].shapes", None, "solids[0].shape"),
     ("shapes", "solids[0].collides", True),
     (
         "shapes",
-        {"solids[0].shapes": None, "solids[0].inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], "solids[0].collides": True},
+        {"solids[0].shapes": None, "solids[0].inertia": ROUND, "solids[0].collides": True},
         "solids[0].collides",
     ),
     ("shapes", "solids[0].shapes[1].radius", -0.1),
@@ -196,24 +172,14 @@ CASES: list[tuple[Any, ...]] = [
     ("shapes", "solids[0].shapes[1]", {"kind": "ellipsoid", "radii": [1.0, -1.0, 1.0]}, "solids[0].shapes[1].radii"),
     ("shapes", "solids[0].shapes[1]", HULL | {"points": CORNERS[:3]}, "solids[0].shapes[1].points"),
     ("shapes", "solids[0].shapes[1]", HULL | {"points": CORNERS * 9}, "solids[0].shapes[1].points"),
-    (
-        "shapes",
-        "solids[0].shapes[1]",
-        HULL | {"points": [[x, y, 0.1] for x, y, _ in CORNERS]},
-        "solids[0].shapes[1].points",
-    ),
-    (
-        "shapes",
-        "solids[0].shapes[1]",
-        HULL | {"points": [*CORNERS[1:], [0.0, NAN, 0.0]]},
-        "solids[0].shapes[1].points[7]",
-    ),
+    ("shapes", "solids[0].shapes[1]", HULL | {"points": FLAT}, "solids[0].shapes[1].points"),
+    ("shapes", "solids[0].shapes[1]", HULL | {"points": [*FLAT[1:], [NAN] * 3]}, "solids[0].shapes[1].points[7]"),
     ("shapes", "solids[0]", {"name": "a", "mass": 1.0, "shape": HULL}, "solids[0].shape"),
     ("shapes", "solids[0].shapes[1].mass", 3.0, "solids[0].mass"),
     ("shapes", "solids[0].shapes[0].mass", 2.0, "solids[0].mass"),
     ("shapes", "solids[0].shapes[1]", DISC, "solids[0].shapes[1].mass"),
     ("shapes", "solids[0].centre_of_mass", [0.0, 0.0, 0.0], "solids[0].inertia"),
-    ("shapes", "solids[0].inertia", [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], "solids[0].centre_of_mass"),
+    ("shapes", "solids[0].inertia", ROUND, "solids[0].centre_of_mass"),
     ("shapes", "solids[0].shapes", [SHAPES[0]] * 4001, "solids"),
 ]
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from models.robot_files import rover, write
 from models.test_wheel_groups import four, round_shape
+from rovers import with_fields
 
 from rover_gym import ModelError, RoverModel, Simulation
 from rover_gym.envs.sensors import LaserScanner, Mount
@@ -58,9 +59,8 @@ def test_a_visual_mesh_is_drawn_where_the_file_puts_it_in_its_colour(tmp_path):
     assert (part.kind, part.colour) == ("mesh", (1.0, 0.0, 0.0))
     vertices, triangles = part_mesh(part)
     assert len(triangles) == 12
-    np.testing.assert_allclose(
-        [vertices.min(axis=0), vertices.max(axis=0)], [(-0.2, 0.05, -0.1), (0.2, 0.15, 0.1)], atol=1e-5
-    )
+    box = [(-0.2, 0.05, -0.1), (0.2, 0.15, 0.1)]
+    np.testing.assert_allclose([vertices.min(axis=0), vertices.max(axis=0)], box, atol=1e-5)
     ((colour, points, _),) = coloured_meshes((part,))
     assert colour == (1.0, 0.0, 0.0)
     assert len(points) == 36
@@ -113,11 +113,8 @@ def test_a_drawing_that_is_none_is_refused(changes, field):
 
 def test_drawings_change_nothing_that_moves():
     plain = RoverModel.named("open-rover")
-    source = plain.to_dict()
-    source["solids"][0]["drawings"] = [
-        {"vertices": [[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 5.0, 0.0]], "faces": [[0, 1, 2]]}
-    ]
-    drawn = RoverModel.from_dict(source)
+    drawing = {"vertices": [[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 5.0, 0.0]], "faces": [[0, 1, 2]]}
+    drawn = with_fields(plain, {plain.solid_names[0]: {"drawings": [drawing]}})
     q = np.linspace(-0.2, 0.2, plain.nq)
     np.testing.assert_array_equal(drawn.mass_matrix(q), plain.mass_matrix(q))
     assert drawn != plain

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from models.robot_files import rover, write
+from rovers import slid, standing
 
-from rover_gym import ModelError, Plane, RoverModel, Simulation
+from rover_gym import ModelError, Plane, RoverModel
 from rover_gym.core import SimulationBatch
 from rover_gym.models import RobotFileWarning
 
@@ -99,32 +100,18 @@ def cart(folder):
     return RoverModel.from_urdf(write(folder, SLEDGE.format(wheels=wheels)))
 
 
-def slid(model, degrees, heading):
-    """How far a braked cart slides down a slope within half a second, m."""
-    slope = Plane.tilted(np.radians(degrees), 0.0)
-    sim = Simulation(model, slope, friction=0.05)
-    start = model.resting_pose(slope, (0.0, 0.0), heading)
-    sim.set_state(start)
-    sim.brake()
-    assert sim.step(100).is_converged
-    return float(np.linalg.norm((sim.q - start)[:3]))
-
-
 def test_a_braked_cart_stands_along_and_slides_across_its_wheels_by_its_two_frictions(tmp_path):
     """At 0.8 along and 0.3 across it stands facing up to atan 0.8 = 38.7 degrees, and sideways to atan 0.3 = 16.7."""
     model = cart(tmp_path)
-    assert slid(model, 36.0, 0.0) < 0.02
-    assert slid(model, 15.5, np.pi / 2) < 0.005
+    assert slid(model, 36.0, 0.0, 0.5, friction=0.05) < 0.02
+    assert slid(model, 15.5, np.pi / 2, 0.5, friction=0.05) < 0.005
     slope = np.radians(30.0)
     expected = 0.5 * 9.81 * (np.sin(slope) - 0.3 * np.cos(slope)) * 0.5**2
-    assert slid(model, 30.0, np.pi / 2) == pytest.approx(expected, rel=0.03)
+    assert slid(model, 30.0, np.pi / 2, 0.5, friction=0.05) == pytest.approx(expected, rel=0.03)
 
 
 def test_forces_and_frames_of_wheels_with_two_frictions_are_in_newton_and_unit_vectors(tmp_path):
-    model = cart(tmp_path)
-    slope = Plane.tilted(np.radians(30.0), 0.0)
-    sim = Simulation(model, slope)
-    sim.set_state(model.resting_pose(slope, (0.0, 0.0), np.pi / 2))
+    sim = standing(cart(tmp_path), Plane.tilted(np.radians(30.0), 0.0), heading=np.pi / 2)
     sim.brake()
     sim.step(60)
     normal, along, across = np.abs(sim.wheel_forces).T
@@ -135,10 +122,8 @@ def test_forces_and_frames_of_wheels_with_two_frictions_are_in_newton_and_unit_v
 
 def test_a_batch_drives_carts_with_two_frictions_as_each_alone(tmp_path):
     model, slope = cart(tmp_path), Plane.tilted(np.radians(25.0), 0.3)
-    sims = [Simulation(model, slope) for _ in range(5)]
+    sims = [standing(model, slope, heading=0.4 * k) for k in range(5)]
     torques = np.array([[0.5 * k, -0.2, 0.3, 1.0] for k in range(5)])
-    for k, sim in enumerate(sims):
-        sim.set_state(model.resting_pose(slope, (0.0, 0.0), 0.4 * k))
     batch = SimulationBatch(sims)
     batch.step(torques, np.zeros((5, 4)), 60)
     assert sims[0].lanes > 1

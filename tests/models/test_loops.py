@@ -182,9 +182,8 @@ def test_the_report_names_what_is_redundant(tmp_path):
 def test_a_loop_that_is_open_in_the_file_is_refused_with_its_gap(tmp_path):
     text = linkage("a connection of sites").replace('name="tip" pos="0.8 0 0"', 'name="tip" pos="0.7 0 0"')
     path = write(tmp_path, text, "linkage.xml")
-    with pytest.raises(
-        ModelError, match=r"loop\[pin\]: the loop .pin. does not close .* the gap is 0\.1\d* m"
-    ) as caught:
+    reason = r"loop\[pin\]: the loop .pin. does not close .* the gap is 0\.1\d* m"
+    with pytest.raises(ModelError, match=reason) as caught:
         RoverModel.from_mjcf(path, wheels=[])
     assert str(caught.value).startswith(str(path))
 
@@ -225,12 +224,8 @@ def test_a_urdf_joint_that_follows_one_on_another_branch_is_a_loop(tmp_path):
     text = rover().replace('mimic joint="left_pivot"', 'mimic joint="left_drive"')
     model = RoverModel.from_urdf(write(tmp_path, text))
     (loop,) = model.loops
-    assert (loop["name"], loop["kind"], loop["solid"], loop["other"]) == (
-        "right_pivot",
-        "joint",
-        "right_rocker",
-        "left_wheel",
-    )
+    told = [loop[key] for key in ("name", "kind", "solid", "other")]
+    assert told == ["right_pivot", "joint", "right_rocker", "left_wheel"]
     run = Simulation(model)
     run.set_wheel_torques([5.0, 0.0, 0.0])
     assert run.step(50).loop_gap < 1e-12

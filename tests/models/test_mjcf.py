@@ -62,11 +62,7 @@ REFUSED = {
     "friction of a ball joint": ('<joint name="slide" type="slide" axis="1 0 0"/>', '<joint name="slide" type="ball" frictionloss="0.2"/>', r'joint\[slide\]\.frictionloss.*0\.2'),
     "a velocity servo": ("<position joint", '<velocity kv="2" joint="slide"/><position joint', r"actuator\["),
     "a muscle": ("<position joint", '<muscle joint="slide" lengthrange="0 1"/><position joint', r"actuator\["),
-    "a coupling of tendons": (
-        "<!--more-->",
-        '<tendon><fixed name="t"><joint joint="slide" coef="1"/></fixed></tendon><equality><tendon tendon1="t"/></equality>',
-        r"equality\[0\]",
-    ),
+    "a coupling of tendons": ("<!--more-->", '<tendon><fixed name="t"><joint joint="slide" coef="1"/></fixed></tendon><equality><tendon tendon1="t"/></equality>', r"equality\[0\]"),
     "a tendon": ("<!--more-->", '<tendon><fixed name="t" stiffness="3"><joint joint="slide" coef="1"/></fixed></tendon>', r"tendon\[t\]"),
     "air": ("<compiler", '<option density="1.2"/><compiler', "option.density"),
     "no gravity": ('name="arm"', 'name="arm" gravcomp="1"', "gravcomp"),
@@ -135,28 +131,13 @@ def test_a_written_rover_drives_forward_in_mujoco(tmp_path):
     assert abs(left + right) < 0.01
 
 
-@pytest.mark.parametrize(
-    ("inside", "message"),
-    [
-        (
-            '<worldbody><replicate count="100000000"><geom size="1"/></replicate></worldbody>',
-            "replicate.count.*100000000",
-        ),
-        (
-            '<worldbody><replicate count="+300"><replicate count="1e2"><geom size="1"/></replicate></replicate></worldbody>',
-            "replicate.count.*30000",
-        ),
-        ('<asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>', r"hfield.nrow.*10000000000"),
-        (
-            '<asset><texture type="2d" builtin="flat" width="99999" height="99999"/></asset>',
-            "texture.width.*9999800001",
-        ),
-        (
-            '<worldbody><body><composite count="300 300 300" type="grid"/></body></worldbody>',
-            "composite.count.*27000000",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("inside", "message"), [
+    ('<worldbody><replicate count="100000000"><geom size="1"/></replicate></worldbody>', "replicate.count.*100000000"),
+    ('<worldbody><replicate count="+300"><replicate count="1e2"><geom size="1"/></replicate></replicate></worldbody>', "replicate.count.*30000"),
+    ('<asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>', r"hfield.nrow.*10000000000"),
+    ('<asset><texture type="2d" builtin="flat" width="99999" height="99999"/></asset>', "texture.width.*9999800001"),
+    ('<worldbody><body><composite count="300 300 300" type="grid"/></body></worldbody>', "composite.count.*27000000"),
+])  # fmt: skip
 def test_few_words_that_become_enormous_are_refused_before_they_do(inside, message, tmp_path):
     """MuJoCo took minutes for the first and 40 GB for the third."""
     for included in (False, True):
@@ -227,9 +208,8 @@ def test_several_joints_of_one_body_are_a_chain_with_mujocos_mass_matrix(tmp_pat
     assert model.nv == 5
     assert model.solid_names == ["torso_rootx", "torso_rootz", "torso_torso_joint3", "torso", "leg"]
     listed = [entry for entry in model.import_report.assumed if "between two joints of one body" in entry]
-    assert listed == [
-        "1e-09 kg, because it is between two joints of one body: link torso_rootx, link torso_rootz, link torso_torso_joint3"
-    ]
+    links = "link torso_rootx, link torso_rootz, link torso_torso_joint3"
+    assert listed == [f"1e-09 kg, because it is between two joints of one body: {links}"]
     theirs = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(theirs)
     for seed in range(5):

@@ -6,12 +6,20 @@ import numpy as np
 import pytest
 from models.robot_files import LIMIT, WHEEL, body, changed, joint, rover, write
 from refusals import refused
+from rovers import standing
 
-from rover_gym import ModelError, RoverModel, Simulation
+from rover_gym import ModelError, RoverModel
 from rover_gym.models import RobotFileWarning, read_robot, read_urdf
 
 pytest.importorskip("yourdfpy")
 
+
+def solids_of(model):
+    """The solids of a model's description, by name."""
+    return {solid["name"]: solid for solid in model.to_dict()["solids"]}
+
+
+RIM = '<collision><origin rpy="1.5707963267948966 0 0"/><geometry><mesh filename="package://small/meshes/rim.stl"/></geometry></collision>'
 TO_OURS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
@@ -21,11 +29,8 @@ def test_axes_masses_and_roles_are_the_files(tmp_path):
     assert model.mass == pytest.approx(50.0 + 2 * (5.0 + 1.0 + 2.0) + 2.0)
     assert model.wheel_names == ["left_wheel", "right_wheel", "rear_wheel"]
     assert model.wheel_radii.tolist() == [0.2] * 3
-    assert [model.dof_names[i] if i >= 0 else "" for i in model.steering_joint_indices] == [
-        "left_fork",
-        "right_fork",
-        "",
-    ]
+    steered = [model.dof_names[i] if i >= 0 else "" for i in model.steering_joint_indices]
+    assert steered == ["left_fork", "right_fork", ""]
     poses = model.poses(np.zeros(model.nq))
     # The wheel's centre is that of its cylinder, 5 cm along the axle from the joint; forward, left and up in the file.
     np.testing.assert_allclose(poses["left_wheel"][0], TO_OURS @ (0.5, 0.55, -0.2), atol=1e-15)
@@ -41,11 +46,8 @@ def test_axes_masses_and_roles_are_the_files(tmp_path):
 
 def test_a_positive_command_drives_forward_whatever_the_axis(tmp_path):
     for axis in ("0 1 0", "0 -1 0"):
-        model = RoverModel.from_urdf(
-            write(tmp_path, rover(wheel_axis=axis)), steering_stiffness=1e4, steering_damping=1e2
-        )
-        sim = Simulation(model)
-        sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+        path = write(tmp_path, rover(wheel_axis=axis))
+        sim = standing(RoverModel.from_urdf(path, steering_stiffness=1e4, steering_damping=1e2))
         sim.set_wheel_torques([5.0] * 3)
         sim.step(100)
         assert sim.q[0] > 0.05, axis
@@ -55,7 +57,7 @@ def test_the_rockers_of_a_differential_move_oppositely(tmp_path):
     model = RoverModel.from_urdf(write(tmp_path, rover()))
     assert "left_rocker" in model.dof_names
     assert "right_rocker" not in model.dof_names
-    solids = {solid["name"]: solid for solid in model.to_dict()["solids"]}
+    solids = solids_of(model)
     assert solids["right_rocker"]["coupled"] == {"joint": "left_rocker", "ratio": -1.0, "offset": 0.0}
     # The stops of both hold for the one that is left: [-0.6, 0.5] and its mirror image.
     assert solids["left_rocker"]["limits"] == {"lower": -0.5, "upper": 0.5}
@@ -63,7 +65,7 @@ def test_the_rockers_of_a_differential_move_oppositely(tmp_path):
 
 def test_steering_axes_that_point_down_are_reversed(tmp_path):
     model = RoverModel.from_urdf(write(tmp_path, rover(steer_axis="0 0 -1")))
-    fork = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "left_fork")
+    fork = solids_of(model)["left_fork"]
     assert fork["axis"] == [0.0, 1.0, 0.0]
     assert fork["limits"] == {"lower": -0.5, "upper": 0.6}
     assert any("reversed" in entry for entry in model.import_report.assumed)
@@ -84,10 +86,8 @@ def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
     assert model.import_report.assumed == ()
     assert model.wheel_torque_limits.tolist() == [12.0] * 3
     assert model.steering_limit == 0.3
-    fork = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "left_fork")
-    assert fork["hold"] == {"stiffness": 300.0, "damping": 4.0}
-    wheel = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "rear_wheel")
-    assert wheel["hold"] == {"stiffness": 700.0, "damping": 9.0}
+    assert solids_of(model)["left_fork"]["hold"] == {"stiffness": 300.0, "damping": 4.0}
+    assert solids_of(model)["rear_wheel"]["hold"] == {"stiffness": 700.0, "damping": 9.0}
 
 
 def test_another_forward_axis_turns_the_machine(tmp_path):
@@ -95,11 +95,8 @@ def test_another_forward_axis_turns_the_machine(tmp_path):
     with pytest.raises(ModelError, match="forward"):
         RoverModel.from_urdf(path, forward="z")
     model = RoverModel.from_urdf(path, forward="-x")
-    zero = np.zeros(model.nq)
-    plain = RoverModel.from_urdf(path)
-    np.testing.assert_allclose(
-        model.poses(zero)["left_wheel"][0], plain.poses(zero)["left_wheel"][0] * (-1.0, 1.0, -1.0), atol=1e-15
-    )
+    turned, plain = (one.poses(np.zeros(one.nq))["left_wheel"][0] for one in (model, RoverModel.from_urdf(path)))
+    np.testing.assert_allclose(turned, plain * (-1.0, 1.0, -1.0), atol=1e-15)
     assert [wheel["drive_sign"] for wheel in model.to_dict()["wheels"]] == [-1.0] * 3
 
 
@@ -150,7 +147,7 @@ def test_a_wheel_of_a_mesh_has_the_meshs_radius(tmp_path):
     rim = trimesh.creation.cylinder(radius=150.0, height=80.0, sections=64)
     (tmp_path / "meshes").mkdir()
     rim.export(tmp_path / "meshes" / "rim.stl")
-    mesh = '<collision><origin rpy="1.5707963267948966 0 0"/><geometry><mesh filename="package://small/meshes/rim.stl" scale="0.001 0.001 0.001"/></geometry></collision>'
+    mesh = RIM.replace("/></geometry>", ' scale="0.001 0.001 0.001"/></geometry>')
     path = write(tmp_path, rover(wheel=mesh))
     assert RoverModel.from_urdf(path).wheel_radii == pytest.approx([0.15] * 3, rel=1e-6)
     (tmp_path / "meshes" / "rim.stl").unlink()
@@ -160,17 +157,13 @@ def test_a_wheel_of_a_mesh_has_the_meshs_radius(tmp_path):
 
 def test_dry_friction_is_read_or_left_out_by_word(tmp_path):
     path = write(tmp_path, changed(rover(), LIMIT, LIMIT + '<dynamics damping="0.5" friction="0.1"/>'))
-
-    def friction(model):
-        return {solid["name"]: solid.get("friction") for solid in model.to_dict()["solids"]}["left_rocker"]
-
     model = RoverModel.from_urdf(path)
-    assert friction(model) == 0.1
+    assert solids_of(model)["left_rocker"]["friction"] == 0.1
     model.to_urdf(tmp_path / "again.urdf")
-    assert friction(RoverModel.from_urdf(tmp_path / "again.urdf")) == 0.1
+    assert solids_of(RoverModel.from_urdf(tmp_path / "again.urdf"))["left_rocker"]["friction"] == 0.1
     model = RoverModel.from_urdf(path, ignore=["friction"])
-    assert friction(model) is None
-    assert next(s for s in model.to_dict()["solids"] if s["name"] == "left_rocker")["damping"] == 0.5
+    assert "friction" not in solids_of(model)["left_rocker"]
+    assert solids_of(model)["left_rocker"]["damping"] == 0.5
     for wrong in ("friction", ["rust"], [[]], 3):
         with pytest.raises(ModelError, match="ignore"):
             RoverModel.from_urdf(path, ignore=wrong)
@@ -181,19 +174,12 @@ def test_dry_friction_is_read_or_left_out_by_word(tmp_path):
 
 
 def test_what_is_not_simulated_is_listed(tmp_path):
-    extra = '<gazebo reference="chassis"><kp>1e6</kp></gazebo><sensor name="eye"/>'
-    model = RoverModel.from_urdf(
-        write(tmp_path, changed(rover(extra=extra), "<box size.*?/>", '<mesh filename="hull.dae"/>'))
-    )
+    text = rover(extra='<gazebo reference="chassis"><kp>1e6</kp></gazebo><sensor name="eye"/>')
+    path = write(tmp_path, changed(text, "<box size.*?/>", '<mesh filename="hull.dae"/>'))
+    model = RoverModel.from_urdf(path)
     listed = "\n".join(model.import_report.left_out)
-    for what in (
-        "<kp>: gazebo[chassis]",
-        "<sensor> of <robot>",
-        "a shape that touches is the mesh",
-        "hull.dae, which cannot be read",
-        "chassis",
-        "a limit of its speed",
-    ):
+    told = ("a shape that touches is the mesh", "hull.dae, which cannot be read", "a limit of its speed")
+    for what in ("<kp>: gazebo[chassis]", "<sensor> of <robot>", *told):
         assert what in listed
     assert listed in "\n".join(line.strip() for line in str(model.import_report).splitlines())
 
@@ -346,9 +332,8 @@ def test_substitutions_of_ros_have_their_defaults(tmp_path):
 @pytest.mark.parametrize("value", ["$(optenv MAST_XYZ)", "$(arg xyz)", "${x} 0 0", "$(eval 1 + 2) 0 0"])
 def test_substitutions_without_a_value_are_refused(tmp_path, value):
     text = changed(rover(), '"0.3 0.1 0.5"', f'"{value}"')
-    with pytest.raises(
-        ModelError, match=r"joint\[mast\]\.origin\.xyz: holds what xacro or roslaunch replaces"
-    ) as raised:
+    reason = r"joint\[mast\]\.origin\.xyz: holds what xacro or roslaunch replaces"
+    with pytest.raises(ModelError, match=reason) as raised:
         RoverModel.from_urdf(write(tmp_path, text))
     assert raised.value.value == value
 
@@ -390,9 +375,7 @@ def test_a_steering_joint_that_follows_another_still_does_when_its_axis_is_rever
 def with_pivot_limits(lower, upper):
     """Without the joint that follows the rocker's."""
     text = re.sub('<mimic joint="left_pivot".*?/>', "", rover())
-    return changed(
-        text, r'name="left_pivot"(.*?)lower="-0.6" upper="0.5"', rf'name="left_pivot"\1lower="{lower}" upper="{upper}"'
-    )
+    return changed(text, r'(name="left_pivot".*?)lower="-0.6" upper="0.5"', rf'\1lower="{lower}" upper="{upper}"')
 
 
 @pytest.mark.parametrize(
@@ -406,8 +389,7 @@ def with_pivot_limits(lower, upper):
 def test_limits_far_away_mean_none(tmp_path, lower, upper, limits, listed):
     """TIAGo's wheels have limits of 1e16 and were refused: neighbouring floating-point numbers are 2 rad apart there."""
     model = RoverModel.from_urdf(write(tmp_path, with_pivot_limits(lower, upper)))
-    solids = {solid["name"]: solid for solid in model.to_dict()["solids"]}
-    assert solids["left_rocker"].get("limits") == limits
+    assert solids_of(model)["left_rocker"].get("limits") == limits
     told = [entry.replace("joint[left_pivot]: ", "") for entry in model.import_report.assumed]
     assert any(listed.partition(": ")[0] in entry for entry in told) or not listed
     assert ("left_pivot" in "".join(told)) == bool(listed)
@@ -418,7 +400,7 @@ def test_limits_of_0_and_0_are_warned_of_and_mean_none(tmp_path):
     with pytest.warns(RobotFileWarning, match=r"joint\[left_pivot\]: its limits are 0 and 0.*without stops") as caught:
         model = RoverModel.from_urdf(write(tmp_path, with_pivot_limits("0", "0.0")))
     assert str(caught[0].message) in model.import_report.warnings
-    assert "limits" not in {solid["name"]: solid for solid in model.to_dict()["solids"]}["left_rocker"]
+    assert "limits" not in solids_of(model)["left_rocker"]
     with pytest.raises(ModelError, match="lower limit must be below"):
         RoverModel.from_urdf(write(tmp_path, with_pivot_limits("0.1", "0.1")))
 
@@ -426,9 +408,8 @@ def test_limits_of_0_and_0_are_warned_of_and_mean_none(tmp_path):
 def test_packages_are_searched_where_ros_keeps_them(tmp_path, monkeypatch):
     """Meshes of robots that lie in other packages were not found, and the error did not say where it had looked."""
     trimesh = pytest.importorskip("trimesh")
-    mesh = '<collision><origin rpy="1.5707963267948966 0 0"/><geometry><mesh filename="package://small/meshes/rim.stl"/></geometry></collision>'
     (tmp_path / "robots").mkdir()
-    path = write(tmp_path / "robots", rover(wheel=mesh))
+    path = write(tmp_path / "robots", rover(wheel=RIM))
     source, install = tmp_path / "src", tmp_path / "install"
     for folder, radius in ((source / "small", 0.1), (install / "share" / "small", 0.2)):
         (folder / "meshes").mkdir(parents=True)
@@ -440,8 +421,8 @@ def test_packages_are_searched_where_ros_keeps_them(tmp_path, monkeypatch):
     assert str(tmp_path) in str(caught.value)
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'other'}:{install}")
     with pytest.raises(ModelError, match="in none of"):
-        RoverModel.from_urdf(write(tmp_path / "robots", rover(wheel=mesh.replace("small/", "large/"))))
-    path = write(tmp_path / "robots", rover(wheel=mesh))
+        RoverModel.from_urdf(write(tmp_path / "robots", rover(wheel=RIM.replace("small/", "large/"))))
+    path = write(tmp_path / "robots", rover(wheel=RIM))
     assert RoverModel.from_urdf(path).wheel_radii == pytest.approx([0.2] * 3, rel=1e-6)
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(source))
     assert RoverModel.from_urdf(path).wheel_radii == pytest.approx([0.1] * 3, rel=1e-6)

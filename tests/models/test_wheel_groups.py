@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from models.robot_files import write
+from rovers import slid, standing
 
-from rover_gym import CommandError, ModelError, Plane, RoverModel, Simulation
+from rover_gym import CommandError, ModelError, RoverModel, Simulation
 from rover_gym.models import RobotFileWarning, check_statics, read_robot
 from rover_gym.models.import_report import solid_rows
 
@@ -41,18 +42,13 @@ def robot(*parts, base=""):
 
 def four(rear=None, axis="0 1 0", rpy=ABOUT_Y, more=""):
     """A robot on four wheels; `rear`: what the joints of the rear wheels hold besides, by side."""
-    parts = []
-    for name, (x, y) in PLACES.items():
-        extra = (rear or {}).get(name, "") + more
-        parts.append(
-            link(f"{name}_wheel", round_shape(0.1, rpy=rpy)) + turning(f"{name}_wheel", x, y, axis=axis, more=extra)
-        )
-    return robot(*parts)
+    extra = {name: (rear or {}).get(name, "") + more for name in PLACES}
+    links = [link(f"{name}_wheel", round_shape(0.1, rpy=rpy)) for name in PLACES]
+    return robot(*links, *(turning(f"{name}_wheel", *at, axis=axis, more=extra[name]) for name, at in PLACES.items()))
 
 
 def settled(model):
-    sim = Simulation(model)
-    sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    sim = standing(model)
     sim.step(200)
     return sim
 
@@ -127,10 +123,8 @@ def test_a_drawn_box_of_size_0_does_not_refuse_a_robot(tmp_path, size):
 def test_one_axle_with_two_round_shapes_is_two_wheels_on_one_joint(tmp_path):
     """Half of an axle's wheels were lost, and the robot stood on three points."""
     axle = round_shape(0.1, y=0.2) + round_shape(0.1, y=-0.2) + round_shape(0.02, length=0.4)
-    parts = [
-        link(f"{end}_axle", axle, mass=2.0) + turning(f"{end}_axle", x, 0.0)
-        for end, x in (("front", 0.2), ("rear", -0.2))
-    ]
+    ends = {"front_axle": 0.2, "rear_axle": -0.2}
+    parts = (link(end, axle, mass=2.0) + turning(end, x, 0.0) for end, x in ends.items())
     model = RoverModel.from_urdf(write(tmp_path, robot(*parts)), torque_limit=5.0)
     assert model.wheel_names == ["front_axle", "rear_axle", "front_axle_2", "rear_axle_2"]
     assert model.mass == pytest.approx(24.0)
@@ -147,9 +141,8 @@ def test_one_axle_with_two_round_shapes_is_two_wheels_on_one_joint(tmp_path):
 def test_a_chosen_wheel_that_cannot_touch_level_ground_is_refused(tmp_path):
     spare = link("spare_wheel", round_shape(0.1)) + turning("spare_wheel", 0.0, 0.0, z=0.3)
     text = four().replace("</robot>", spare + "</robot>")
-    with pytest.raises(
-        ModelError, match=r"link\[spare_wheel\]: this wheel cannot touch level ground: .* 0\.3 m farther down"
-    ):
+    reason = r"link\[spare_wheel\]: this wheel cannot touch level ground: .* 0\.3 m farther down"
+    with pytest.raises(ModelError, match=reason):
         RoverModel.from_urdf(write(tmp_path, text))
     given = [f"{name}_wheel" for name in PLACES]
     assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=given).wheel_names == given
@@ -205,13 +198,7 @@ def test_an_imported_robot_stands_braked_on_a_slope(tmp_path):
     """It rolled 19 m down 10 degrees in 5 s: wheels had no gains to be held with, and nothing said so."""
     RoverModel.named("open-rover").to_urdf(tmp_path / "o.urdf")
     model = RoverModel.from_urdf(tmp_path / "o.urdf")
-    slope = Plane.tilted(np.radians(10.0), 0.0)
-    sim = Simulation(model, slope)
-    start = model.resting_pose(slope, (0.0, 0.0), 0.0)
-    sim.set_state(start)
-    sim.brake()
-    sim.step(400)
-    assert np.linalg.norm((sim.q - start)[:3]) < 0.01
+    assert slid(model, 10.0) < 0.01
     assert "a brake holds it with" in str(model.import_report)
 
 
@@ -231,27 +218,20 @@ def test_a_brake_or_a_hold_without_gains_is_refused_by_the_field_that_lacks_them
 
 def test_masses_make_a_body_of_what_is_only_drawn(tmp_path):
     drawn = '<link name="base"><visual><geometry><box size="0.6 0.4 0.2"/></geometry></visual></link>'
-    wheels = "".join(
-        f'<link name="{n}_wheel">{round_shape(0.1, role="visual")}</link>' + turning(f"{n}_wheel", *at)
-        for n, at in PLACES.items()
-    )
+    round_one = round_shape(0.1, role="visual")
+    names = {f"{name}_wheel": at for name, at in PLACES.items()}
+    wheels = "".join(f'<link name="{n}">{round_one}</link>' + turning(n, *at) for n, at in names.items())
     path = write(tmp_path, f'<robot name="r">{drawn}{wheels}</robot>')
     with pytest.raises(ModelError, match="must have a mass"):
         RoverModel.from_urdf(path)
-    masses = {"base": 10.0} | {f"{name}_wheel": 0.5 for name in PLACES}
-    model, report = read_robot(path, masses=masses)
+    model, report = read_robot(path, masses={"base": 10.0} | dict.fromkeys(names, 0.5))
     assert model.mass == pytest.approx(12.0)
     assert "centre and inertia of its shapes" in str(report)
-    base = model.to_dict()["solids"][0]
-    np.testing.assert_allclose(
-        base["inertia"][:3], 10.0 / 12.0 * np.array([0.2**2 + 0.4**2, 0.6**2 + 0.4**2, 0.6**2 + 0.2**2])
-    )
+    inertia = 10.0 / 12.0 * np.array([0.2**2 + 0.4**2, 0.6**2 + 0.4**2, 0.6**2 + 0.2**2])
+    np.testing.assert_allclose(model.to_dict()["solids"][0]["inertia"][:3], inertia)
     np.testing.assert_allclose(check_statics(model).loads, 3.0 * 9.81, rtol=1e-3)
-    for wrong, reason in (
-        ({"nothing": 1.0}, "there is no such link"),
-        ({"base": 0.0}, r"masses\[base\]"),
-        (3, "must be a mapping"),
-    ):
+    bad = (({"nothing": 1.0}, "there is no such link"), ({"base": 0.0}, r"masses\[base\]"), (3, "must be a mapping"))
+    for wrong, reason in bad:
         with pytest.raises(ModelError, match=reason):
             read_robot(path, masses=wrong)
     heavier, _ = read_robot(write(tmp_path, four()), masses={"base": 40.0})
@@ -264,27 +244,14 @@ def test_a_robot_with_a_caster_brakes_by_its_driven_wheels(tmp_path):
     caster = source["wheels"][-1]
     caster["torque_limit"] = 0.0
     next(solid for solid in source["solids"] if solid["name"] == caster["solid"]).pop("hold")
-    model = RoverModel.from_dict(source)
-    slope = Plane.tilted(np.radians(10.0), 0.0)
-    sim = Simulation(model, slope)
-    start = model.resting_pose(slope, (0.0, 0.0), 0.0)
-    sim.set_state(start)
-    sim.brake()
-    sim.step(200)
-    assert np.linalg.norm((sim.q - start)[:3]) < 0.01
+    assert slid(RoverModel.from_dict(source), 10.0) < 0.01
 
 
 def test_the_rows_of_a_model_with_two_wheels_on_one_solid_name_it_once() -> None:
     ball = {"kind": "sphere", "radius": 0.1}
     body = {"name": "body", "mass": 5.0, "shape": ball}
-    axle = {
-        "name": "axle",
-        "parent": "body",
-        "position": [0.0, -0.1, 0.0],
-        "axis": [0, 0, 1],
-        "mass": 1.0,
-        "shape": ball,
-    }
+    axle = {"name": "axle", "parent": "body", "position": [0.0, -0.1, 0.0], "axis": [0, 0, 1]}
+    axle |= {"mass": 1.0, "shape": ball}
     wheel = {"solid": "axle", "axle": [0, 0, 1], "radius": 0.1, "torque_limit": 1.0, "drive_sign": -1.0}
     wheels = [{"name": name, "deflection": 1e-3, **wheel} for name in ("left", "right")]
     model = RoverModel.from_dict({"format": 1, "name": "m", "solids": [body, axle], "wheels": wheels})

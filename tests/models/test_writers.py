@@ -60,13 +60,12 @@ def test_every_rover_of_the_gallery_comes_back(tmp_path, kind, name):
     model = RoverModel.named(name)
     back = written_and_read(model, tmp_path, kind)
     assert_same_machine(model, back)
-    solids = [wheel["solid"] for wheel in model.to_dict()["wheels"]]
-    by_solid = {wheel["solid"]: wheel for wheel in back.to_dict()["wheels"]}
-    assert set(by_solid) == set(solids)
-    for wheel in model.to_dict()["wheels"]:
-        again = by_solid[wheel["solid"]]
-        for field in ("radius", "width", "torque_limit", "steering"):
-            assert again.get(field) == wheel.get(field), field
+    fields = ("radius", "width", "torque_limit", "steering")
+    told, again = (
+        {wheel["solid"]: {field: wheel.get(field) for field in fields} for wheel in one.to_dict()["wheels"]}
+        for one in (model, back)
+    )
+    assert told == again
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -96,10 +95,8 @@ def test_springs_and_rotors_pass_through_mjcf_and_are_refused_by_urdf(tmp_path):
 
 def test_a_urdf_has_one_tree_and_no_ball_joints(tmp_path):
     solids = machine().to_dict()["solids"]
-    ball = [
-        solids[0],
-        {key: solids[1][key] for key in ("name", "parent", "position", "mass", "shapes")} | {"joint": "spherical"},
-    ]
+    kept = {key: solids[1][key] for key in ("name", "parent", "position", "mass", "shapes")}
+    ball = [solids[0], kept | {"joint": "spherical"}]
     with pytest.raises(ModelError, match=r"solids\[1\]\.joint"):
         RoverModel.from_dict({"name": "x", "solids": ball}).to_urdf(tmp_path / "x.urdf")
     two = [solids[0], solids[0] | {"name": "other"}]
@@ -154,13 +151,7 @@ PAGE = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
 SOURCES = ROOT / "rust" / "core" / "src" / "multibody"
 
 #: Structures that are written to a file, and their variants' fields.
-STRUCTURES = (
-    "description/mod.rs",
-    "description/closure.rs",
-    "description/joint.rs",
-    "description/shape.rs",
-    "motor.rs",
-)
+STRUCTURES = (*(f"description/{name}.rs" for name in ("mod", "closure", "joint", "shape")), "motor.rs")
 
 
 def fields() -> set[str]:
@@ -200,11 +191,8 @@ def test_a_model_file_says_its_format_and_may_leave_it_out() -> None:
 )
 def test_errors_name_line_field_and_value(tmp_path: Path, old: str, new: str, expected: str) -> None:
     lines = ['name = "small"', "", "# one solid", "[[solids]]", 'name = "trunk"', "mass = 600.0"]
-    text = (
-        RoverModel().to_text()
-        if "steering" in old
-        else "\n".join([*lines, 'shape = { kind = "sphere", radius = 1.0 }'])
-    )
+    lines += ['shape = { kind = "sphere", radius = 1.0 }']
+    text = RoverModel().to_text() if "steering" in old else "\n".join(lines)
     path = tmp_path / "small.toml"
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ModelError, match=expected) as caught:
@@ -213,17 +201,16 @@ def test_errors_name_line_field_and_value(tmp_path: Path, old: str, new: str, ex
 
 
 def test_the_gallery_has_what_its_names_promise() -> None:
-    shapes = {
-        name: (len(model.wheel_names), sum(i >= 0 for i in model.steering_joint_indices))
-        for name, model in ((name, RoverModel.named(name)) for name in RoverModel.names())
-    }
-    assert shapes == {
+    models = {name: RoverModel.named(name) for name in RoverModel.names()}
+    steered = [(len(model.wheel_names), sum(i >= 0 for i in model.steering_joint_indices)) for model in models.values()]
+    expected = {
         "rover": (6, 6),
         "mars-rover": (6, 4),
         "open-rover": (6, 4),
         "skid-steered": (4, 0),
         "four-steered": (4, 4),
     }
+    assert dict(zip(models, steered, strict=True)) == expected
     for name in ("mars-rover", "open-rover"):
         solids = {solid["name"]: solid for solid in RoverModel.named(name).to_dict()["solids"]}
         assert solids["right_rocker"]["coupled"]["ratio"] == -1.0

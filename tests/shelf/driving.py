@@ -3,6 +3,7 @@
 from typing import Literal
 
 import numpy as np
+from rovers import placed
 
 from rover_gym import RoverModel, Simulation, SphereField
 from shelf.problem import Dense
@@ -15,7 +16,6 @@ def hardest(simulation: Simulation, steps: int) -> Dense:
         report = simulation.step()
         if report.iterations > worst:
             worst, problem = report.iterations, simulation.last_problem()
-    assert problem is not None
     return Dense(*(np.array(array) for array in problem))
 
 
@@ -32,9 +32,7 @@ def on_rocks(
     simulation = Simulation(
         RoverModel().replace(wheel_radius=0.20), field, time_step=time_step, friction=friction, variant=variant
     )
-    q = np.zeros(21)
-    q[1] = 0.45
-    simulation.set_state(q, np.zeros(21))
+    placed(simulation, y=0.45)
     simulation.step(round(1.0 / time_step))
     simulation.set_wheel_torques([20.0] * 6)
     simulation.step(round(wait / time_step))

@@ -25,25 +25,12 @@ def script(name: str, function: str) -> Script:
     return run
 
 
-@pytest.fixture(scope="session")
-def evaluate() -> Script:
-    """`evaluate.py`."""
-    return script("evaluate", "evaluate")
+def fixture_of(name: str, function: str) -> Any:
+    """A fixture that gives a command of a script."""
+    return pytest.fixture(scope="session")(lambda: script(name, function))
 
 
-@pytest.fixture(scope="session")
-def passable() -> Script:
-    """`passable.py`."""
-    return script("passable", "passable")
-
-
-@pytest.fixture(scope="session")
-def ablations() -> Script:
-    """`ablations.py`."""
-    return script("ablations", "ablations")
-
-
-@pytest.fixture(scope="session")
-def train_foresight() -> Script:
-    """`train_foresight.py`."""
-    return script("train_foresight", "train")
+evaluate = fixture_of("evaluate", "evaluate")
+passable = fixture_of("passable", "passable")
+ablations = fixture_of("ablations", "ablations")
+train_foresight = fixture_of("train_foresight", "train")

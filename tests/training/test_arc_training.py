@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from typer.testing import CliRunner
+from commands import output_of, rover
+from refusals import refused
 
 from rover_gym import OptionError
-from rover_gym.cli import app
 from rover_gym.drive import ArcNetwork
 from rover_gym.learn.arc_config import ArcConfig, ArcPPOConfig, read_arc_config
 from rover_gym.learn.arc_learner import ArcVecEnv, leash_at, make_model, network_of
@@ -57,30 +57,23 @@ def test_a_training_writes_a_network_and_goes_on(tmp_path: Path, workers: int) -
     lines = (folder / "curve.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith("stage,decisions,cpu_minutes,easy")
     if workers == 1:
-        assert settings.ppo is not None
         longer = replace(settings, ppo=replace(settings.ppo, decisions=144))
         train_arcs(longer, folder, workers=1, threads=1, device="cpu", resume=True, say=said.append)
         assert json.loads((folder / "run.json").read_text(encoding="utf-8"))["decisions"] == 144
         other = config(tmp_path, scenes={"rocks": {"environment": {"terrain": "rocks"}}})
-        with pytest.raises(OptionError) as caught:
+        with refused(OptionError, "scenes"):
             train_arcs(other, folder, resume=True)
-        assert caught.value.field == "scenes"
 
 
 @pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
 def test_the_command_trains_and_its_policy_drives(tmp_path: Path) -> None:
     path, run = tmp_path / "tiny.yaml", tmp_path / "run"
     path.write_text(yaml.safe_dump({**TINY, "ppo": None}), encoding="utf-8")
-    runner = CliRunner()
-    trained = runner.invoke(app, ["train", str(path), "--output", str(run), "--workers", "1"])
-    assert trained.exit_code == 0, trained.output
-    driven = runner.invoke(
-        app, ["evaluate", str(run), "--difficulty", "0", "--episodes", "1", "--output", str(tmp_path)]
-    )
-    assert driven.exit_code == 0, driven.output
-    assert "scenes:" in runner.invoke(app, ["train", "anywhere", "--show"]).output
+    output_of("train", path, "--output", run, "--workers", 1)
+    output_of("evaluate", run, "--difficulty", 0, "--episodes", 1, "--output", tmp_path)
+    assert "scenes:" in output_of("train", "anywhere", "--show")
     path.write_text("scenes: [", encoding="utf-8")
-    assert runner.invoke(app, ["train", str(path)]).exit_code != 0
+    assert rover("train", path).exit_code != 0
 
 
 @pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
@@ -95,9 +88,8 @@ def test_imitation_goes_on_after_a_round(tmp_path: Path) -> None:
 
 
 def test_without_a_checkpoint_nothing_goes_on(tmp_path: Path) -> None:
-    with pytest.raises(OptionError) as caught:
+    with refused(OptionError, "resume"):
         train_arcs(config(tmp_path), tmp_path / "run", resume=True)
-    assert caught.value.field == "resume"
 
 
 def test_the_network_without_pytorch_is_the_same(tmp_path: Path) -> None:
@@ -147,7 +139,6 @@ def test_bad_configurations_are_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(OptionError) as caught:
             config(tmp_path, **changes)
-        assert caught.value.field is not None
         assert caught.value.field.startswith(field)
 
 

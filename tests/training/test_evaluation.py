@@ -58,10 +58,8 @@ def test_a_ratios_interval_covers_as_it_says() -> None:
 
 
 def test_a_summary_counts_ends_and_takes_times_of_successes_only() -> None:
-    summary = summarise(
-        "p",
-        [a_drive(0, "goal", 4.0, 2.0, 10.0), a_drive(1, "time", 60.0, 1.0, 5.0), a_drive(2, "goal", 6.0, 2.0, 10.0)],
-    )
+    rows = ((0, "goal", 4.0, 2.0, 10.0), (1, "time", 60.0, 1.0, 5.0), (2, "goal", 6.0, 2.0, 10.0))
+    summary = summarise("p", [a_drive(*row) for row in rows])
     assert (summary.successes, summary.episodes) == (2, 3)
     assert summary.success.value == pytest.approx(2 / 3)
     assert summary.time.value == 5.0

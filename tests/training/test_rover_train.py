@@ -35,6 +35,14 @@ def config(tmp_path: Path) -> Path:
     return path
 
 
+def with_ppo(folder: Path, **options: Any) -> Path:
+    """A configuration of PPO alone."""
+    ppo = {"decisions": 32, "n_steps": 4, "batch_size": 16, "n_epochs": 1, **options}
+    path = folder / "ppo.yaml"
+    path.write_text(yaml.safe_dump({**TINY, "imitation": {"rounds": 0}, "ppo": ppo}), encoding="utf-8")
+    return path
+
+
 @pytest.mark.nightly("tests/training/test_rover_train.py::test_a_run_is_never_overwritten_and_its_figures_are_events")
 def test_several_seeds_end_with_a_table(config: Path, tmp_path: Path) -> None:
     runs = tmp_path / "runs"
@@ -53,17 +61,13 @@ def test_several_seeds_end_with_a_table(config: Path, tmp_path: Path) -> None:
 @pytest.mark.nightly("tests/training/test_arc_training.py::test_a_training_writes_a_network_and_goes_on")
 def test_a_training_begins_with_a_network(config: Path, tmp_path: Path) -> None:
     """PPO alone, whose actor is held at first: the network stays the shipped one."""
-    ppo = {"decisions": 32, "n_steps": 4, "batch_size": 16, "n_epochs": 1, "every": 16, "warm_up": 10_000}
-    changed = tmp_path / "ppo.yaml"
-    changed.write_text(yaml.safe_dump({**TINY, "imitation": {"rounds": 0}, "ppo": ppo}), encoding="utf-8")
+    changed = with_ppo(tmp_path, every=16, warm_up=10_000)
     output_of("train", changed, "--from", "anywhere", "--output", tmp_path / "held", "--workers", 1)
     shipped = ArcNetwork.read(FOLDER / "anywhere" / "arcs.npz")
     held = ArcNetwork.read(tmp_path / "held" / "arcs.npz")
     for name, values in shipped.arrays.items():
         np.testing.assert_array_equal(values, held.arrays[name])
-    changed.write_text(
-        yaml.safe_dump({**TINY, "imitation": {"rounds": 0}, "ppo": {**ppo, "warm_up": 0}}), encoding="utf-8"
-    )
+    with_ppo(tmp_path, every=16, warm_up=0)
     output_of("train", changed, "--from", tmp_path / "held", "--output", tmp_path / "free", "--workers", 1)
     free = ArcNetwork.read(tmp_path / "free" / "arcs.npz")
     assert not np.array_equal(shipped.arrays["dense_2"], free.arrays["dense_2"])
@@ -133,8 +137,6 @@ def test_a_run_without_a_round_cannot_be_resumed_and_the_error_says_what_to_do(c
 def test_a_long_training_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between two evaluations, for minutes, a training printed nothing."""
     monkeypatch.setattr("rover_gym.learn.arc_recipe.SILENCE", 0.0)
-    ppo = {"decisions": 32, "n_steps": 4, "batch_size": 16, "n_epochs": 1, "every": 1000}
-    changed = tmp_path / "ppo.yaml"
-    changed.write_text(yaml.safe_dump({**TINY, "imitation": {"rounds": 0}, "ppo": ppo}), encoding="utf-8")
+    changed = with_ppo(tmp_path, every=1000)
     said = output_of("train", changed, "--from", "anywhere", "--output", tmp_path / "run", "--workers", 1)
     assert "16 of 32 decisions, 50%" in said

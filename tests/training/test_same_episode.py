@@ -16,16 +16,10 @@ from rover_gym.envs.vector.sb3 import RoverVecEnv
 from rover_gym.learn.command_vec_env import CommandVecEnv
 
 ROVERS, SEED, LIMIT, REPEAT = 3, 70, 100, 3
+NOISY: dict[str, Any] = {"height_scan": (8, 6, 0.2), "friction": (0.5, 0.8), "observation_noise": 0.01}
 GROUNDS: dict[str, dict[str, Any]] = {
     "plane": {"terrain": "plane", "goal_distance": (2.0, 4.0), "control_frequency": 10},
-    "rocks": {
-        "terrain": "rocks",
-        "goal_distance": (2.0, 4.0),
-        "difficulty": 1.0,
-        "height_scan": (8, 6, 0.2),
-        "friction": (0.5, 0.8),
-        "observation_noise": 0.01,
-    },
+    "rocks": {"terrain": "rocks", "goal_distance": (2.0, 4.0), "difficulty": 1.0, **NOISY},
 }
 
 
