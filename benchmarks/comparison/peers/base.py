@@ -61,6 +61,16 @@ class Variant:
     differs: str
     best: bool = True
 
+    @property
+    def key(self) -> dict[str, str]:
+        """Engine and name, as files of results have them."""
+        return {"engine": self.engine, "variant": self.name}
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What files of results say about the variant."""
+        return self.key | {"settings": self.settings, "differs": self.differs, "best": self.best}
+
 
 @dataclass(frozen=True)
 class Body:
