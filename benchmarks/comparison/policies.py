@@ -159,16 +159,8 @@ def _percent(one: Mapping[str, Any]) -> str:
 
 def table(data: Mapping[str, Any], name: str) -> str:
     """The table of a group, in Markdown."""
-    heads = (
-        "scene",
-        "policy",
-        "success",
-        "95% interval",
-        "time to goal",
-        "energy",
-        f"over `{YARDSTICK}`",
-        "other ends",
-    )
+    over = f"over `{YARDSTICK}`"
+    heads = ("scene", "policy", "success", "95% interval", "time to goal", "energy", over, "other ends")
     lines = []
     last = ""
     for one in data["rows"]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from reports import table
 
 from validation.ball_drum import GLASS, YIELD
 from validation.ball_janssen import farthest
@@ -42,12 +43,10 @@ class Finding:
         """Whether the number is in its range; one that is not finite is not."""
         return bool(self.low <= self.number <= self.high)
 
-    def row(self) -> str:
-        """A line of a table."""
+    def cells(self) -> list[str]:
+        """Of a line of a table."""
         number = f"{self.number:{self.digits}} {self.unit}".strip()
-        return (
-            f"| {self.what} | {self.expected} | {self.source} | {number if self.holds else f'**outside**: {number}'} |"
-        )
+        return [self.what, self.expected, self.source, number if self.holds else f"**outside**: {number}"]
 
 
 def collapse(data: dict[str, Any]) -> Iterator[Finding]:
@@ -398,7 +397,6 @@ PARTS = {
 }
 
 
-def table(found: list[Finding]) -> str:
+def table_of(found: list[Finding]) -> str:
     """All rows."""
-    head = ["| what | expected | source | measured |", "|---|---|---|---|"]
-    return "\n".join(head + [f.row() for f in found])
+    return table(["what", "expected", "source", "measured"], [f.cells() for f in found])
