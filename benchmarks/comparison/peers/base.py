@@ -57,8 +57,8 @@ class Variant:
     engine: str
     name: str
     build: Callable[[RoverScene, float], Runner]
-    settings: str
-    differs: str
+    settings: str = ""
+    differs: str = ""
     best: bool = True
 
     @property
