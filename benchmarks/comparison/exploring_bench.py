@@ -56,23 +56,10 @@ def instructions(ground: str, torque: float) -> dict[str, float]:
     """Instructions of each part of a step, the mean over the counted steps."""
     program = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "examples" / "explore_steps"
     with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [  # noqa: S607
-                "valgrind",
-                "--tool=callgrind",
-                "--collect-atstart=no",
-                "--toggle-collect=*counted_step*",
-                "--dump-before=*part_ends*",
-                f"--callgrind-out-file={folder}/out",
-                program,
-                ground,
-                str(torque),
-                str(COUNTED_DRIVES),
-            ],
-            check=True,
-            capture_output=True,
-            text=True,
-        )
+        counting = ["valgrind", "--tool=callgrind", "--collect-atstart=no", "--toggle-collect=*counted_step*"]
+        counting += ["--dump-before=*part_ends*", f"--callgrind-out-file={folder}/out"]
+        command = [*counting, program, ground, str(torque), str(COUNTED_DRIVES)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
         steps, *parts = done.stdout.split()
         return by_part(int(steps), parts, Path(folder))
 

@@ -14,13 +14,13 @@ import numpy as np
 from reports import fill, read_json, table, write_json
 from rich.console import Console
 
-from comparison.ensembles import distance, drive
+from comparison.ensembles import drive
 from comparison.exploring import PERIOD, REST, drives, scene
 from comparison.machine import meta
 from comparison.output import command_line, page_of
 from comparison.peers import LeftOut, Variant, load
 from comparison.run import run
-from comparison.scene import Array, RoverScene, steps_in
+from comparison.scene import Array, RoverScene, distance, steps_in
 from comparison.tables import number
 
 REFERENCES = Path(__file__).parent / "references" / "exploring.json"

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from comparison import exploring_chart as chart
-from comparison.ensembles import distance, drive
+from comparison.ensembles import drive
+from comparison.scene import distance
 
 
 @pytest.mark.parametrize(("ground", "torque"), chart.SCENES)

@@ -5,9 +5,9 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from comparison.ensembles import distance
 from comparison.peers.grid import corners, middle, triangles
 from comparison.run import run
+from comparison.scene import distance
 from comparison.surfaces import bodies, drives
 from comparison.surfaces.our_surfaces import ROVERS, ROVERS_ON_BALLS, OurBody
 from comparison.surfaces.rolling import over_curve, over_facets, rolled

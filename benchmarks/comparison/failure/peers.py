@@ -9,15 +9,10 @@ import numpy as np
 from comparison.failure.finding import Row, for_each
 from comparison.failure.rover import ODD_MASSES, G, with_odd_masses
 from comparison.peers import Runner, Variant
-from comparison.scene import Phase, RoverScene, steps_in
+from comparison.scene import Phase, RoverScene, rigid, steps_in
 from comparison.scenes import parked
-from rover_gym import RoverModel
 
 STEP = 2e-3  # s
-
-
-#: The machine of every engine: rigid wheels without motors.
-RIGID = RoverModel().replace(wheel_stiffness=0.0, motor=None)
 
 
 def _flat(name: str, machine: dict[str, Any], height: float, phase: Phase, *, brake: bool = True) -> RoverScene:
@@ -62,7 +57,7 @@ def slide(variant: Variant) -> Iterator[Row]:
 def mass_ratios(variant: Variant) -> Iterator[Row]:
     """Trunk a hundred times heavier, wheels a thousand times lighter: dropped from 5 cm, it stands."""
     for title, odd in ODD_MASSES.items():
-        runner = _build(variant, _flat(title, with_odd_masses(RIGID.to_dict(), *odd), 0.40, Phase(3.0)))
+        runner = _build(variant, _flat(title, with_odd_masses(rigid(), *odd), 0.40, Phase(3.0)))
         runner.advance(steps_in(3.0, STEP))
         low, speed = float(0.35 - runner.position()[1]), runner.speed()
         off = max(abs(low), speed)
@@ -73,7 +68,7 @@ def mass_ratios(variant: Variant) -> Iterator[Row]:
 @for_each()
 def wheel_spin(variant: Variant) -> Iterator[Row]:
     """260 N m a wheel for 2.3 s: all slip, v = mu g t = 15.79 m/s."""
-    machine = RIGID.replace(wheel_torque_limit=1e3).to_dict()
+    machine = rigid(wheel_torque_limit=1e3)
     runner = _build(variant, _flat("spin", machine, 0.35, Phase(2.3, torques=(260.0,) * 6), brake=False))
     runner.advance(steps_in(2.3, STEP))
     off = abs(runner.speed() / (0.7 * G * 2.3) - 1.0)
@@ -86,7 +81,7 @@ def drop(variant: Variant) -> Iterator[Row]:
     """From 2 m: how far the trunk goes below its height at rest, which is how deep the wheels go."""
     depth = 0.0
     for extra in (0.0, 0.004, 0.008):  # the impact falls elsewhere in its step
-        runner = _build(variant, _flat("drop", RIGID.to_dict(), 2.35 + extra, Phase(1.0)))
+        runner = _build(variant, _flat("drop", rigid(), 2.35 + extra, Phase(1.0)))
         for _ in range(steps_in(1.0, STEP)):
             runner.advance(1)
             depth = max(depth, 0.35 - float(runner.position()[1]))
