@@ -71,15 +71,8 @@ def row(
     engine: str, settings: str, hardware: str, rovers: int, rate: float, error: float, source: str
 ) -> dict[str, Any]:
     """A row of the file."""
-    return {
-        "engine": engine,
-        "settings": settings,
-        "hardware": hardware,
-        "rovers": rovers,
-        "rover_steps_per_s": rate,
-        "rms_error_m": error,
-        "source": source,
-    }
+    names = ("engine", "settings", "hardware", "rovers", "rover_steps_per_s", "rms_error_m", "source")
+    return dict(zip(names, (engine, settings, hardware, rovers, rate, error, source), strict=True))
 
 
 def lines_of(rows: list[dict[str, Any]]) -> dict[tuple[str, str, str], list[dict[str, Any]]]:

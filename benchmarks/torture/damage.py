@@ -116,8 +116,8 @@ def attempt(
 
 
 def use(ledger: Ledger, what: str, sim: Any) -> None:
-    """A few steps of a simulation that was accepted: finite, or a `StepError`."""
-    for _ in range(5):
+    """A few steps of a simulation that was accepted, and is not None: finite, or a `StepError`."""
+    for _ in range(5 if sim is not None else 0):
         if attempt(ledger, what, sim.step) is None:
             return
         state = (sim.position, sim.velocity) if isinstance(sim, DiskSimulation) else (sim.q, sim.v)
@@ -184,9 +184,7 @@ def models(random: Random, ledger: Ledger) -> None:
         back = attempt(ledger, "RoverModel.to_text", lambda found=found: RoverModel.from_text(found.to_text()))
         if back is not None and back.to_dict() != found.to_dict():
             ledger.find("a model is another after its way through a file")
-        sim = attempt(ledger, "Simulation", Simulation, found)
-        if sim is not None:
-            use(ledger, "a damaged model", sim)
+        use(ledger, "a damaged model", attempt(ledger, "Simulation", Simulation, found))
 
 
 #: Writer, reader and ending of the kinds of robot files, by the package that reads them.
@@ -220,9 +218,7 @@ def robots(random: Random, ledger: Ledger) -> None:
             continue
         if attempt(ledger, "RoverModel.from_dict", lambda found=found: RoverModel.from_dict(found.to_dict())) != found:
             ledger.find("an imported model is another after its way through its description")
-        sim = attempt(ledger, "Simulation", Simulation, found)
-        if sim is not None:
-            use(ledger, "a damaged robot", sim)
+        use(ledger, "a damaged robot", attempt(ledger, "Simulation", Simulation, found))
 
 
 def _moving() -> Simulation:
@@ -258,13 +254,9 @@ def snapshots(random: Random, ledger: Ledger) -> None:
         snapshot = attempt(ledger, "from_bytes", Snapshot.from_bytes, damaged)
         if snapshot is None:
             continue
-        before = sim.snapshot().to_bytes()
-
-        def restore(snapshot: Any = snapshot) -> bool:
-            sim.restore(snapshot)
-            return True
-
-        if attempt(ledger, "restore", restore):
+        before, refused = sim.snapshot().to_bytes(), ledger.refused
+        attempt(ledger, "restore", sim.restore, snapshot)
+        if ledger.refused == refused:
             use(ledger, "a damaged snapshot", sim)
             sim.restore(Snapshot.from_bytes(data))
         elif sim.snapshot().to_bytes() != before:
@@ -280,9 +272,7 @@ def rocks(random: Random, ledger: Ledger) -> None:
         path.write_bytes(mutate_bytes(random, ("x,y,z,radius\n" + rows[:3000]).encode()))
         terrain = attempt(ledger, "SphereField.from_file", SphereField.from_file, path)
         if terrain is not None:
-            sim = attempt(ledger, "Simulation", lambda terrain=terrain: Simulation(terrain=terrain))
-            if sim is not None:
-                use(ledger, "a damaged field", sim)
+            use(ledger, "a damaged field", attempt(ledger, "Simulation", Simulation, RoverModel(), terrain))
 
 
 INPUTS = Bounds(not_converged=1.0, refused=1.0, slowest=2.0)
