@@ -9,6 +9,7 @@ A page marks a number with the key that says where it is from, and a table with 
 |---|---|
 | `cost SCENE ERROR CURVE` | CPU ms per simulated second at which a curve of `chart.json` reaches an error |
 | `least SCENE CURVE` | smallest error of the curve, cm |
+| `error SCENE STEP CURVE` | error of the curve at a step, cm |
 | `rollout ENGINE ROW` | us a step of `rollout.json` |
 | `solved METHOD` | problems of `solver_profiles.json` that a method of contacts solves |
 | `faster WHICH` | Siconos' best time over that of `auto`: `mean`, `least`, NAME; how many `problems`, `slower` |
@@ -33,10 +34,13 @@ from reports import table as table_of
 from comparison import gpu_chart, policies
 from comparison.output import CHART
 from comparison.presets import short_table
+from comparison.spheres import tables as spheres
+from comparison.surfaces import tables as surfaces
 from comparison.tables import cost_of, curve, number, rows_of, short_reach
 
 PAGES = (
     "README.md",
+    "docs/accuracy.md",
     "docs/comparison.md",
     "docs/many-rovers.md",
     "docs/policies.md",
@@ -56,10 +60,9 @@ TABLES = {
     "validation": "docs/tables/validation.md",
     "sand": "docs/validation/sand.md",
 }
-VALUE = re.compile(
-    r"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:cost|least|rollout|cell|policy|solved|faster) [^>]*?) -->)"
-)
-TABLE = re.compile(r"(?P<begin><!-- table (?P<key>\w+) -->\n\n).*?(?P<end>\n\n<!-- end of table -->)", flags=re.DOTALL)
+KINDS = "cost|least|error|rollout|cell|policy|solved|faster"
+VALUE = re.compile(rf"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:{KINDS}) [^>]*?) -->)")
+TABLE = re.compile(r"(?P<begin><!-- table (?P<key>\w+) -->\n\n).*?(?P<end><!-- end of table -->)", flags=re.DOTALL)
 
 
 @cache
@@ -84,7 +87,7 @@ def cell(page: str, row: str, column: str) -> str:
             heads = []
         elif not heads:
             heads = cells
-        elif column in heads and cells[: len(first)] == first:
+        elif column in heads and (cells[: len(first)] == first or cells[0] == row):
             found += re.findall(r"-?\d[\d.]*(?:e-?\d+)?", cells[heads.index(column)])[:1]
     if len(found) != 1:
         raise LookupError(f"{TABLES[page]}: {len(found)} cells of the row {row!r} and the column {column!r}")
@@ -112,11 +115,15 @@ def value(key: str) -> str:
         engine, row = rest.split(" ", 1)
         times = {line["row"]: line for line in data("rollout.json")["rows"]}
         return number(times[row][engine])
-    scene, *error, name = rest.split(" ", 2 if kind == "cost" else 1)
+    scene, *at, name = rest.split(" ", 1 if kind == "least" else 2)
+    if kind == "error":
+        step = 1e-3 * float(at[0].removesuffix("ms"))
+        rows = rows_of(data("chart.json"), scene, *name.split(", ", 1))
+        return number(100.0 * next(p["error"] for p in rows if math.isclose(p["step"], step)))
     points = curve(data("chart.json"), scene, name)
     if kind == "least":
         return number(100.0 * min(error for _, error in points))
-    cost = cost_of(points, float(error[0].removesuffix("mm")) * 1e-3)
+    cost = cost_of(points, float(at[0].removesuffix("mm")) * 1e-3)
     if cost is None:
         raise LookupError(f"{key}: the curve does not reach the error")
     return number(cost)
@@ -217,13 +224,15 @@ MADE: dict[str, Callable[[], str]] = {
     "rollout": rollout_table,
     "sand": sand_table,
     "exploring": exploring_table,
+    "surfaces": lambda: surfaces.short_table(data("surfaces.json")),
+    "spheres": lambda: spheres.short_table(data("spheres.json")),
 }
 
 
 def filled(text: str) -> str:
     """A page with the numbers and the tables that the files have."""
     text = VALUE.sub(lambda found: value(found["key"]) + found["mark"], text)
-    return TABLE.sub(lambda found: found["begin"] + table(found["key"]) + found["end"], text)
+    return TABLE.sub(lambda found: f"{found['begin']}{table(found['key'])}\n\n{found['end']}", text)
 
 
 def main() -> None:

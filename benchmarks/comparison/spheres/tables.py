@@ -65,3 +65,18 @@ def tables(data: dict[str, Any]) -> str:
         parts.append(f"**{scene}**: {error.label}, and CPU time of a step")
         parts.append(table(["engine", *(f"{1e3 * h:g} ms" for h in steps)], lines))
     return "\n\n".join([*parts, f"{measured(data['meta'])}."])
+
+
+#: Scenes of the manual's table: of rolling one direction stands for three.
+SHORT = ("666", "elastic 666", "bouncing", "rolling, diagonal")
+
+
+def short_table(data: dict[str, Any], step: float = 1e-3) -> str:
+    """Markdown: the errors at one step, a line an engine and variant and a column a scene."""
+    points = [p for p in data["points"] if p["step"] == step]
+    lines = []
+    for key in dict.fromkeys((p["engine"], p["variant"]) for p in points):
+        rows = {p["scene"]: p for p in points if (p["engine"], p["variant"]) == key}
+        found = [rows.get(scene, {}).get(ERRORS[scene].key) for scene in SHORT]
+        lines.append([", ".join(key), *("-" if error is None else f"{error:.1e}" for error in found)])
+    return table(["engine", *(f"{scene}: {ERRORS[scene].label}" for scene in SHORT)], lines)

@@ -104,3 +104,22 @@ def tables(data: dict[str, Any]) -> str:
     changes = ", ".join(millimetres(change) for change in meta["changes_of_references_m"])
     lines += [f"The references of the hills change by {changes} mm when their step is halved.", ""]
     return "\n".join([*lines, *left_out(meta["missing"]), f"{measured(meta)}."])
+
+
+def short_table(data: dict[str, Any], spacing: float = 0.05, step: float = 1e-3) -> str:
+    """Markdown: what the manual shows of one spacing of the cells and one step, a line an engine and variant."""
+    cells: dict[str, Callable[[Row], str]] = {
+        "edges": lambda row: f"{millimetres(row['error'])}, {false_impulse(row['impulse'])}",
+        "rest": lambda row: f"{millimetres(row['error'])}, {false_impulse(row['impulse'])}",
+        "sine": lambda row: millimetres(row["error"]),
+        "hills": lambda row: f"{millimetres(row['error'])}, {number(row['cpu_ms_per_s'])} ms/s",
+    }
+    points = [p for p in data["points"] if p["step"] == step and p.get("spacing", spacing) == spacing]
+    lines = []
+    for key in dict.fromkeys((p["engine"], p["variant"]) for p in points):
+        rows = {p["scene"]: p for p in points if (p["engine"], p["variant"]) == key}
+        own = [cell(rows[scene]) if "failure" not in rows[scene] else "-" for scene, cell in cells.items()]
+        lines.append([", ".join(key), *own])
+    what = ("ball over edges: error, false impulse", "box at rest: way, false impulse")
+    heads = ["errors in mm", *what, "ball on a sine: error", "rover over hills: error, CPU time"]
+    return table(heads, lines)
