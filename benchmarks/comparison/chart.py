@@ -18,7 +18,7 @@ from comparison.machine import meta
 from comparison.output import command_line, page_of
 from comparison.peers import LeftOut, Variant, load
 from comparison.references import load as load_reference
-from comparison.run import run
+from comparison.run import timed
 from comparison.scene import STEPS, RoverScene, Trace
 from comparison.scenes import flat_drive, parked, rocks, rug
 from comparison.tables import write
@@ -61,14 +61,11 @@ def measure(
                 row["failure"] = f"left out: would take more than {cap:g} s of CPU time"
                 continue
             try:
-                trace = run(variant, measured.scene, step, cap)
+                trace = timed(variant, measured.scene, step, cap, short=1.0, times=2)
             except LeftOut as left_out:
                 row["failure"] = f"left out: {left_out.reason}"
                 continue
             cost = trace.cpu / trace.simulated
-            for _ in range(2 if trace.cpu < 1.0 and not trace.failure else 0):
-                again = run(variant, measured.scene, step, cap)
-                cost = min(cost, again.cpu / again.simulated)
             said = trace.failure
             if trace.failure:
                 row["failure"] = trace.failure

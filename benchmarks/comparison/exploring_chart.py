@@ -19,7 +19,7 @@ from comparison.exploring import PERIOD, REST, drives, scene
 from comparison.machine import meta
 from comparison.output import command_line, page_of
 from comparison.peers import LeftOut, Variant, load
-from comparison.run import run
+from comparison.run import timed
 from comparison.scene import Array, RoverScene, distance, steps_in
 from comparison.tables import number
 
@@ -83,16 +83,14 @@ def point(variant: Variant, played: list[RoverScene], paths: list[Array], step: 
     errors, cpu, simulated = [], 0.0, 0.0
     for one, path in zip(played, paths, strict=True):
         try:
-            traces = [run(variant, one, step, CAP)]
-            if traces[0].cpu < 0.1:
-                traces.append(run(variant, one, step, CAP))
+            trace = timed(variant, one, step, CAP, short=0.1, times=1)
         except LeftOut as left_out:
             return {"failure": f"left out: {left_out.reason}"}
-        if traces[0].failure:
-            return {"failure": traces[0].failure}
-        errors.append(distance(driven(traces[0].positions), path))
-        cpu += min(trace.cpu for trace in traces)
-        simulated += traces[0].simulated
+        if trace.failure:
+            return {"failure": trace.failure}
+        errors.append(distance(driven(trace.positions), path))
+        cpu += trace.cpu
+        simulated += trace.simulated
     low, median, high = np.quantile(errors, (0.25, 0.5, 0.75))
     return {"error": median, "quartiles": [low, high], "cpu_ms_per_s": 1e3 * cpu / simulated}
 

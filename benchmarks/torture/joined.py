@@ -10,6 +10,7 @@ from rover_gym import HeightField, Plane, RoverModel, Simulation
 from rover_gym.core import SimulationBatch
 from torture.drives import log_uniform
 from torture.ledger import Bounds, Ledger, Regime
+from torture.round_trips import restored
 
 Random = np.random.Generator
 
@@ -114,7 +115,7 @@ def together(random: Random, ledger: Ledger) -> None:
     for _ in range(n_rovers):
         command = limits * random.uniform(-0.3, 1.0, len(limits)) * log_uniform(random, 0.05, 1.0)
         sim.set_wheel_torques(command)
-        starts.append((_copy(sim), command))
+        starts.append((restored(sim, sim.snapshot()), command))
         if not _go(sim, steps, ledger):
             break
     batch = SimulationBatch([start for start, _ in starts], threads=1)
@@ -125,12 +126,6 @@ def together(random: Random, ledger: Ledger) -> None:
         own = batch.simulation(k)
         if not ((own.q == alone.q).all() and (own.v == alone.v).all()):
             ledger.find("a batch moves otherwise than each alone")
-
-
-def _copy(sim: Simulation) -> Simulation:
-    copy = Simulation(sim.model, sim.terrain, **sim.settings)
-    copy.restore(sim.snapshot())
-    return copy
 
 
 def _go(sim: Simulation, steps: int, ledger: Ledger) -> bool:

@@ -15,7 +15,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from comparison.mujoco_rover import HALF_WIDTH, text_of
-from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
+from comparison.peers.base import Variant, bodies, held, quaternion_of
 from comparison.peers.grid import corners, middle, triangles, wavefront
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
@@ -121,7 +121,7 @@ class BulletRunner:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "rover.urdf"
             path.write_text(description(scene), encoding="utf-8")
-            w, x, y, z = quaternion_of(rotation_of(scene.q))
+            w, x, y, z = quaternion_of(scene.q)
             self.rover = c.loadURDF(str(path), list(scene.q[:3]), [x, y, z, w], flags=c.URDF_USE_INERTIA_FROM_FILE)
         for ground in grounds:
             c.changeDynamics(ground, -1, lateralFriction=1.0)  # Bullet multiplies the two

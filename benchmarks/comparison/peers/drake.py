@@ -40,7 +40,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from comparison.mujoco_rover import HALF_WIDTH
-from comparison.peers.base import LeftOut, Variant, bodies, held, rotation_of, turn_z_to
+from comparison.peers.base import LeftOut, Variant, bodies, held, rotation_of
 from comparison.peers.grid import corners, triangles, wavefront
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
@@ -77,7 +77,7 @@ def hydroelastic(friction: float, radius: float | None = None) -> ProximityPrope
 
 def add_plane(plant: MultibodyPlant, normal: Array, properties: ProximityProperties, *, is_hydroelastic: bool) -> None:
     """The plane through the origin: a half-space, or in point contact a large box."""
-    turn = RotationMatrix(turn_z_to(normal))
+    turn = RotationMatrix.MakeFromOneVector(normal, axis_index=2)
     pose, shape = RigidTransform(turn, -5.0 * normal), Box(GROUND, GROUND, 10.0)
     if is_hydroelastic:
         pose, shape = RigidTransform(turn, np.zeros(3)), HalfSpace()
