@@ -241,7 +241,7 @@ def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list
         machine.to_mjcf(file)
         text = file.read_text(encoding="utf-8")
     wheels = {wheel["solid"]: wheel for wheel in machine.to_dict()["wheels"]}
-    limits = {solid["name"]: solid for solid in machine.to_dict()["solids"]}
+    solids = {solid["name"]: solid for solid in machine.to_dict()["solids"]}
     texts = []
     for simulation in simulations:
         root = ElementTree.fromstring(text)  # noqa: S314 - our own text
@@ -262,17 +262,12 @@ def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list
                 geom.attrib |= masks | {"type": kind, "size": size}
         for motor in root.iter("motor"):
             motor.attrib.pop("ctrlrange", None)
-        for name, solid in limits.items():
-            if (
-                solid.get("hold")
-                and name not in wheels
-                and not any(a.get("name") == f"hold_{name}" for a in root.iter("position"))
-            ):
-                # A joint held by its model, and not steered, is a spring and a damper.
-                for joint in root.iter("joint"):
-                    if joint.get("name") == name and joint.get("type"):
-                        joint.set("stiffness", repr(solid["hold"]["stiffness"]))
-                        joint.set("damping", repr(solid["hold"]["damping"]))
+        # A joint held by its model, and not steered, is a spring and a damper.
+        driven = {*wheels, *(str(servo.get("name")).removeprefix("hold_") for servo in root.iter("position"))}
+        for joint in root.iter("joint"):
+            hold = solids.get(str(joint.get("name")), {}).get("hold")
+            if hold and joint.get("type") and joint.get("name") not in driven:
+                joint.attrib |= {gain: repr(hold[gain]) for gain in ("stiffness", "damping")}
         _add_ground(root, simulation.terrain)
         texts.append(ElementTree.tostring(root, encoding="unicode"))
     return texts

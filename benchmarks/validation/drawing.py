@@ -152,15 +152,10 @@ def hourglass(panels: Any, data: dict[str, Any]) -> None:
     runs, fixed, free = data["runs"], data["fixed"], data["free"]
     opening, rate, error = (np.array([r[name] for r in runs], dtype=float) for name in ("opening", "rate", "error"))
     spans = np.linspace(fixed["k"], 1.05 * opening.max(), 200)
-    left.plot(
-        spans,
-        fixed["C"] ** (2.0 / 3.0) * (spans - fixed["k"]),
-        color=PAPER,
-        label=f"{fixed['C']:.2f} (D/d - {fixed['k']:.2f})$^{{3/2}}$",
-    )
-    left.errorbar(
-        opening, rate ** (2.0 / 3.0), 4.0 / 3.0 * error / rate ** (1.0 / 3.0), fmt="o", color=OURS, capsize=3.0
-    )
+    label = f"{fixed['C']:.2f} (D/d - {fixed['k']:.2f})$^{{3/2}}$"
+    left.plot(spans, fixed["C"] ** (2.0 / 3.0) * (spans - fixed["k"]), color=PAPER, label=label)
+    bars = {"fmt": "o", "color": OURS, "capsize": 3.0}
+    left.errorbar(opening, rate ** (2.0 / 3.0), 4.0 / 3.0 * error / rate ** (1.0 / 3.0), **bars)
     left.set_xlim(left=0.0)
     left.set_ylim(bottom=0.0)
     left.set_ylabel(r"W$^{2/3}$, W in $\rho\sqrt{g}\,$d$^{3/2}$")
@@ -168,20 +163,13 @@ def hourglass(panels: Any, data: dict[str, Any]) -> None:
     spans = np.linspace(0.9 * opening.min(), 1.05 * opening.max(), 200)
     over = (opening - fixed["k"]) ** 1.5
     right.axhline(fixed["C"], color=PAPER)
-    right.plot(
-        spans,
-        free["C"] * (spans - free["k"]) ** free["n"] / (spans - fixed["k"]) ** 1.5,
-        "--",
-        color=OURS,
-        linewidth=1.2,
-        label=f"{free['C']:.2f} (D/d - {free['k']:.2f})$^{{{free['n']:.2f}}}$",
-    )
-    right.errorbar(opening, rate / over, 2.0 * error / over, fmt="o", color=OURS, capsize=3.0)
+    label = f"{free['C']:.2f} (D/d - {free['k']:.2f})$^{{{free['n']:.2f}}}$"
+    fit = free["C"] * (spans - free["k"]) ** free["n"] / (spans - fixed["k"]) ** 1.5
+    right.plot(spans, fit, "--", color=OURS, linewidth=1.2, label=label)
+    right.errorbar(opening, rate / over, 2.0 * error / over, **bars)
     for name, marker, label in (("lower", "s", "half the filling"), ("finer", "^", "and half the step")):
-        run = data[name]
-        right.plot(
-            run["opening"] + 0.3, run["rate"] / (run["opening"] - fixed["k"]) ** 1.5, marker, color=OTHER, label=label
-        )
+        place, height = data[name]["opening"] + 0.3, data[name]["rate"] / (data[name]["opening"] - fixed["k"]) ** 1.5
+        right.plot(place, height, marker, color=OTHER, label=label)
     right.set_ylabel(f"W / (D/d - {fixed['k']:.2f})$^{{3/2}}$")
     legend(right)
     for axes in (left, right):
@@ -280,13 +268,8 @@ def ball_drum(panels: Any, data: dict[str, Any]) -> None:
     """Surfaces in a drum, and their slope against friction, against the rate and against the size of the balls."""
     (surfaces, frictions), (rates, sizes) = panels
     _surfaces(surfaces, data)
-    frictions.plot(
-        list(YIELD),
-        list(YIELD.values()),
-        "s",
-        color=PAPER,
-        label="slow shear: Peyneau and Roux 2008, Chialvo et al. 2012",
-    )
+    label = "slow shear: Peyneau and Roux 2008, Chialvo et al. 2012"
+    frictions.plot(list(YIELD), list(YIELD.values()), "s", color=PAPER, label=label)
     frictions.axhspan(*GLASS, color=PAPER, alpha=0.12, label="glass beads: Jop et al. 2006")
     _angles(frictions, data, "drum with a rough wall")
     smooth = data["smooth"]

@@ -166,6 +166,28 @@ def run_off(watched: Watched, *, looks: int, most: float) -> None:
         quiet = quiet + 1 if slow(watched) and not fallen.any() else 0
 
 
+def fly(watched: Watched, steps: int) -> dict[str, float]:
+    """Takes steps: how much of the kinetic energy is lost, and how much all growth of the energy adds up to."""
+    start = watched.sim.energy().kinetic
+    watched.step(steps)
+    return {"lost": 1.0 - watched.sim.energy().kinetic / start, "grown": watched.ledger.growth / start}
+
+
+def meet(watched: Watched, duration: float) -> dict[str, float]:
+    """Lets clouds meet: relative changes of their momentum and its moment, and the share of energy that is left."""
+    sim, d = watched.sim, len(watched.sim.settings["gravity"])
+    x, v = np.zeros((2, len(sim.radius), 3))
+    x[:, :d], v[:, :d] = sim.position[:, :d], sim.velocity[:, :d]
+    sizes = (float(sim.mass @ np.linalg.norm(of, axis=1)) for of in (v, np.cross(x, v)))
+    before, kinetic = sim.momentum(), sim.energy().kinetic
+    watched.step(round(duration / sim.time_step))
+    change = np.abs(sim.momentum() - before)
+    parts = (change[:d], change[d:])
+    momentum, moment = (float(part.max()) / size for part, size in zip(parts, sizes, strict=True))
+    left = float(sim.energy().kinetic / kinetic)
+    return {"momentum_error": momentum, "moment_error": moment, "energy_left": left}
+
+
 def line(x: np.ndarray, y: np.ndarray) -> dict[str, float]:
     """The straight line through points: its value at 0 with the standard error, and its slope with its own."""
     (slope, value), covariance = np.polyfit(x, y, 1, cov=True)
