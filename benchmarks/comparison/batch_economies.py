@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from reports import table
 from rich.console import Console
-from rich.table import Table
 
 from rover_gym import Plane, SphereField
 from rover_gym.core import SimulationBatch
@@ -73,12 +73,10 @@ def main() -> None:
     found = measure()
     whole = found["steering, plane"]
     width = SimulationBatch([RoverVectorEnv(1).prototype.simulation]).instruction_set
-    table = Table(title=f"{N_ROVERS} rovers, one thread, {platform.processor() or platform.machine()}, {width}")
-    for heading in ("batch", "rover-steps/s of CPU time", "time over the first"):
-        table.add_column(heading, justify="left" if heading == "batch" else "right")
-    for name, seconds in found.items():
-        table.add_row(name, f"{1.0 / seconds:,.0f}", f"{seconds / whole:.2f}")
-    Console(width=100).print(table)
+    rows = [[name, f"{1.0 / seconds:,.0f}", f"{seconds / whole:.2f}"] for name, seconds in found.items()]
+    machine = platform.processor() or platform.machine()
+    Console(width=100).print(f"{N_ROVERS} rovers, one thread, {machine}, {width}\n")
+    Console(width=100).print(table(["batch", "rover-steps/s of CPU time", "time over the first"], rows))
 
 
 if __name__ == "__main__":

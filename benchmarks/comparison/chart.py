@@ -5,24 +5,23 @@ less than a second is repeated and the least time kept. One thread. Writes `char
 `docs/tables/comparison.md`.
 """
 
-import argparse
-import json
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from reports import read_json, write_json
 from rich.console import Console
 
-from comparison.machine import processor, versions
-from comparison.output import CHART, QUICK, page_of
+from comparison.machine import meta
+from comparison.output import command_line, page_of
 from comparison.peers import LeftOut, Variant, load
 from comparison.references import load as load_reference
-from comparison.run import run
+from comparison.run import timed
 from comparison.scene import STEPS, RoverScene, Trace
 from comparison.scenes import flat_drive, parked, rocks, rug
-from comparison.tables import fill
+from comparison.tables import write
 
 
 @dataclass(frozen=True)
@@ -53,62 +52,45 @@ def measure(
 ) -> list[dict[str, Any]]:
     """One row for every variant and step: error, CPU ms per simulated second, failure."""
     rows: list[dict[str, Any]] = []
-    expected = dict.fromkeys((v.engine, v.name) for v in variants)
+    longest: dict[Variant, float] = {}  # CPU s times step of the last run
     for step in sorted((s for s in steps if s >= measured.finest), reverse=True):
         for variant in variants:
-            key = (variant.engine, variant.name)
-            row = {"scene": measured.scene.name, "engine": key[0], "variant": key[1], "step": step}
-            last = expected[key]
-            if last is not None and last[1] * last[0] / step > 1.5 * cap:
-                rows.append(row | {"failure": f"left out: would take more than {cap:g} s of CPU time"})
+            row = {"scene": measured.scene.name, **variant.key, "step": step}
+            rows.append(row)
+            if longest.get(variant, 0.0) / step > 1.5 * cap:
+                row["failure"] = f"left out: would take more than {cap:g} s of CPU time"
                 continue
             try:
-                trace = run(variant, measured.scene, step, cap)
+                trace = timed(variant, measured.scene, step, cap, short=1.0, times=2)
             except LeftOut as left_out:
-                rows.append(row | {"failure": f"left out: {left_out.reason}"})
+                row["failure"] = f"left out: {left_out.reason}"
                 continue
             cost = trace.cpu / trace.simulated
-            for _ in range(2 if trace.cpu < 1.0 and not trace.failure else 0):
-                again = run(variant, measured.scene, step, cap)
-                cost = min(cost, again.cpu / again.simulated)
+            said = trace.failure
             if trace.failure:
                 row["failure"] = trace.failure
             else:
-                expected[key] = (step, trace.cpu)
+                longest[variant] = step * trace.cpu
                 row |= {"error": measured.error(trace), "cpu_ms_per_s": 1e3 * cost}
-            rows.append(row)
-            console.print(
-                f"{measured.scene.name:<11} {step * 1e3:>6g} ms  {variant.engine + ': ' + variant.name:<34}"
-                + (
-                    row["failure"]
-                    if trace.failure
-                    else f"{row['error']:>10.2e} {measured.unit} {cost * 1e3:>9.2f} ms/s"
-                )
-            )
+                said = f"{row['error']:>10.2e} {measured.unit} {cost * 1e3:>9.2f} ms/s"
+            name = f"{variant.engine}: {variant.name}"
+            console.print(f"{measured.scene.name:<11} {step * 1e3:>6g} ms  {name:<34}{said}")
     return rows
 
 
 def measure_all(path: Path, wanted: list[str] | None, steps: tuple[float, ...], cap: float, console: Console) -> None:
     """Measures scenes and writes the file after each, keeping what it has of the others."""
-    variants, missing = load()
-    for engine, why in missing.items():
-        console.print(f"left out, not installed: {engine} ({why})")
+    variants, missing = load(console)
     every = scenes()
-    data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    data: dict[str, Any] = read_json(path, {})
     data |= {
-        "meta": {
-            "command": "make chart",
-            "cost": "CPU time of one thread per simulated second, ms; the least of up to three runs",
-            "processor": processor(),
-            "python": platform.python_version(),
-            "packages": versions(),
-            "cap_s": cap,
-        },
+        "meta": meta(
+            cost="CPU time of one thread per simulated second, ms; the least of up to three runs",
+            python=platform.python_version(),
+            cap_s=cap,
+        ),
         "scenes": {m.scene.name: {"title": m.scene.title, "unit": m.unit, "error": m.what} for m in every},
-        "engines": [
-            {"engine": v.engine, "variant": v.name, "settings": v.settings, "differs": v.differs, "best": v.best}
-            for v in variants
-        ],
+        "engines": [variant.told for variant in variants],
         "missing": missing,
     }
     for measured in every:
@@ -117,30 +99,24 @@ def measure_all(path: Path, wanted: list[str] | None, steps: tuple[float, ...], 
             continue
         rows = measure(measured, variants, steps, cap, console)
         data["points"] = [row for row in data.get("points", []) if row["scene"] != name] + rows
-        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        write_json(path, data)
 
 
 def main() -> None:
     """Measures and draws."""
-    parser = argparse.ArgumentParser(description="Error against CPU time for this project and its peers.")
-    parser.add_argument("--quick", action="store_true", help=f"four steps and a cap of 2 s a run, under {QUICK}")
-    parser.add_argument("--draw", action="store_true", help="only draw what chart.json has")
-    parser.add_argument("--scenes", nargs="*", help="only these; the rest is kept as it is in chart.json")
-    parser.add_argument("--cap", type=float, default=8.0, help="CPU time that a run may take, s")
-    arguments = parser.parse_args()
+    description = "Error against CPU time for this project and its peers."
+    quick = "four steps and a cap of 2 s a run"
+    given = command_line("chart.json", description, quick, cap=8.0, has_scenes=True)
     console = Console(width=140)
-    output = QUICK if arguments.quick else CHART
-    output.mkdir(parents=True, exist_ok=True)
-    path = output / "chart.json"
-    if not arguments.draw:
-        steps, cap = (STEPS[3::2], 2.0) if arguments.quick else (STEPS, arguments.cap)
-        measure_all(path, arguments.scenes, steps, cap, console)
+    if not given.draw:
+        steps, cap = (STEPS[3::2], 2.0) if given.quick else (STEPS, given.cap)
+        measure_all(given.path, given.scenes, steps, cap, console)
     from comparison.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
 
-    data = json.loads(path.read_text(encoding="utf-8"))
-    for picture in draw(data, output):
+    data = read_json(given.path)
+    for picture in draw(data, given.path.parent):
         console.print(str(picture))
-    fill(page_of(output), data)
+    write(page_of(given.path.parent), data)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from reports import table
 from rich.console import Console
 
 from comparison.rollout import STEPS_A_COMMAND, TIME_STEP, Player, one_by_one, together
@@ -92,14 +93,14 @@ def microseconds(make: Callable[[], Simulation], n: int, seed: int) -> float:
 
 def main() -> None:
     """Prints the table."""
-    console = Console(width=120, highlight=False)
-    console.print("| | in a batch | alone |\n|---|---|---|")
+    rows = []
     for name, make in ROWS.items():
         cells, beside = [], flying if name == TURNING else driving
         for n in (TOGETHER, ALONE):
             ratios = [microseconds(make, n, seed) / microseconds(beside, n, seed) for seed in range(ROUNDS)]
             cells.append(f"{statistics.median(ratios):.2f}")
-        console.print(f"| {name} | {' | '.join(cells)} |")
+        rows.append([name, *cells])
+    Console(width=120, highlight=False).print(table(["", "in a batch", "alone"], rows))
 
 
 if __name__ == "__main__":

@@ -6,24 +6,15 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
-
-mpl.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
+
+from comparison.curves import COLOURS, OURS, finish, label, plt, save, style
+from comparison.tables import rows_of
 
 Array = npt.NDArray[np.float64]
 Curve = tuple[dict[str, Any], Array, Array, Array]
 
-OURS = "rover-gym"
-COLOURS = {
-    OURS: "#d1361f",
-    "Drake": "#2f6db3",
-    "MuJoCo": "#3f8f4f",
-    "Bullet": "#8a5fb0",
-    "Pinocchio": "#b07a1e",
-    "Siconos": "#5b6770",
-}
 #: Of our variants in the picture of ours.
 OWN_COLOURS = ("#d1361f", "#e8a33d", "#7a4fa3", "#2b7a78")
 STYLES = {"SAP, stiff": (0, (4, 2)), "defaults": (0, (1, 1.5))}
@@ -37,12 +28,7 @@ def curves(data: dict[str, Any], scene: str) -> list[Curve]:
     """Variant, steps, costs (ms per simulated second) and errors of every curve of a scene."""
     out = []
     for engine in data["engines"]:
-        key = (engine["engine"], engine["variant"])
-        rows = [
-            p for p in data["points"] if p["scene"] == scene and (p["engine"], p["variant"]) == key and "error" in p
-        ]
-        if rows:
-            rows.sort(key=lambda p: p["step"])
+        if rows := rows_of(data, scene, engine["engine"], engine["variant"])[::-1]:
             step, cost, error = (np.array([p[k] for p in rows]) for k in ("step", "cpu_ms_per_s", "error"))
             out.append((engine, step, cost, np.maximum(error, FLOOR.get(scene, 0.0))))
     return out
@@ -71,10 +57,7 @@ def _shade(axes: Axes, shown: list[Curve]) -> None:
 def _finish(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.grid(which="major", color="#dddddd", linewidth=0.7)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    finish(axes)
 
 
 def _steps(axes: Axes, curve: Curve, wanted: tuple[float, ...], size: float) -> None:
@@ -82,34 +65,16 @@ def _steps(axes: Axes, curve: Curve, wanted: tuple[float, ...], size: float) -> 
     _, step, cost, error = curve
     for h, x, y in zip(step, cost, error, strict=True):
         if np.isclose(h, wanted).any():
-            axes.annotate(
-                f"{h * 1e3:g} ms",
-                (x, y),
-                (-7, -5),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                fontsize=size,
-                color=COLOURS[OURS],
-            )
+            place = {"textcoords": "offset points", "ha": "right", "va": "top"}
+            axes.annotate(f"{h * 1e3:g} ms", (x, y), (-7, -5), fontsize=size, color=COLOURS[OURS], **place)
 
 
 def _plot(axes: Axes, shown: list[Curve]) -> None:
     axes.margins(0.1)
     for engine, _, cost, error in shown:
-        own = engine["engine"] == OURS
-        axes.plot(
-            cost,
-            error,
-            color=COLOURS[engine["engine"]],
-            linestyle=STYLES.get(engine["variant"], "-"),
-            linewidth=2.6 if own else 1.5,
-            marker="o",
-            markersize=6 if own else 4,
-            zorder=4 if own else 3,
-        )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+        own = {"linewidth": 2.6, "markersize": 6, "zorder": 4} if engine["engine"] == OURS else {"markersize": 4}
+        linestyle = STYLES.get(engine["variant"], "-")
+        axes.loglog(cost, error, **style(engine["engine"], linestyle=linestyle, **({"zorder": 3} | own)))
 
 
 #: Text of a curve's label.
@@ -159,10 +124,7 @@ def flat_drive(data: dict[str, Any], path: Path) -> Path:
     """The picture of the README."""
     figure, axes = plt.subplots(figsize=(8.0, 5.6), dpi=125)
     fill_flat_drive(axes, data)
-    figure.tight_layout()
-    figure.savefig(path)
-    plt.close(figure)
-    return path
+    return save(figure, path)
 
 
 def fill_flat_drive(axes: Axes, data: dict[str, Any]) -> None:
@@ -177,29 +139,27 @@ def fill_flat_drive(axes: Axes, data: dict[str, Any]) -> None:
         if curve[0]["engine"] == OURS:
             _steps(axes, curve, (1e-1, 2e-2, 5e-3, 1e-3, 1e-4), 9)
     axes.axhline(GOAL[1], color="#999999", linewidth=0.9, linestyle=(0, (2, 3)), zorder=1)
-    axes.annotate(
-        "1 cm",
-        (3.0 * GOAL[0], GOAL[1]),
-        (0, 3),
-        textcoords="offset points",
-        ha="left",
-        fontsize=9,
-        color="#777777",
-    )
-    axes.text(
-        0.02, 0.03, "reached by nothing here", transform=axes.transAxes, fontsize=9, color="#a98d6d", style="italic"
-    )
+    above = {"textcoords": "offset points", "ha": "left", "fontsize": 9}
+    axes.annotate("1 cm", (3.0 * GOAL[0], GOAL[1]), (0, 3), color="#777777", **above)
+    beyond = {"transform": axes.transAxes, "fontsize": 9, "color": "#a98d6d", "style": "italic"}
+    axes.text(0.02, 0.03, "reached by nothing here", **beyond)
     axes.set_xlabel("CPU time of one thread, ms per simulated second", fontsize=10.5)
     axes.set_ylabel("error of the path (RMS), m", fontsize=10.5)
     axes.set_title("A drive of 22 m in a curve, one point per step size, 0.1 to 100 ms", fontsize=11.5, loc="left")
     _finish(axes)
 
 
+def _row(data: dict[str, Any], without: str, height: float) -> tuple[Any, list[tuple[Axes, str]]]:
+    """A figure with a panel for each scene but one, by its name."""
+    names = [name for name in data["scenes"] if name != without and curves(data, name)]
+    figure, panels = plt.subplots(1, len(names), figsize=(4.4 * len(names), height), dpi=100, squeeze=False)
+    return figure, list(zip(panels[0], names, strict=True))
+
+
 def others(data: dict[str, Any], path: Path) -> Path:
     """Rug, rocks and parking, with a common legend."""
-    names = [name for name in data["scenes"] if name != "flat_drive" and curves(data, name)]
-    figure, panels = plt.subplots(1, len(names), figsize=(4.4 * len(names), 4.7), dpi=100, squeeze=False)
-    for axes, name in zip(panels[0], names, strict=True):
+    figure, panels = _row(data, "flat_drive", 4.7)
+    for axes, name in panels:
         scene = data["scenes"][name]
         shown = [c for c in curves(data, name) if c[0]["best"]]
         _plot(axes, shown)
@@ -207,49 +167,29 @@ def others(data: dict[str, Any], path: Path) -> Path:
         for curve in shown:
             if curve[0]["engine"] == OURS:
                 _steps(axes, curve, (2e-2, 5e-3, 1e-3), 8.5)
-        axes.set_title(scene["title"], fontsize=11, loc="left")
-        axes.set_xlabel("CPU time, ms per simulated second")
-        axes.set_ylabel(f"{scene['error']}, {scene['unit']}")
+        label(axes, scene["title"], "CPU time, ms per simulated second", f"{scene['error']}, {scene['unit']}")
         _finish(axes)
-    lines = [
-        plt.Line2D(
-            [],
-            [],
-            color=COLOURS[e["engine"]],
-            linestyle=STYLES.get(e["variant"], "-"),
-            marker="o",
-            linewidth=2.6 if e["engine"] == OURS else 1.5,
-            label=OURS if e["engine"] == OURS else f"{e['engine']}: {e['variant']}",
-        )
-        for e in data["engines"]
-        if e["best"]
-    ]
+    lines = []
+    for e in (e for e in data["engines"] if e["best"]):
+        name = OURS if e["engine"] == OURS else f"{e['engine']}: {e['variant']}"
+        own = style(e["engine"], linestyle=STYLES.get(e["variant"], "-"), markersize=mpl.rcParams["lines.markersize"])
+        lines.append(plt.Line2D([], [], label=name, **(own | ({"linewidth": 2.6} if e["engine"] == OURS else {}))))
     figure.legend(handles=lines, loc="lower center", ncols=4, frameon=False, fontsize=9.5)
-    figure.tight_layout(rect=(0, 0.11, 1, 1))
-    figure.savefig(path)
-    plt.close(figure)
-    return path
+    return save(figure, path, rect=(0, 0.11, 1, 1))
 
 
 def variants(data: dict[str, Any], path: Path) -> Path:
     """Our own variants and tolerances."""
-    names = [name for name in data["scenes"] if name != "parked" and curves(data, name)]
-    figure, panels = plt.subplots(1, len(names), figsize=(4.4 * len(names), 4.5), dpi=100, squeeze=False)
-    for axes, name in zip(panels[0], names, strict=True):
+    figure, panels = _row(data, "parked", 4.5)
+    for axes, name in panels:
         own = [c for c in curves(data, name) if c[0]["engine"] == OURS]
         for (engine, _, cost, error), colour in zip(own, OWN_COLOURS, strict=True):
-            axes.plot(cost, error, color=colour, marker="o", markersize=4.5, linewidth=1.6, label=engine["variant"])
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_title(data["scenes"][name]["title"], fontsize=11, loc="left")
-        axes.set_xlabel("CPU time, ms per simulated second")
-        axes.set_ylabel("RMS error of the path, m")
+            axes.loglog(cost, error, **style(OURS, color=colour, linewidth=1.6, label=engine["variant"]))
+        label(axes, data["scenes"][name]["title"], "CPU time, ms per simulated second", "RMS error of the path, m")
         _finish(axes)
-    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="lower center", ncols=4, frameon=False, fontsize=9.5)
-    figure.tight_layout(rect=(0, 0.07, 1, 1))
-    figure.savefig(path)
-    plt.close(figure)
-    return path
+    handles = panels[0][0].get_legend_handles_labels()
+    figure.legend(*handles, loc="lower center", ncols=4, frameon=False, fontsize=9.5)
+    return save(figure, path, rect=(0, 0.07, 1, 1))
 
 
 def draw(data: dict[str, Any], folder: Path) -> list[Path]:

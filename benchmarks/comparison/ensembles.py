@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from reports import read_json
 
 from comparison.peers import Variant
 from comparison.peers.ours import OurRunner
 from comparison.run import run
-from comparison.scene import SAMPLE, Array, Phase, RoverScene
+from comparison.scene import SAMPLE, Array, Phase, RoverScene, distance
 from comparison.scenes import flat_drive, parked, rocks, rug
 from rover_gym import SphereField
 
@@ -60,11 +61,6 @@ class Ensemble:
         return {title: distance(positions[:end], reference[:end]) for title, end in ends.items()}
 
 
-def distance(path: Array, other: Array) -> float:
-    """RMS distance of two paths sampled at the same times, m."""
-    return float(np.sqrt(np.mean(np.sum((path - other) ** 2, axis=1))))
-
-
 def _flat(member: int) -> RoverScene:
     scene, rng = flat_drive.scene(), np.random.default_rng(member)
     q = scene.q.copy()
@@ -99,6 +95,7 @@ def _many(make: Callable[[int], RoverScene]) -> tuple[RoverScene, ...]:
 
 def ensembles() -> list[Ensemble]:
     """All of them."""
+    parking = ("parked", "parked", "slope of 5 to 34.5 degrees")
     return [
         Ensemble(
             "flat_drive",
@@ -108,11 +105,7 @@ def ensembles() -> list[Ensemble]:
             {"all 12 s": 12.0},
         ),
         Ensemble(
-            "rug",
-            "10 s on the report's rug",
-            "start moved by up to 5 cm each way",
-            _many(_rug),
-            {"all 10 s": 10.0},
+            "rug", "10 s on the report's rug", "start moved by up to 5 cm each way", _many(_rug), {"all 10 s": 10.0}
         ),
         Ensemble(
             "rocks",
@@ -122,14 +115,7 @@ def ensembles() -> list[Ensemble]:
             {"first 3 s": SHORT, "all 7 s": 7.0},
             finest=1e-4,
         ),
-        Ensemble(
-            "parked",
-            "parked",
-            "slope of 5 to 34.5 degrees",
-            _many(_parked),
-            {"creep": 10.0},
-            has_reference=False,
-        ),
+        Ensemble(*parking, _many(_parked), {"creep": 10.0}, has_reference=False),
     ]
 
 
@@ -147,13 +133,13 @@ def drive(scene: RoverScene, step: float, cap: float = 1e3, **options: Any) -> t
 
 def load() -> dict[str, list[dict[str, Any]]]:
     """By ensemble, for every member its `path` and the linearised variant's `distance` (by window, m)."""
-    data = json.loads(FILE.read_text(encoding="utf-8"))["members"]
+    data = read_json(FILE)["members"]
     return {name: [{**m, "path": np.array(m["path"])} for m in members] for name, members in data.items()}
 
 
 def main() -> None:
     """Makes the references of those that are named, or of all."""
-    data: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {"members": {}}
+    data: dict[str, Any] = read_json(FILE, {"members": {}})
     data["meta"] = {
         "what": "trunk x, y, z, m, every 0.1 s",
         "made_by": "this project's Newton variant at 0.05 ms, rocks at 0.1 ms",

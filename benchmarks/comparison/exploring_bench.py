@@ -6,6 +6,7 @@ under valgrind may lack AVX-512. It only reports.
 """
 
 import argparse
+import itertools
 import json
 import os
 import re
@@ -14,14 +15,16 @@ import subprocess
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from reports import ROOT, table
 from rich.console import Console
 
 from comparison.exploring import GROUNDS, TORQUES
 from comparison.machine import processor, versions
-from comparison.output import ROOT
 
 #: Drives whose steps callgrind counts.
 COUNTED_DRIVES = 2
@@ -40,6 +43,7 @@ PARTS = {
 #: Upper ends of a histogram's bins.
 BINS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 32, 64, 128)
 Histogram = list[tuple[int, int]]
+Figures = dict[str, Any]
 
 
 def ours(ground: str, torque: float) -> dict[str, Any]:
@@ -56,23 +60,10 @@ def instructions(ground: str, torque: float) -> dict[str, float]:
     """Instructions of each part of a step, the mean over the counted steps."""
     program = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "examples" / "explore_steps"
     with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [  # noqa: S607
-                "valgrind",
-                "--tool=callgrind",
-                "--collect-atstart=no",
-                "--toggle-collect=*counted_step*",
-                "--dump-before=*part_ends*",
-                f"--callgrind-out-file={folder}/out",
-                program,
-                ground,
-                str(torque),
-                str(COUNTED_DRIVES),
-            ],
-            check=True,
-            capture_output=True,
-            text=True,
-        )
+        counting = ["valgrind", "--tool=callgrind", "--collect-atstart=no", "--toggle-collect=*counted_step*"]
+        counting += ["--dump-before=*part_ends*", f"--callgrind-out-file={folder}/out"]
+        command = [*counting, program, ground, str(torque), str(COUNTED_DRIVES)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
         steps, *parts = done.stdout.split()
         return by_part(int(steps), parts, Path(folder))
 
@@ -107,36 +98,29 @@ def titles() -> list[str]:
     return [str(a) if a == b else f"{a}-{b}" for a, b in zip(lows, BINS, strict=True)] + [f"{BINS[-1] + 1}+"]
 
 
-def print_times(rows: dict[tuple[str, float], dict[str, Any]], console: Console) -> None:
-    """Microseconds a step."""
-    names = ["1e-12", "1e-6", "batch", "iterations", "general", "not converged"]
-    console.print(f"\n{'us a step of 5 ms, one thread':<30}" + "".join(f"{name:>{len(name) + 3}}" for name in names))
-    for (ground, torque), row in rows.items():
-        total = sum(size * count for size, count in row["iterations"])
-        values = [*row["microseconds"], row["batch_microseconds"], total / row["steps"]]
-        cells = [f"{value:.1f}" for value in values]
-        cells += [f"{row[what]} of {row['steps']}" for what in ("general", "not_converged")]
-        widths = (len(name) + 3 for name in names)
-        line = "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
-        console.print(f"{ground + f', {torque:g} N m':<30}{line}")
+def table_of(
+    what: str, heads: Iterable[str], cells: Callable[[Figures], Iterable[str]], rows: dict[str, Figures]
+) -> str:
+    """A line a scene."""
+    return "\n" + table([what, *heads], [[scene, *cells(row)] for scene, row in rows.items()])
 
 
-def print_instructions(rows: dict[tuple[str, float], dict[str, Any]], console: Console) -> None:
-    """Thousands of instructions a step, part by part."""
-    console.print(f"\n{'1000 instructions a step':<30}{'all':>6}" + "".join(f"{p:>15}" for p in PARTS.values()))
-    for (ground, torque), row in rows.items():
-        counts = row["instructions"]
-        line = "".join(f"{counts[part] / 1e3:>15.1f}" for part in PARTS)
-        console.print(f"{ground + f', {torque:g} N m':<30}{sum(counts.values()) / 1e3:>6.0f}{line}")
+def times(row: Figures) -> list[str]:
+    """Microseconds a step, iterations, and steps that took more."""
+    total = sum(size * count for size, count in row["iterations"])
+    values = [*row["microseconds"], row["batch_microseconds"], total / row["steps"]]
+    return [f"{v:.1f}" for v in values] + [f"{row[what]} of {row['steps']}" for what in ("general", "not_converged")]
 
 
-def print_histograms(rows: dict[tuple[str, float], dict[str, Any]], console: Console) -> None:
-    """Percent of the steps by what the contact solver did in them, at 1e-12."""
-    for what in ("iterations", "factorisations", "pivots"):
-        console.print(f"\n{'% of the steps by ' + what:<30}" + "".join(f"{title:>7}" for title in titles()))
-        for (ground, torque), row in rows.items():
-            line = "".join(f"{100.0 * share:>7.1f}" if share else f"{'':>7}" for share in shares(row[what]))
-            console.print(f"{ground + f', {torque:g} N m':<30}{line}")
+def thousands(row: Figures) -> list[str]:
+    """Instructions a step, all and part by part."""
+    counts = row["instructions"]
+    return [f"{sum(counts.values()) / 1e3:.0f}", *(f"{counts[part] / 1e3:.1f}" for part in PARTS)]
+
+
+def percent(row: Figures, what: str) -> list[str]:
+    """Of the steps by what the contact solver did in them, at 1e-12."""
+    return [f"{100.0 * share:.1f}" if share else "" for share in shares(row[what])]
 
 
 def main() -> None:
@@ -151,19 +135,19 @@ def main() -> None:
     if counts:
         build = ["cargo", "build", "--release", "--quiet", "--locked", "-p", "rover-comparison"]
         subprocess.run([*build, "--example", "explore_steps"], cwd=ROOT, check=True)
-    rows = {}
-    for ground in GROUNDS:
-        for torque in TORQUES:
-            row = ours(ground, torque)
-            if counts:
-                row["instructions"] = instructions(ground, torque)
-            rows[ground, torque] = row
-    print_times(rows, console)
+    rows: dict[str, Figures] = {}
+    for ground, torque in itertools.product(GROUNDS, TORQUES):
+        rows[f"{ground}, {torque:g} N m"] = row = ours(ground, torque)
+        if counts:
+            row["instructions"] = instructions(ground, torque)
+    heads = ["1e-12", "1e-6", "batch", "iterations", "general", "not converged"]
+    console.print(table_of("us a step of 5 ms, one thread", heads, times, rows))
     if counts:
-        print_instructions(rows, console)
+        console.print(table_of("1000 instructions a step", ["all", *PARTS.values()], thousands, rows))
     else:
         console.print("\nvalgrind is not installed, or was not wanted: no instruction counts")
-    print_histograms(rows, console)
+    for what in ("iterations", "factorisations", "pivots"):
+        console.print(table_of(f"% of the steps by {what}", titles(), partial(percent, what=what), rows))
 
 
 if __name__ == "__main__":

@@ -6,26 +6,24 @@ are this project's own, with steps halved until the path changes by less than `S
 minutes). Writes `exploring.json`, the picture and the tables of `docs/tables/comparison.md`.
 """
 
-import argparse
-import json
 import platform
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from reports import fill, read_json, table, write_json
 from rich.console import Console
 
-from comparison.ensembles import distance, drive
+from comparison.ensembles import drive
 from comparison.exploring import PERIOD, REST, drives, scene
-from comparison.machine import processor, versions
-from comparison.output import CHART, QUICK, between
+from comparison.machine import meta
+from comparison.output import command_line, page_of
 from comparison.peers import LeftOut, Variant, load
-from comparison.run import run
-from comparison.scene import Array, RoverScene, steps_in
+from comparison.run import timed
+from comparison.scene import Array, RoverScene, distance, steps_in
 from comparison.tables import number
 
 REFERENCES = Path(__file__).parent / "references" / "exploring.json"
-BEGIN, END = "<!-- exploring: made by `make chart`, not by hand -->", "<!-- end of exploring -->"
 #: Of the commands, s.
 HORIZON = 1.5
 #: Ground and largest torque (N m) of each scene.
@@ -70,14 +68,13 @@ def make_references(console: Console) -> None:
             found.setdefault(played.name, []).append(reference(played))
             last = found[played.name][-1]
             console.print(f"{played.name}: changes by {last['change']:.1e} m at {last['step'] * 1e3:g} ms")
-    meta = {"what": "trunk's path since the end of the rest, x, y, z, m, every 0.05 s", "made_by": "halving our step"}
-    text = json.dumps({"meta": meta, "members": found}).replace('{"step"', '\n{"step"')
-    REFERENCES.write_text(text + "\n", encoding="utf-8")
+    about = {"what": "trunk's path since the end of the rest, x, y, z, m, every 0.05 s", "made_by": "halving our step"}
+    write_json(REFERENCES, {"meta": about, "members": found}, a_line_each="step")
 
 
 def references() -> dict[str, list[dict[str, Any]]]:
     """By scene, for every drive its `path`, `step` and `change`."""
-    found: dict[str, list[dict[str, Any]]] = json.loads(REFERENCES.read_text(encoding="utf-8"))["members"]
+    found: dict[str, list[dict[str, Any]]] = read_json(REFERENCES)["members"]
     return found
 
 
@@ -86,25 +83,21 @@ def point(variant: Variant, played: list[RoverScene], paths: list[Array], step: 
     errors, cpu, simulated = [], 0.0, 0.0
     for one, path in zip(played, paths, strict=True):
         try:
-            traces = [run(variant, one, step, CAP)]
-            if traces[0].cpu < 0.1:
-                traces.append(run(variant, one, step, CAP))
+            trace = timed(variant, one, step, CAP, short=0.1, times=1)
         except LeftOut as left_out:
             return {"failure": f"left out: {left_out.reason}"}
-        if traces[0].failure:
-            return {"failure": traces[0].failure}
-        errors.append(distance(driven(traces[0].positions), path))
-        cpu += min(trace.cpu for trace in traces)
-        simulated += traces[0].simulated
+        if trace.failure:
+            return {"failure": trace.failure}
+        errors.append(distance(driven(trace.positions), path))
+        cpu += trace.cpu
+        simulated += trace.simulated
     low, median, high = np.quantile(errors, (0.25, 0.5, 0.75))
     return {"error": median, "quartiles": [low, high], "cpu_ms_per_s": 1e3 * cpu / simulated}
 
 
 def measure(steps: tuple[float, ...], size: int, console: Console) -> dict[str, Any]:
     """All scenes, steps and engines."""
-    variants, missing = load()
-    for engine, why in missing.items():
-        console.print(f"left out, not installed: {engine} ({why})")
+    variants, missing = load(console)
     known = references()
     points: list[dict[str, Any]] = []
     titles: dict[str, dict[str, str]] = {}
@@ -113,80 +106,64 @@ def measure(steps: tuple[float, ...], size: int, console: Console) -> dict[str, 
         name = played[0].name
         paths = [np.array(member["path"]) for member in known[name][:size]]
         titles[name] = {"title": f"exploring, {name}", "unit": "m", "error": "median of the paths' RMS errors"}
-        failed = set()
+        failed: set[Variant] = set()
         for step in steps:
             for variant in variants:
-                key = (variant.engine, variant.name)
-                if key in failed:
+                if variant in failed:
                     continue
                 row = point(variant, played, paths, step)
                 if "cap" in row.get("failure", "") or "CPU time" in row.get("failure", ""):
-                    failed.add(key)  # finer steps take longer
-                points.append({"scene": name, "engine": key[0], "variant": key[1], "step": step, **row})
+                    failed.add(variant)  # finer steps take longer
+                points.append({"scene": name, **variant.key, "step": step, **row})
                 said = row.get("failure") or f"{row['error']:.1e} m {row['cpu_ms_per_s']:.2f} ms/s"
-                console.print(f"{name:<16} {step * 1e3:>5g} ms  {key[0] + ': ' + key[1]:<36} {said}")
+                console.print(f"{name:<16} {step * 1e3:>5g} ms  {variant.engine + ': ' + variant.name:<36} {said}")
     return {
-        "meta": {
-            "command": "make chart",
-            "processor": processor(),
-            "python": platform.python_version(),
-            "packages": versions(),
-            "drives": size,
-            "horizon_s": HORIZON,
-        },
+        "meta": meta(python=platform.python_version(), drives=size, horizon_s=HORIZON),
         "scenes": titles,
         "changes": {name: float(np.median([m["change"] for m in members])) for name, members in known.items()},
-        "engines": [
-            {"engine": v.engine, "variant": v.name, "settings": v.settings, "differs": v.differs, "best": v.best}
-            for v in variants
-        ],
+        "engines": [variant.told for variant in variants],
         "points": points,
         "missing": missing,
     }
 
 
-def table(data: dict[str, Any], name: str) -> str:
+def table_of(data: dict[str, Any], name: str) -> str:
     """Error and cost of every engine at every step on one scene."""
     steps = sorted({p["step"] for p in data["points"]}, reverse=True)
-    lines = [
-        f"**{name}**: median error of the path, mm, and CPU time, ms per simulated second. The references change by "
-        f"{1e3 * data['changes'][name]:.1g} mm (median) when their step is halved.\n",
-        "| engine | " + " | ".join(f"{step * 1e3:g} ms" for step in steps) + " |",
-        "|---" * (len(steps) + 1) + "|",
-    ]
     found = {(p["engine"], p["variant"], p["step"]): p for p in data["points"] if p["scene"] == name}
+    lines = []
     for engine in data["engines"]:
         rows = [found.get((engine["engine"], engine["variant"], step), {}) for step in steps]
         if any("error" in row for row in rows):
             cells = (f"{1e3 * r['error']:.2g}, {number(r['cpu_ms_per_s'])} ms/s" if "error" in r else "-" for r in rows)
-            lines.append(f"| {engine['engine']}, {engine['variant']} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+            lines.append([f"{engine['engine']}, {engine['variant']}", *cells])
+    what = (
+        f"**{name}**: median error of the path, mm, and CPU time, ms per simulated second. The references change by "
+        f"{1e3 * data['changes'][name]:.1g} mm (median) when their step is halved."
+    )
+    return f"{what}\n\n{table(['engine', *(f'{step * 1e3:g} ms' for step in steps)], lines)}"
 
 
 def main() -> None:
     """Measures and draws."""
-    parser = argparse.ArgumentParser(description="Error against CPU time where a policy explores.")
-    parser.add_argument("--quick", action="store_true", help=f"two steps of three drives, under {QUICK}")
-    parser.add_argument("--draw", action="store_true", help="only draw what exploring.json has")
-    parser.add_argument("--references", action="store_true", help="make the references anew")
-    arguments = parser.parse_args()
+    description = "Error against CPU time where a policy explores."
+    flags = {"references": "make the references anew"}
+    given = command_line("exploring.json", description, "two steps of three drives", flags=flags)
     console = Console(width=140)
-    if arguments.references:
+    if given.references:
         make_references(console)
         return
-    output = QUICK if arguments.quick else CHART
-    output.mkdir(parents=True, exist_ok=True)
-    path = output / "exploring.json"
-    if not arguments.draw:
-        steps, size = (QUICK_STEPS, QUICK_SIZE) if arguments.quick else (STEPS, len(drives()))
-        path.write_text(json.dumps(measure(steps, size, console), indent=1) + "\n", encoding="utf-8")
+    if not given.draw:
+        steps, size = (QUICK_STEPS, QUICK_SIZE) if given.quick else (STEPS, len(drives()))
+        write_json(given.path, measure(steps, size, console))
     from comparison.drawing import others  # noqa: PLC0415 - Matplotlib would load before the engines
 
-    data = json.loads(path.read_text(encoding="utf-8"))
-    console.print(str(others(data, output / "exploring.png")))
-    meta = data["meta"]
-    made = f"{meta['drives']} drives a scene. Measured with `make chart` on {meta['processor']}, shared with others."
-    between(output, BEGIN, END, "\n\n".join([*(table(data, name) for name in data["scenes"]), made]))
+    data = read_json(given.path)
+    console.print(str(others(data, given.path.with_suffix(".png"))))
+    about = data["meta"]
+    made = f"{about['drives']} drives a scene. Measured with `make chart` on {about['processor']}, shared with others."
+    tables = [table_of(data, name) for name in data["scenes"]]
+    fill(page_of(given.path.parent), "exploring", "\n\n".join([*tables, made]))
 
 
 if __name__ == "__main__":

@@ -6,12 +6,14 @@ graphics card, or without MuJoCo Warp, it says so and draws what the file has: `
 """
 
 import argparse
-import json
 import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+from reports import read_json, write_json
+from reports import table as table_in_markdown
 
 from comparison.machine import processor
 from comparison.output import CHART
@@ -50,7 +52,7 @@ def measure(hardware: str) -> list[dict[str, Any]]:
         for rovers in BATCHES:
             rate = warp_peer.throughput(scene, rovers, options, limits)
             rows.append(row("MuJoCo Warp", settings, hardware, rovers, rate, error, source))
-    points = json.loads((CHART / "chart.json").read_text(encoding="utf-8"))["points"]
+    points = read_json(CHART / "chart.json")["points"]
     ours = {p["step"]: p for p in points if is_ours(p)}
     threads = os.cpu_count() or 1
     for rovers in BATCHES[:2]:
@@ -69,31 +71,26 @@ def row(
     engine: str, settings: str, hardware: str, rovers: int, rate: float, error: float, source: str
 ) -> dict[str, Any]:
     """A row of the file."""
-    return {
-        "engine": engine,
-        "settings": settings,
-        "hardware": hardware,
-        "rovers": rovers,
-        "rover_steps_per_s": rate,
-        "rms_error_m": error,
-        "source": source,
-    }
+    names = ("engine", "settings", "hardware", "rovers", "rover_steps_per_s", "rms_error_m", "source")
+    return dict(zip(names, (engine, settings, hardware, rovers, rate, error, source), strict=True))
+
+
+def lines_of(rows: list[dict[str, Any]]) -> dict[tuple[str, str, str], list[dict[str, Any]]]:
+    """Rows of every engine, setting and hardware."""
+    found: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for one in rows:
+        found.setdefault((one["engine"], one["settings"], one["hardware"]), []).append(one)
+    return found
 
 
 def table(data: dict[str, Any]) -> str:
     """Markdown: the largest rate of every engine, setting and hardware."""
-    best: dict[tuple[str, str, str], dict[str, Any]] = {}
-    for one in data["rows"]:
-        key = (one["engine"], one["settings"], one["hardware"])
-        if key not in best or one["rover_steps_per_s"] > best[key]["rover_steps_per_s"]:
-            best[key] = one
-    lines = ["| engine | settings | hardware | rovers | rover-steps a second | error |", "|---" * 6 + "|"]
-    for one in best.values():
-        rate = f"{one['rover_steps_per_s'] / 1e6:.2g} million"
-        error = f"{100.0 * one['rms_error_m']:.2g} cm"
-        cells = (one["engine"], one["settings"], one["hardware"], str(one["rovers"]), rate, error)
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+    lines = []
+    for key, own in lines_of(data["rows"]).items():
+        best = max(own, key=lambda one: float(one["rover_steps_per_s"]))
+        rate, error = f"{best['rover_steps_per_s'] / 1e6:.2g} million", f"{100.0 * best['rms_error_m']:.2g} cm"
+        lines.append([*key, str(best["rovers"]), rate, error])
+    return table_in_markdown(["engine", "settings", "hardware", "rovers", "rover-steps a second", "error"], lines)
 
 
 def draw(data: dict[str, Any], path: Path) -> None:
@@ -104,11 +101,8 @@ def draw(data: dict[str, Any], path: Path) -> None:
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
     figure, axes = plt.subplots(figsize=(9, 5.5))
-    lines: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
-    for one in data["rows"]:
-        lines.setdefault((one["engine"], one["settings"], one["hardware"]), []).append(one)
     marks = iter("osD^vPX*<>h")
-    for (engine, settings, hardware), own in lines.items():
+    for (engine, settings, hardware), own in lines_of(data["rows"]).items():
         own.sort(key=lambda one: one["rovers"])
         rates = [one["rover_steps_per_s"] for one in own]
         errors = [100.0 * one["rms_error_m"] for one in own]
@@ -133,14 +127,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Rovers a second and error, on processors and graphics cards.")
     parser.add_argument("--draw", action="store_true", help="only draw what gpu.json has")
     is_drawing = parser.parse_args().draw
-    data: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    data: dict[str, Any] = read_json(FILE)
     hardware, reason = (None, "") if is_drawing else card_or_reason()
     if hardware:
         found = measure(f"one {hardware}")
-        measured = {(one["engine"], one["settings"], one["hardware"]) for one in found}
-        kept = [one for one in data["rows"] if (one["engine"], one["settings"], one["hardware"]) not in measured]
-        data["rows"] = kept + found
-        FILE.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        kept = {key: own for key, own in lines_of(data["rows"]).items() if key not in lines_of(found)}
+        data["rows"] = [one for own in kept.values() for one in own] + found
+        write_json(FILE, data)
     elif reason:
         sys.stdout.write(f"chart-gpu: nothing measured, {reason}; the figure has the rows of {FILE.name}\n")
     draw(data, CHART / "gpu.png")

@@ -9,6 +9,7 @@ A page marks a number with the key that says where it is from, and a table with 
 |---|---|
 | `cost SCENE ERROR CURVE` | CPU ms per simulated second at which a curve of `chart.json` reaches an error |
 | `least SCENE CURVE` | smallest error of the curve, cm |
+| `error SCENE STEP CURVE` | error of the curve at a step, cm |
 | `rollout ENGINE ROW` | us a step of `rollout.json` |
 | `solved METHOD` | problems of `solver_profiles.json` that a method of contacts solves |
 | `faster WHICH` | Siconos' best time over that of `auto`: `mean`, `least`, NAME; how many `problems`, `slower` |
@@ -20,22 +21,26 @@ differs.
 """
 
 import argparse
-import json
 import math
 import re
 import sys
+from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-from comparison import gpu_chart, policies
-from comparison.presets import short_table
-from comparison.tables import cost_of, curve, number, short_reach
+from reports import ROOT, read_json
+from reports import table as table_of
 
-ROOT = Path(__file__).parents[2]
-FILES = ROOT / "docs" / "comparison"
+from comparison import gpu_chart, policies
+from comparison.output import CHART
+from comparison.presets import short_table
+from comparison.spheres import tables as spheres
+from comparison.surfaces import tables as surfaces
+from comparison.tables import cost_of, curve, number, rows_of, short_reach
+
 PAGES = (
     "README.md",
+    "docs/accuracy.md",
     "docs/comparison.md",
     "docs/many-rovers.md",
     "docs/policies.md",
@@ -55,16 +60,15 @@ TABLES = {
     "validation": "docs/tables/validation.md",
     "sand": "docs/validation/sand.md",
 }
-VALUE = re.compile(
-    r"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:cost|least|rollout|cell|policy|solved|faster) [^>]*?) -->)"
-)
-TABLE = re.compile(r"(?P<begin><!-- table (?P<key>\w+) -->\n\n).*?(?P<end>\n\n<!-- end of table -->)", flags=re.DOTALL)
+KINDS = "cost|least|error|rollout|cell|policy|solved|faster"
+VALUE = re.compile(rf"(?P<value>\d[\d.]*(?:e-?\d+)?)(?P<mark><!-- (?P<key>(?:{KINDS}) [^>]*?) -->)")
+TABLE = re.compile(r"(?P<begin><!-- table (?P<key>\w+) -->\n\n).*?(?P<end><!-- end of table -->)", flags=re.DOTALL)
 
 
 @cache
 def data(name: str) -> dict[str, Any]:
     """A JSON file of `docs/comparison/`."""
-    found: dict[str, Any] = json.loads((FILES / name).read_text(encoding="utf-8"))
+    found: dict[str, Any] = read_json(CHART / name)
     return found
 
 
@@ -83,7 +87,7 @@ def cell(page: str, row: str, column: str) -> str:
             heads = []
         elif not heads:
             heads = cells
-        elif column in heads and cells[: len(first)] == first:
+        elif column in heads and (cells[: len(first)] == first or cells[0] == row):
             found += re.findall(r"-?\d[\d.]*(?:e-?\d+)?", cells[heads.index(column)])[:1]
     if len(found) != 1:
         raise LookupError(f"{TABLES[page]}: {len(found)} cells of the row {row!r} and the column {column!r}")
@@ -111,11 +115,15 @@ def value(key: str) -> str:
         engine, row = rest.split(" ", 1)
         times = {line["row"]: line for line in data("rollout.json")["rows"]}
         return number(times[row][engine])
-    scene, *error, name = rest.split(" ", 2 if kind == "cost" else 1)
+    scene, *at, name = rest.split(" ", 1 if kind == "least" else 2)
+    if kind == "error":
+        step = 1e-3 * float(at[0].removesuffix("ms"))
+        rows = rows_of(data("chart.json"), scene, *name.split(", ", 1))
+        return number(100.0 * next(p["error"] for p in rows if math.isclose(p["step"], step)))
     points = curve(data("chart.json"), scene, name)
     if kind == "least":
         return number(100.0 * min(error for _, error in points))
-    cost = cost_of(points, float(error[0].removesuffix("mm")) * 1e-3)
+    cost = cost_of(points, float(at[0].removesuffix("mm")) * 1e-3)
     if cost is None:
         raise LookupError(f"{key}: the curve does not reach the error")
     return number(cost)
@@ -150,47 +158,34 @@ def faster(which: str) -> str:
 
 
 def table(key: str) -> str:
-    """A table of a page."""
-    if key == "reach":
-        return short_reach(data("chart.json"))
-    if key == "presets":
-        return short_table(data("presets.json"))
-    if key == "gpu":
-        return gpu_chart.table(data("gpu.json"))
-    if key == "rollout":
-        return rollout_table()
-    if key == "sand":
-        return sand_table()
-    if key == "policies":
-        return policies.short_table(data(policies.FILE))
+    """A table of a page.
+
+    Raises:
+        LookupError: There is no table of this key.
+    """
     if key.startswith("policies_"):
         return policies.table(data(policies.FILE), key.removeprefix("policies_"))
-    if key == "exploring":
-        return exploring_table()
-    raise LookupError(f"no table {key}")
+    if key not in MADE:
+        raise LookupError(f"no table {key}")
+    return MADE[key]()
 
 
 def rollout_table() -> str:
     """Microseconds a step of rovers on grounds, a line a rover and a kind of ground."""
-    engines = ("alone", "batch", "MuJoCo", "elliptic")
-    lines = [
-        "| µs a step of 5 ms | alone | in a batch | MuJoCo, defaults | MuJoCo, elliptic cone |",
-        "|---" * (1 + len(engines)) + "|",
-    ]
-    rows = data("rollout.json")["rows"]
-    lines += [f"| {row['row']} | {' | '.join(number(row[engine]) for engine in engines)} |" for row in rows]
-    return "\n".join(lines)
+    heads = {"alone": "alone", "batch": "in a batch", "MuJoCo": "MuJoCo, defaults", "elliptic": "MuJoCo, elliptic cone"}
+    rows = [[row["row"], *(number(row[engine]) for engine in heads)] for row in data("rollout.json")["rows"]]
+    return table_of(["µs a step of 5 ms", *heads.values()], rows)
 
 
 def sand_table() -> str:
     """Errors of the soil of both wheels, of the page that `make validate-sand` writes."""
     columns = ("pull, N", "across, N", "sinkage, mm")
-    lines = [f"| root mean square error | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|"]
-    for wheel in ("smooth", "grousered"):
-        for angles in ("below 90°", "all", "all, published model"):
-            cells = [cell("sand", f"{wheel} / {angles}", column) for column in columns]
-            lines.append(f"| {wheel} wheel, {angles} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    rows = [
+        [f"{wheel} wheel, {angles}", *(cell("sand", f"{wheel} / {angles}", column) for column in columns)]
+        for wheel in ("smooth", "grousered")
+        for angles in ("below 90°", "all", "all, published model")
+    ]
+    return table_of(["root mean square error", *columns], rows)
 
 
 #: Of the short table where a policy explores: its scene, and curves with the step at which each is quoted, s; None for
@@ -207,27 +202,37 @@ EXPLORING = (
 
 def exploring_table() -> str:
     """Errors and costs of some curves where a policy explores on the plane."""
-    lines = [f"| {EXPLORED}, a step of | error, CPU time |", "|---|---|"]
+    lines = []
     for name, step in EXPLORING:
-        all_points = [
-            point
-            for point in data("exploring.json")["points"]
-            if point["scene"] == EXPLORED and f"{point['engine']}, {point['variant']}" == name
-        ]
-        found = [point for point in all_points if "error" in point and step in (None, point["step"])]
+        points = rows_of(data("exploring.json"), EXPLORED, *name.split(", ", 1))
+        found = [point for point in points if step in (None, point["step"])]
         errors = sorted(1e3 * point["error"] for point in found)
         cost = number(min(point["cpu_ms_per_s"] for point in found))
         if step is None:
-            lines.append(f"| {name}, any | {number(errors[0])} to {number(errors[-1])} mm, from {cost} ms/s |")
+            lines.append([f"{name}, any", f"{number(errors[0])} to {number(errors[-1])} mm, from {cost} ms/s"])
         else:
-            lines.append(f"| {name}, {1e3 * step:g} ms | {number(errors[0])} mm, {cost} ms/s |")
-    return "\n".join(lines)
+            lines.append([f"{name}, {1e3 * step:g} ms", f"{number(errors[0])} mm, {cost} ms/s"])
+    return table_of([f"{EXPLORED}, a step of", "error, CPU time"], lines)
+
+
+#: Tables by key, beside those of groups of scenes of `policies`.
+MADE: dict[str, Callable[[], str]] = {
+    "reach": lambda: short_reach(data("chart.json")),
+    "presets": lambda: short_table(data("presets.json")),
+    "gpu": lambda: gpu_chart.table(data("gpu.json")),
+    "policies": lambda: policies.short_table(data(policies.FILE)),
+    "rollout": rollout_table,
+    "sand": sand_table,
+    "exploring": exploring_table,
+    "surfaces": lambda: surfaces.short_table(data("surfaces.json")),
+    "spheres": lambda: spheres.short_table(data("spheres.json")),
+}
 
 
 def filled(text: str) -> str:
     """A page with the numbers and the tables that the files have."""
     text = VALUE.sub(lambda found: value(found["key"]) + found["mark"], text)
-    return TABLE.sub(lambda found: found["begin"] + table(found["key"]) + found["end"], text)
+    return TABLE.sub(lambda found: f"{found['begin']}{table(found['key'])}\n\n{found['end']}", text)
 
 
 def main() -> None:

@@ -8,8 +8,8 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
+from reports import table
 from rich.console import Console
-from rich.table import Table
 
 from rover_gym import HeightField, Plane, RoverModel, Simulation, Terrain
 from rover_gym.core import SimulationBatch
@@ -70,15 +70,12 @@ def measure() -> Mapping[str, tuple[float, float]]:
 def main() -> None:
     """Prints the table."""
     found = measure()
-    table = Table(title=f"A step of 5 ms, alone and among {MANY} rovers on one thread")
-    for heading in ("ground", "alone, µs", "over the plane", "batch, µs", "over the plane"):
-        table.add_column(heading, justify="left" if heading == "ground" else "right")
-    plane = found["plane"]
+    plane, rows = found["plane"], []
     for name, (alone, batch) in found.items():
-        table.add_row(
-            name, f"{1e6 * alone:.1f}", f"{alone / plane[0]:.2f}", f"{1e6 * batch:.2f}", f"{batch / plane[1]:.2f}"
-        )
-    Console().print(table)
+        over = f"{alone / plane[0]:.2f}", f"{batch / plane[1]:.2f}"
+        rows.append([name, f"{1e6 * alone:.1f}", over[0], f"{1e6 * batch:.2f}", over[1]])
+    Console(width=120).print(f"A step of 5 ms, alone and among {MANY} rovers on one thread\n")
+    Console(width=120).print(table(["ground", "alone, µs", "over the plane", "batch, µs", "over the plane"], rows))
 
 
 if __name__ == "__main__":

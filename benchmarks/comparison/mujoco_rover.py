@@ -40,9 +40,7 @@ def rover_xml(
         spheres: Centres and radii, (n, 4), m.
         friction: Coulomb's coefficient.
         gravity: m/s².
-        thin_wheels: Whether wheels without a width are cylinders 4 mm wide. Otherwise they are spheres, which touch
-            flat ground at the same point as discs on axles parallel to it. Wheels with a width are cylinders of it, or
-            ellipsoids if their edges are fully rounded.
+        thin_wheels: Whether wheels without a width are cylinders 4 mm wide, and not the spheres of `rim`.
         brake: Whether the wheels are held, too.
         integrator: MuJoCo's.
         cone: Of friction.
@@ -57,7 +55,7 @@ def rover_xml(
         root,
         "option",
         timestep=repr(time_step),
-        gravity=_text(gravity),
+        gravity=text_of(gravity),
         integrator=integrator,
         cone=cone,
         impratio=repr(impratio),
@@ -74,9 +72,10 @@ def rover_xml(
         name, parent = solid["name"], solid.get("parent")
         nodes[name] = _add_solid(nodes[parent] if parent else world, solid)
         if name in wheels:
-            rim = _rim(machine["wheels"][wheels[name]], thin=thin_wheels)
+            wheel = machine["wheels"][wheels[name]]
+            kind, size = rim(wheel, contact_radius(wheel), is_flat=not thin_wheels)
             masks = {"contype": "2", "conaffinity": "1"}
-            ElementTree.SubElement(nodes[name], "geom", masks, type=rim[0], size=rim[1], mass="0")
+            ElementTree.SubElement(nodes[name], "geom", masks, type=kind, size=size, mass="0")
             ElementTree.SubElement(actuator, "motor", name=f"drive{wheels[name]}", joint=name)
         if name in steered or (brake and name in wheels):
             kp, kv = (repr(solid["hold"][gain]) for gain in ("stiffness", "damping"))
@@ -84,38 +83,43 @@ def rover_xml(
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _rim(wheel: Mapping[str, Any], *, thin: bool) -> tuple[str, str]:
-    """Type and size of a wheel's geom."""
-    radius, half = contact_radius(wheel), 0.5 * (wheel.get("width") or 0.0)
-    if half > 0.0 and (wheel.get("rounding") or 0.0) >= half:
-        return "ellipsoid", f"{radius} {radius} {half}"
-    if half > 0.0 or thin:
-        return "cylinder", f"{radius} {half or HALF_WIDTH}"
-    return "sphere", repr(radius)
+def rim(wheel: Mapping[str, Any], radius: float, *, is_flat: bool) -> tuple[str, str]:
+    """Type and size of a wheel in MuJoCo: the cheapest shape that moves as the wheel does.
+
+    A thin disc and a wheel with fully rounded edges touch a plane at the lowest point of their middle, as long as the
+    axle is parallel to it: so does a sphere, in half the time. Elsewhere a disc is a cylinder 4 mm wide.
+    """
+    half = 0.5 * (wheel.get("width") or 0.0)
+    is_round = (wheel.get("rounding") or 0.0) >= half
+    if is_flat and is_round:
+        return "sphere", repr(radius)
+    if half > 0.0 and is_round:
+        return "ellipsoid", f"{radius!r} {radius!r} {half!r}"
+    return "cylinder", f"{radius!r} {half or HALF_WIDTH!r}"
 
 
 def _add_ground(world: ElementTree.Element, normal: Collection[float] | None, spheres: npt.ArrayLike) -> None:
     """Adds a plane, if it has a normal, and spheres."""
     masks = {"contype": "1", "conaffinity": "2"}  # the links do not touch each other
     if normal is not None:
-        ElementTree.SubElement(world, "geom", masks, type="plane", size="0 0 1", zaxis=_text(normal))
+        ElementTree.SubElement(world, "geom", masks, type="plane", size="0 0 1", zaxis=text_of(normal))
     for x, y, z, r in np.reshape(np.asarray(spheres, dtype=float), (-1, 4)):
-        ElementTree.SubElement(world, "geom", masks, type="sphere", size=repr(float(r)), pos=_text((x, y, z)))
+        ElementTree.SubElement(world, "geom", masks, type="sphere", size=repr(float(r)), pos=text_of((x, y, z)))
 
 
 def _add_solid(parent: ElementTree.Element, solid: Mapping[str, Any]) -> ElementTree.Element:
     """Adds a solid with its inertia and its joint to its parent, and returns its element."""
     name = solid["name"]
-    node = ElementTree.SubElement(parent, "body", name=name, pos=_text(solid.get("position") or (0.0, 0.0, 0.0)))
+    node = ElementTree.SubElement(parent, "body", name=name, pos=text_of(solid.get("position") or (0.0, 0.0, 0.0)))
     ElementTree.SubElement(
         node,
         "inertial",
-        pos=_text(solid.get("centre_of_mass") or (0.0, 0.0, 0.0)),
+        pos=text_of(solid.get("centre_of_mass") or (0.0, 0.0, 0.0)),
         mass=repr(solid["mass"]),
-        diaginertia=_text(principal_inertia(solid)),
+        diaginertia=text_of(principal_inertia(solid)),
     )
     if solid.get("parent"):
-        ElementTree.SubElement(node, "joint", name=name, type="hinge", axis=_text(solid.get("axis") or (0, 0, 1)))
+        ElementTree.SubElement(node, "joint", name=name, type="hinge", axis=text_of(solid.get("axis") or (0, 0, 1)))
     else:
         ElementTree.SubElement(node, "freejoint")
     return node
@@ -148,5 +152,6 @@ def principal_inertia(solid: Mapping[str, Any]) -> Array:
     return np.array([across, m * r * r / 2.0, across])
 
 
-def _text(values: Collection[float] | Array) -> str:
+def text_of(values: Collection[float] | Array) -> str:
+    """Numbers as an attribute of XML has them."""
     return " ".join(repr(float(v)) for v in values)

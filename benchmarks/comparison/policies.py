@@ -11,14 +11,15 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from reports import ROOT, write_json
+from reports import table as table_of
 from rich.console import Console
 
 from comparison.machine import versions
-from comparison.output import CHART, ROOT
+from comparison.output import CHART
 from rover_gym.drive.comparison import Contender, drive_or_reuse, named_contender
 from rover_gym.drive.evaluation import SUCCESSES, EvaluatedEpisode, summarise
 from rover_gym.record.channels import outcome_words
@@ -158,49 +159,42 @@ def _percent(one: Mapping[str, Any]) -> str:
 
 def table(data: Mapping[str, Any], name: str) -> str:
     """The table of a group, in Markdown."""
-    heads = (
-        "scene",
-        "policy",
-        "success",
-        "95% interval",
-        "time to goal",
-        "energy",
-        f"over `{YARDSTICK}`",
-        "other ends",
-    )
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    over = f"over `{YARDSTICK}`"
+    heads = ("scene", "policy", "success", "95% interval", "time to goal", "energy", over, "other ends")
+    lines = []
     last = ""
     for one in data["rows"]:
         if one["group"] != name:
             continue
         low, high = (100.0 * bound for bound in one["interval"])
         ratio = one["energy_ratio"]
-        cells = (
-            "" if one["scene"] == last else one["scene"],
-            f"`{one['policy']}`",
-            f"{_percent(one)}%",
-            f"{low:.1f} to {high:.1f}%",
-            "" if one["time"] is None else f"{one['time']:.1f} s",
-            f"{one['energy_per_metre']:.0f} J/m",
-            "" if ratio[0] is None or one["policy"] == YARDSTICK else "{1:.2f}, {0:.2f} to {2:.2f}".format(*ratio),
-            ", ".join(f"{n} {outcome_words(end)}" for end, n in one["ends"].items()),
+        lines.append(
+            (
+                "" if one["scene"] == last else one["scene"],
+                f"`{one['policy']}`",
+                f"{_percent(one)}%",
+                f"{low:.1f} to {high:.1f}%",
+                "" if one["time"] is None else f"{one['time']:.1f} s",
+                f"{one['energy_per_metre']:.0f} J/m",
+                "" if ratio[0] is None or one["policy"] == YARDSTICK else "{1:.2f}, {0:.2f} to {2:.2f}".format(*ratio),
+                ", ".join(f"{n} {outcome_words(end)}" for end, n in one["ends"].items()),
+            )
         )
         last = one["scene"]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+    return table_of(heads, lines)
 
 
 def short_table(data: Mapping[str, Any]) -> str:
     """Success among rocks, a column a policy, in Markdown."""
-    lines = [f"| difficulty | {' | '.join(f'`{policy}`' for policy in ALL)} |", "|---" * (1 + len(ALL)) + "|"]
+    lines = []
     for scene, arguments in GROUPS["rocks"].scenes.items():
         own = {one["policy"]: one for one in data["rows"] if one["scene"] == scene}
         cells = []
         for policy in ALL:
             low, high = (100.0 * bound for bound in own[policy]["interval"])
             cells.append(f"{success(data, scene, policy)}%, {low:.1f} to {high:.1f}")
-        lines.append(f"| {arguments['difficulty']:g} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        lines.append([f"{arguments['difficulty']:g}", *cells])
+    return table_of(["difficulty", *(f"`{policy}`" for policy in ALL)], lines)
 
 
 def success(data: Mapping[str, Any], scene: str, policy: str) -> str:
@@ -231,8 +225,7 @@ def main() -> None:
     }
     rows = [one for name in GROUPS for one in measured(name)]
     meta = {"command": "make policies", "packages": versions(), "groups": groups}
-    text = json.dumps({"meta": meta, "rows": rows}).replace('{"group"', '\n{"group"')
-    Path(CHART / FILE).write_text(text + "\n", encoding="utf-8")
+    write_json(CHART / FILE, {"meta": meta, "rows": rows}, a_line_each="group")
 
 
 if __name__ == "__main__":

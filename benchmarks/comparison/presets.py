@@ -5,20 +5,18 @@ For every scene the median and the quartiles of the members' errors and the medi
 the same with the Newton variant, under `runs/`.
 """
 
-import argparse
-import json
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from reports import fill, read_json, table, write_json
 from rich.console import Console
 
 from comparison.ensembles import SIZE, Ensemble, drive, ensembles, load
-from comparison.machine import processor, versions
-from comparison.output import CHART, QUICK, between
+from comparison.machine import meta
+from comparison.output import QUICK, command_line, page_of
 from rover_gym import accuracy_options
 
-BEGIN, END = "<!-- presets: made by `make chart`, not by hand -->", "<!-- end of presets -->"
 NAMES = ("fast", "balanced", "reference")
 #: Creep below this is rounding, m/s.
 ROUNDING = 1e-11
@@ -63,79 +61,73 @@ def is_ordered(rows: list[dict[str, Any]]) -> bool:
     return medians == sorted(medians, reverse=True)
 
 
-def table(data: dict[str, Any]) -> str:
-    """Markdown: a line a scene and window, a column an accuracy."""
-    rows = data["rows"]
-    names = list(dict.fromkeys(row["accuracy"] for row in rows))
-    lines = [
-        "| scene | members differ in | " + " | ".join(f"`{n}`" for n in names) + " |",
-        "|---" * (2 + len(names)) + "|",
-    ]
+def by_window(data: dict[str, Any]) -> Iterator[tuple[Ensemble, str, dict[str, dict[str, Any]]]]:
+    """Every ensemble and window with its rows, by accuracy."""
     for ensemble in ensembles():
-        unit = "m" if ensemble.has_reference else "m/s"
         for window in ensemble.windows:
-            own = {r["accuracy"]: r for r in rows if r["scene"] == ensemble.name and r["window"] == window}
-            cells = []
-            for name in names:
-                if name not in own:
-                    cells.append("-")
-                    continue
+            rows = [r for r in data["rows"] if (r["scene"], r["window"]) == (ensemble.name, window)]
+            yield ensemble, window, {r["accuracy"]: r for r in rows}
+
+
+def long_table(data: dict[str, Any]) -> str:
+    """Markdown: a line a scene and window, a column an accuracy."""
+    names = list(dict.fromkeys(row["accuracy"] for row in data["rows"]))
+    lines = []
+    for ensemble, window, own in by_window(data):
+        unit = "m" if ensemble.has_reference else "m/s"
+        cells = []
+        for name in names:
+            if name in own:
                 r = own[name]
-                low, high = r["quartiles"]
-                error = f"{r['median']:.1e} ({low:.1e} to {high:.1e}) {unit}"
-                cells.append(f"{error}, {r['cpu_ms_per_s']:.2g} ms/s")
-            lines.append(f"| {ensemble.title}: {window} | {ensemble.differ} | " + " | ".join(cells) + " |")
-    meta = data["meta"]
-    lines.append(
-        f"\n{meta['members']} members a scene; median and quartiles of the errors, median CPU time."
-        f" Measured with `make chart` on {meta['processor']}, shared with other work."
+                error = "{:.1e} ({:.1e} to {:.1e})".format(r["median"], *r["quartiles"])
+                cells.append(f"{error} {unit}, {r['cpu_ms_per_s']:.2g} ms/s")
+            else:
+                cells.append("-")
+        lines.append([f"{ensemble.title}: {window}", ensemble.differ, *cells])
+    heads = ["scene", "members differ in", *(f"`{name}`" for name in names)]
+    about = data["meta"]
+    return (
+        f"{table(heads, lines)}\n\n{about['members']} members a scene; median and quartiles of the errors, median CPU"
+        f" time. Measured with `make chart` on {about['processor']}, shared with other work."
     )
-    return "\n".join(lines)
 
 
 def short_table(data: dict[str, Any]) -> str:
     """Markdown: the medians of errors and costs alone, for the manual."""
-    lines = ["| scene | " + " | ".join(f"`{name}`" for name in NAMES) + " |", "|---" * (1 + len(NAMES)) + "|"]
-    for ensemble in ensembles():
-        for window in ensemble.windows:
-            own = {r["accuracy"]: r for r in data["rows"] if (r["scene"], r["window"]) == (ensemble.name, window)}
-            cells = []
-            for name in NAMES:
-                median, cost = own[name]["median"], own[name]["cpu_ms_per_s"]
-                creep = f"{median:.1e} m/s" if median > ROUNDING else f"below {ROUNDING:g} m/s"
-                error = f"{1e3 * median:.2g} mm" if ensemble.has_reference else creep
-                cells.append(f"{error}, {cost:.2g} ms/s")
-            lines.append(f"| {ensemble.title}: {window} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    lines = []
+    for ensemble, window, own in by_window(data):
+        cells = []
+        for name in NAMES:
+            median, cost = own[name]["median"], own[name]["cpu_ms_per_s"]
+            creep = f"{median:.1e} m/s" if median > ROUNDING else f"below {ROUNDING:g} m/s"
+            error = f"{1e3 * median:.2g} mm" if ensemble.has_reference else creep
+            cells.append(f"{error}, {cost:.2g} ms/s")
+        lines.append([f"{ensemble.title}: {window}", *cells])
+    return table(["scene", *(f"`{name}`" for name in NAMES)], lines)
 
 
 def main() -> None:
     """Measures and fills the table."""
-    parser = argparse.ArgumentParser(description="The named accuracies over ensembles of drives.")
-    parser.add_argument("--quick", action="store_true", help=f'two members, no "reference", under {QUICK}')
-    parser.add_argument(
-        "--newton", action="store_true", help=f'"reference" and the same with the Newton variant, under {QUICK}'
-    )
-    parser.add_argument("--scenes", nargs="*", help="only these; the rest is kept as it is in presets.json")
-    arguments = parser.parse_args()
+    description, quick = "The named accuracies over ensembles of drives.", 'two members, no "reference"'
+    flags = {"newton": f'"reference" and the same with the Newton variant, under {QUICK}'}
+    given = command_line("presets.json", description, quick, has_scenes=True, flags=flags)
     console = Console(width=160)
-    size = 2 if arguments.quick else SIZE
-    names = NAMES[:2] if arguments.quick else ("reference", "reference, Newton") if arguments.newton else NAMES
-    output: Path = CHART if names == NAMES else QUICK
-    output.mkdir(parents=True, exist_ok=True)
-    path = output / "presets.json"
-    data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"rows": []}
-    data["meta"] = {"command": "make chart", "processor": processor(), "packages": versions(), "members": size}
-    for ensemble in ensembles():
-        if arguments.scenes and ensemble.name not in arguments.scenes:
+    size = 2 if given.quick else SIZE
+    names = NAMES[:2] if given.quick else ("reference", "reference, Newton") if given.newton else NAMES
+    path = QUICK / given.path.name if given.newton else given.path
+    data: dict[str, Any] = read_json(path, {"rows": []})
+    if not given.draw:
+        data["meta"] = meta(members=size)
+    for ensemble in () if given.draw else ensembles():
+        if given.scenes and ensemble.name not in given.scenes:
             continue
         rows = measure(ensemble, names, size, console)
         data["rows"] = [row for row in data["rows"] if row["scene"] != ensemble.name] + rows
-        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        write_json(path, data)
         for window in ensemble.windows if names == NAMES else ():
             if not is_ordered([row for row in rows if row["window"] == window]):
                 console.print(f"not in order: {ensemble.title}, {window}")
-    between(output, BEGIN, END, table(data))
+    fill(page_of(path.parent), "presets", long_table(data))
 
 
 if __name__ == "__main__":

@@ -55,16 +55,22 @@ class Engine:
     """How a kind of simulation is read, set and commanded.
 
     Attributes:
-        read: Its state.
-        write: Sets a state, without a warm start.
+        state: Attributes of its state, in the order in which `set_state` takes them.
         draw: Draws a command.
         command: Gives it.
     """
 
-    read: Callable[[Any], Arrays]
-    write: Callable[..., None]
-    draw: Callable[[Any, np.random.Generator], Arrays]
-    command: Callable[..., None]
+    state: tuple[str, ...]
+    draw: Callable[[Any, np.random.Generator], Arrays] = lambda _sim, _generator: ()
+    command: Callable[..., None] = lambda _sim, *_command: None
+
+    def read(self, sim: Any) -> Arrays:
+        """Its state."""
+        return tuple(getattr(sim, name) for name in self.state)
+
+    def write(self, sim: Any, *state: Any) -> None:
+        """Sets a state, without a warm start."""
+        sim.set_state(*state)
 
 
 def _rover_command(sim: Any, generator: np.random.Generator) -> Arrays:
@@ -74,40 +80,29 @@ def _rover_command(sim: Any, generator: np.random.Generator) -> Arrays:
     return torques, np.where(steered, 0.5 * sim.model.steering_limit * generator.uniform(-1.0, 1.0, len(limits)), 0.0)
 
 
-ROVER = Engine(
-    lambda sim: (sim.q, sim.v),
-    lambda sim, q, v: sim.set_state(q, v),
-    _rover_command,
-    lambda sim, torques, steering: sim.set_commands(torques, steering),
-)
+ROVER = Engine(("q", "v"), _rover_command, lambda sim, torques, steering: sim.set_commands(torques, steering))
 PLANAR = Engine(
-    lambda sim: (sim.q, sim.v),
-    lambda sim, q, v: sim.set_state(q, v),
+    ("q", "v"),
     lambda sim, generator: (20.0 * generator.uniform(-0.4, 1.0, len(sim.torques)),),
     lambda sim, torques: sim.set_torques(torques) if len(torques) else None,
 )
-DISKS = Engine(
-    lambda sim: (sim.position, sim.velocity),
-    lambda sim, position, velocity: sim.set_state(position, velocity),
-    lambda _sim, _generator: (),
-    lambda _sim: None,
-)
-BALLS = Engine(
-    lambda sim: (sim.position, sim.velocity, sim.spin),
-    lambda sim, position, velocity, spin: sim.set_state(position, velocity, spin),
-    lambda _sim, _generator: (),
-    lambda _sim: None,
-)
+DISKS = Engine(("position", "velocity"))
+BALLS = Engine(("position", "velocity", "spin"))
 
 
-def _write_among_balls(sim: RoverGrainSimulation, q: Any, v: Any, *balls: Any) -> None:
-    sim.rover.set_state(q, v)
-    sim.grains.set_state(*balls)
+class AmongBalls(Engine):
+    """A rover and balls."""
+
+    def read(self, sim: Any) -> Arrays:
+        return *ROVER.read(sim.rover), *BALLS.read(sim.grains)
+
+    def write(self, sim: Any, *state: Any) -> None:
+        ROVER.write(sim.rover, *state[:2])
+        BALLS.write(sim.grains, *state[2:])
 
 
-AMONG_BALLS = Engine(
-    lambda sim: (*ROVER.read(sim.rover), *BALLS.read(sim.grains)),
-    _write_among_balls,
+AMONG_BALLS = AmongBalls(
+    (),
     lambda sim, generator: _rover_command(sim.rover, generator),
     lambda sim, torques, steering: sim.rover.set_commands(torques, steering),
 )

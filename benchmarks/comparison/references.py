@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from reports import read_json
 
 from comparison.peers import ours
 from comparison.run import run
-from comparison.scene import Array, RoverScene
+from comparison.scene import Array, RoverScene, distance
 from comparison.scenes import flat_drive, rocks, rug
 
 FOLDER = Path(__file__).parent / "references"
@@ -24,11 +25,7 @@ NO_CAP = 3600.0  # s
 
 def load(name: str) -> Array:
     """(n, 2 or 3) reference path of a scene, m."""
-    return np.array(json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))["path"])
-
-
-def _rms(difference: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(difference**2, axis=1))))
+    return np.array(read_json(FOLDER / f"{name}.json")["path"])
 
 
 def _ours(scene: RoverScene, step: float = FINEST) -> Array:
@@ -37,7 +34,6 @@ def _ours(scene: RoverScene, step: float = FINEST) -> Array:
 
 
 def _save(name: str, path: Array, meta: dict[str, Any]) -> None:
-    FOLDER.mkdir(exist_ok=True)
     data = {"meta": meta, "path": np.round(path, 8).tolist()}
     (FOLDER / f"{name}.json").write_text(json.dumps(data) + "\n", encoding="utf-8")
 
@@ -51,7 +47,7 @@ def make_flat_drive() -> None:
     path = 2.0 * fine - coarse
     own = _ours(scene)[:, [0, 2]]
     first = round(flat_drive.REST / 0.1)
-    away = _rms(own[first:] - own[first] - path)
+    away = distance(own[first:] - own[first], path)
     _save(
         "flat_drive",
         path,
@@ -75,8 +71,8 @@ def make_path(scene: RoverScene, peer_step: float = 1e-3) -> None:
         {
             "what": "trunk x, y, z, m, every 0.1 s",
             "made_by": "this project's Newton variant at 0.05 ms",
-            "rms_distance_of_ours_at_0.1_ms_m": _rms(_ours(scene, 1e-4) - path),
-            f"rms_distance_of_Pinocchio_ADMM_at_{peer_step * 1e3:g}_ms_m": _rms(other - path),
+            "rms_distance_of_ours_at_0.1_ms_m": distance(_ours(scene, 1e-4), path),
+            f"rms_distance_of_Pinocchio_ADMM_at_{peer_step * 1e3:g}_ms_m": distance(other, path),
         },
     )
 

@@ -17,30 +17,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import (
-    AddContactMaterial,
-    Box,
-    CollisionFilterDeclaration,
-    GeometrySet,
-    ProximityProperties,
-    Sphere,
-)
+from pydrake.geometry import Box, CollisionFilterDeclaration, GeometrySet, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import (
-    AddMultibodyPlantSceneGraph,
-    CoulombFriction,
-    DiscreteContactApproximation,
-    MultibodyPlant,
-)
+from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 from pydrake.multibody.tree import PdControllerGains
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path += [str(Path(__file__).parents[1]), str(Path(__file__).parents[2] / "tests")]
 
 from models.drives import FRICTION, SAMPLE, Part, commands, start
 
+from comparison.peers.drake import DrakePlant, material
 from rover_gym import RoverModel, Simulation
 from rover_gym.models.robot_tree import right_angle
 
@@ -121,19 +108,11 @@ def in_drake(
     path: Path, model: RoverModel, parts: tuple[Part, ...], step: float, stiffness: float, *, snap: bool = True
 ) -> Drive:
     """The drive in Drake's discrete plant: contacts are springs, and its solver is that of rigid Coulomb friction."""
-    builder = DiagramBuilder()
-    plant, graph = AddMultibodyPlantSceneGraph(builder, step)
-    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
+    own = DrakePlant((0.0, 0.0, -GRAVITY), step, DiscreteContactApproximation.kLagged)
+    plant = own.plant
     plant.set_stiction_tolerance(CREEP)
-    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -GRAVITY])
     (robot,) = Parser(plant).AddModelsFromString(for_drake(path, snap=snap), "urdf")
-    properties = ProximityProperties()
-    AddContactMaterial(
-        dissipation=DISSIPATION,
-        point_stiffness=2.0 * stiffness,  # of each of the two sides, which act in series
-        friction=CoulombFriction(FRICTION, FRICTION),
-        properties=properties,
-    )
+    properties = material(FRICTION, 2.0 * stiffness, DISSIPATION)  # of each of the two sides, which act in series
     below = RigidTransform([0.0, 0.0, -5.0])
     plant.RegisterCollisionGeometry(plant.world_body(), below, Box(GROUND, GROUND, 10.0), "ground", properties)
     description = model.to_dict()
@@ -153,10 +132,9 @@ def in_drake(
     plant.Finalize()
     bodies = [plant.get_body(index) for index in plant.GetBodyIndices(robot)]
     touching = GeometrySet([g for body in bodies for g in plant.GetCollisionGeometriesForBody(body)])
-    graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(touching))
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
-    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    own.graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(touching))
+    own.finish()
+    context = own.context
     root = plant.GetBodyByName(description["solids"][0]["name"])
     q = start(model)
     angles = dict(zip(model.dof_names[6:], q[6:], strict=True))
@@ -179,7 +157,7 @@ def in_drake(
             desired[at] = signs[name] * of[name]
         plant.get_actuation_input_port(robot).FixValue(context, actuation)
         plant.get_desired_state_input_port(robot).FixValue(context, desired)
-        simulator.AdvanceTo(k * SAMPLE)
+        own.simulator.AdvanceTo(k * SAMPLE)
         places.append(root.EvalPoseInWorld(context).translation())
     return Drive(np.array(places), _loads(plant, context, wheels))
 

@@ -16,7 +16,7 @@ import math
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -30,7 +30,7 @@ from mujoco import rollout
 from rich.console import Console
 
 from comparison.machine import processor
-from comparison.mujoco_rover import HALF_WIDTH
+from comparison.mujoco_rover import rim
 from comparison.output import CHART
 from comparison.scene import Array
 from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField
@@ -241,7 +241,7 @@ def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list
         machine.to_mjcf(file)
         text = file.read_text(encoding="utf-8")
     wheels = {wheel["solid"]: wheel for wheel in machine.to_dict()["wheels"]}
-    limits = {solid["name"]: solid for solid in machine.to_dict()["solids"]}
+    solids = {solid["name"]: solid for solid in machine.to_dict()["solids"]}
     texts = []
     for simulation in simulations:
         root = ElementTree.fromstring(text)  # noqa: S314 - our own text
@@ -262,35 +262,15 @@ def descriptions(simulations: list[Simulation], *, bodies: bool = False) -> list
                 geom.attrib |= masks | {"type": kind, "size": size}
         for motor in root.iter("motor"):
             motor.attrib.pop("ctrlrange", None)
-        for name, solid in limits.items():
-            if (
-                solid.get("hold")
-                and name not in wheels
-                and not any(a.get("name") == f"hold_{name}" for a in root.iter("position"))
-            ):
-                # A joint held by its model, and not steered, is a spring and a damper.
-                for joint in root.iter("joint"):
-                    if joint.get("name") == name and joint.get("type"):
-                        joint.set("stiffness", repr(solid["hold"]["stiffness"]))
-                        joint.set("damping", repr(solid["hold"]["damping"]))
+        # A joint held by its model, and not steered, is a spring and a damper.
+        driven = {*wheels, *(str(servo.get("name")).removeprefix("hold_") for servo in root.iter("position"))}
+        for joint in root.iter("joint"):
+            hold = solids.get(str(joint.get("name")), {}).get("hold")
+            if hold and joint.get("type") and joint.get("name") not in driven:
+                joint.attrib |= {gain: repr(hold[gain]) for gain in ("stiffness", "damping")}
         _add_ground(root, simulation.terrain)
         texts.append(ElementTree.tostring(root, encoding="unicode"))
     return texts
-
-
-def rim(wheel: Mapping[str, Any], radius: float, *, is_flat: bool) -> tuple[str, str]:
-    """Type and size of a wheel in MuJoCo: the cheapest shape that moves as the wheel does.
-
-    A thin disc and a wheel with fully rounded edges touch a plane at the lowest point of their middle, as long as the
-    axle is parallel to it: so does a sphere, in half the time. Elsewhere a disc is a cylinder 4 mm wide.
-    """
-    half = 0.5 * (wheel.get("width") or 0.0)
-    is_round = (wheel.get("rounding") or 0.0) >= half
-    if is_flat and is_round:
-        return "sphere", repr(radius)
-    if half > 0.0 and is_round:
-        return "ellipsoid", f"{radius!r} {radius!r} {half!r}"
-    return "cylinder", f"{radius!r} {half or HALF_WIDTH!r}"
 
 
 def _add_ground(root: ElementTree.Element, terrain: Any) -> None:

@@ -8,6 +8,15 @@ from comparison.peers import Variant
 from comparison.scene import RoverScene, Trace, steps_in
 
 
+def timed(variant: Variant, scene: RoverScene, time_step: float, cap: float, short: float, times: int) -> Trace:
+    """A run with the least CPU time of so many more where it took less than `short`, s."""
+    trace = run(variant, scene, time_step, cap)
+    for _ in range(times if trace.cpu < short and not trace.failure else 0):
+        again = run(variant, scene, time_step, cap)
+        trace.cpu = min(trace.cpu, again.cpu * trace.simulated / again.simulated)
+    return trace
+
+
 def run(variant: Variant, scene: RoverScene, time_step: float, cap: float = 20.0) -> Trace:
     """One run, stopped where it takes more CPU time than `cap` (s), turns infinite or fails."""
     runner = variant.build(scene, time_step)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym import HeightField
+from rover_gym import HeightField, RoverModel
 
 Array = npt.NDArray[np.float64]
 
@@ -91,6 +91,16 @@ class Trace:
     cpu: float
     simulated: float
     failure: str = ""
+
+
+def rigid(**changes: Any) -> dict[str, Any]:
+    """Description of the built-in rover with some changes, with rigid wheels and without motors, as peers have it."""
+    return RoverModel().replace(wheel_stiffness=0.0, motor=None, **changes).to_dict()
+
+
+def distance(path: Array, other: Array) -> float:
+    """RMS distance of two paths sampled at the same times, m."""
+    return float(np.sqrt(np.mean(np.sum((path - other) ** 2, axis=1))))
 
 
 def steps_in(seconds: float, time_step: float) -> int:

@@ -16,7 +16,6 @@ families alone are used.
 import argparse
 import json
 import platform
-import select
 import subprocess
 import tempfile
 import time
@@ -30,13 +29,14 @@ import numpy as np
 import numpy.typing as npt
 
 import rover_gym
+from comparison.output import CHART
 from comparison.problems import Problem, problem_folder, recorded, residual
+from comparison.worker import Worker, says
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 Array = npt.NDArray[np.float64]
-ROOT = Path(__file__).parents[2]
 RESIDUAL = 1e-8  # relative natural map of an answer that counts
 VELOCITY = 1e-6  # m/s, largest violation at a contact
 OURS = ("auto", "nsgs", "newton", "proximal", "admm")
@@ -83,13 +83,8 @@ def mechanism(seed: int, n_contacts: int, dimension: int) -> Problem:
     H = rng.uniform(-1, 1, (n, n + 2))
     inverse = 10 ** rng.uniform(-1, 1, n + 2)
     q = H @ rng.uniform(-1, 1, n + 2)
-    return Problem(
-        f"mechanism_{dimension}d_{n_contacts}_{seed}",
-        H * inverse @ H.T,
-        q,
-        rng.uniform(0.1, 0.8, n_contacts),
-        dimension,
-    )
+    mu = rng.uniform(0.1, 0.8, n_contacts)
+    return Problem(f"mechanism_{dimension}d_{n_contacts}_{seed}", H * inverse @ H.T, q, mu, dimension)
 
 
 def synthetic() -> list[Problem]:
@@ -135,19 +130,8 @@ class Siconos:
 
     def __init__(self, python: str, folder: Path) -> None:
         """`folder` holds the problems while they are passed on."""
-        self.python, self.folder = python, folder
-        self.worker: subprocess.Popen[str] | None = None
-
-    @staticmethod
-    def is_installed(python: str) -> bool:
-        """Whether the interpreter can import it."""
-        try:
-            return (
-                subprocess.run([python, "-c", "import siconos.numerics"], capture_output=True, check=False).returncode
-                == 0
-            )
-        except OSError:
-            return False
+        self.command, self.folder = [python, str(Path(__file__).with_name("siconos_peer.py"))], folder
+        self.worker: Worker | None = None
 
     def solve(self, problem: Problem, solver: str, tolerance: float) -> tuple[float, int, Array]:
         """One job; an answer of zeros where it takes longer than the cap or the worker dies."""
@@ -155,32 +139,20 @@ class Siconos:
         if not path.exists():
             np.savez(path, W=problem.W, q=problem.q, mu=problem.mu, dimension=problem.dimension)
         if self.worker is None:
-            command = [self.python, str(Path(__file__).with_name("siconos_peer.py"))]
-            self.worker = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-            )
-            assert self.worker.stdout is not None
-            self.worker.stdout.readline()  # ready: its start does not count
-        worker = self.worker
-        assert worker.stdin is not None
-        assert worker.stdout is not None
+            self.worker = Worker(self.command, stderr=subprocess.DEVNULL)
+            self.worker.hear()  # ready: its start does not count
         job = {"problem": str(path), "solver": solver, "tolerance": tolerance, "repetitions": 5, "cap": CAP}
-        worker.stdin.write(json.dumps(job) + "\n")
-        worker.stdin.flush()
-        line = worker.stdout.readline() if select.select([worker.stdout], [], [], STUCK)[0] else ""
-        if not line:
-            worker.kill()
-            worker.wait()
-            self.worker = None
+        answer = self.worker.ask(job, STUCK)
+        if answer is None:
+            self.close()
             return np.inf, 0, np.zeros(len(problem.q))
-        answer = json.loads(line)
         return answer["seconds"], answer["iterations"], np.array(answer["impulses"])
 
     def close(self) -> None:
         """Ends the worker."""
         if self.worker is not None:
-            self.worker.kill()
-            self.worker.wait()
+            self.worker.close()
+        self.worker = None
 
 
 def run(problem: Problem, solve: Callable[[Problem, float], tuple[float, int, Array]]) -> Run:
@@ -209,16 +181,8 @@ def draw(profiles: dict[str, dict[str, list[float]]], taus: Array, n_problems: i
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), sharey=True, constrained_layout=True)
     for axis, (what, curves) in zip(axes, profiles.items(), strict=True):
         for index, (name, shares) in enumerate(curves.items()):
-            peer = name.startswith("Siconos")
-            axis.step(
-                taus,
-                shares,
-                where="post",
-                label=name,
-                color=f"C{index}",
-                ls="--" if peer else "-",
-                lw=2.5 if name == "auto" else 1.3,
-            )
+            style, width = "--" if name.startswith("Siconos") else "-", 2.5 if name == "auto" else 1.3
+            axis.step(taus, shares, where="post", label=name, color=f"C{index}", ls=style, lw=width)
         axis.set(xscale="log", xlim=(1, taus[-1]), ylim=(0, 1.02), xlabel=f"{what} / least {what} of any solver")
         axis.grid(alpha=0.3)
     axes[0].set_ylabel(f"share of {n_problems} problems solved")
@@ -233,25 +197,17 @@ def compare(problems: list[Problem], siconos: str | None) -> dict[str, dict[str,
         name: lambda problem, tolerance, name=name: solve_ours(problem, name, tolerance) for name in OURS
     }
     with tempfile.TemporaryDirectory() as folder:
-        peer = Siconos(siconos, Path(folder)) if siconos and Siconos.is_installed(siconos) else None
-        for name in PEERS if peer else ():
-            assert peer is not None
-            solvers[f"Siconos {name}"] = lambda problem, tolerance, name=name, peer=peer: peer.solve(
-                problem, name, tolerance
-            )
+        is_installed = siconos is not None and not says([siconos, "-c", "import siconos.numerics"])
+        peer = Siconos(siconos or "", Path(folder))
+        for name in PEERS if is_installed else ():
+            solvers[f"Siconos {name}"] = lambda problem, tolerance, name=name: peer.solve(problem, name, tolerance)
         results: dict[str, dict[str, Run]] = {name: {} for name in solvers}
         for problem in problems:
             for name, solve in solvers.items():
                 results[name][problem.name] = run(problem, solve)
-            print(
-                problem.name,
-                *(
-                    f"{n}:{r[problem.name].seconds:.1e}{'' if r[problem.name].is_solved else '!'}"
-                    for n, r in results.items()
-                ),
-            )
-        if peer is not None:
-            peer.close()
+            found = {name: of[problem.name] for name, of in results.items()}
+            print(problem.name, *(f"{n}:{one.seconds:.1e}{'' if one.is_solved else '!'}" for n, one in found.items()))
+        peer.close()
     return results
 
 
@@ -265,7 +221,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--problems", type=Path, default=problem_folder(), help="folder of recorded problems (.npz)")
     parser.add_argument("--siconos", default="/usr/bin/python3", help="interpreter that can import siconos")
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "comparison")
+    parser.add_argument("--output", type=Path, default=CHART)
     parser.add_argument("--only", default="", help="part of the names of the problems to run")
     arguments = parser.parse_args()
     if arguments.problems is None:

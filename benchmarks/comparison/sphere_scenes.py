@@ -6,25 +6,22 @@ all. Writes `docs/comparison/spheres.json`, `spheres.png` and the tables of `doc
 marks.
 """
 
-import argparse
-import importlib
 import json
 import subprocess
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from reports import ROOT, fill, read_json, write_json
 from rich.console import Console
 
-from comparison.machine import processor, versions
-from comparison.output import CHART, QUICK
-from comparison.peers import LeftOut
+from comparison.machine import meta
+from comparison.output import command_line, page_of
+from comparison.peers import LeftOut, installed
 from comparison.spheres.scene import FreeRunner, FreeScene, energy, penetration, velocity_error
-from comparison.spheres.tables import ERRORS, fill
+from comparison.spheres.tables import ERRORS, tables
 
-ROOT = Path(__file__).parents[2]
 STEPS = (1e-2, 5e-3, 2e-3, 1e-3)
 SAMPLE = 0.01  # s
 SETTLE = 0.5  # s of rest before a push, in which the weight compresses what springs an engine has
@@ -37,19 +34,6 @@ OWN = {
     "velocity_level": "velocity level",
 }
 Builder = Callable[[FreeScene, float], FreeRunner]
-
-
-def peers(console: Console) -> dict[tuple[str, str], Builder]:
-    """Of the engines that are installed."""
-    found: dict[tuple[str, str], Builder] = {}
-    for name in ENGINES:
-        try:
-            module = importlib.import_module(f"comparison.spheres.{name}")
-        except ImportError as missing:
-            console.print(f"left out, not installed: {name} ({missing})")
-        else:
-            found |= module.VARIANTS
-    return found
 
 
 def run_peer(make: Builder, scene: FreeScene, step: float, duration: float, cap: float) -> dict[str, Any]:
@@ -109,57 +93,48 @@ def measure(
 ) -> dict[str, Any]:
     """Every engine in every scene; `quick` shortens the scenes to 2 s."""
     rows: list[dict[str, Any]] = []
-    engines = peers(console)
+    modules, _ = installed("comparison.spheres", ENGINES, console)
+    engines: dict[tuple[str, str], Builder] = {key: make for one in modules for key, make in one.VARIANTS.items()}
     cost: dict[tuple[str, str, str], float] = {}  # us of a step, at the step before
     for given in ours("--start"):
         scene = FreeScene.of(given)
         if wanted and scene.name not in wanted:
             continue
         duration = min(2.0, scene.duration) if quick else scene.duration
-        key = ERRORS[scene.name].key
         for step in steps:
-            found: list[tuple[str, str, dict[str, Any]]] = []
-            shown = ours("--scene", scene.name, "--duration", repr(duration), repr(step))
-            found += [("rover-gym", OWN[row["treatment"]], row["run"]) for row in shown[0]["runs"]]
-            for (engine, variant), make in engines.items():
-                key_of_cost = (scene.name, engine, variant)
-                if cost.get(key_of_cost, 0.0) * 1e-6 * duration / step > 1.5 * cap:
-                    row = {"failure": f"left out: would take more than {cap:g} s of CPU time"}
+            (shown,) = ours("--scene", scene.name, "--duration", repr(duration), repr(step))
+            found = {("rover-gym", OWN[row["treatment"]]): row["run"] for row in shown["runs"]}
+            for key, make in engines.items():
+                known = cost.get((scene.name, *key), 0.0)
+                if known * 1e-6 * duration / step > 1.5 * cap:
+                    found[key] = {"failure": f"left out: would take more than {cap:g} s of CPU time"}
                 else:
-                    row = run_peer(make, scene, step, duration, cap)
-                    cost[key_of_cost] = row.get("us_per_step", cost.get(key_of_cost, 0.0))
-                found.append((engine, variant, row))
-            for engine, variant, row in found:
+                    found[key] = run_peer(make, scene, step, duration, cap)
+                    cost[(scene.name, *key)] = found[key].get("us_per_step", known)
+            for (engine, variant), row in found.items():
                 rows.append({"scene": scene.name, "engine": engine, "variant": variant, "step": step} | row)
-                text = row.get("failure") or f"{row[key]:.2e} {row['us_per_step']:8.1f} us a step"
+                error = ERRORS[scene.name].key
+                text = row.get("failure") or f"{row[error]:.2e} {row['us_per_step']:8.1f} us a step"
                 console.print(f"{scene.name:<18}{step * 1e3:>5g} ms  {engine}, {variant}: {text}")
-    meta = {"command": "make chart", "processor": processor(), "packages": versions(), "is_quick": quick}
-    return {"meta": meta, "points": rows}
+    return {"meta": meta(is_quick=quick), "points": rows}
 
 
 def main() -> None:
     """Measures, draws, fills."""
-    parser = argparse.ArgumentParser(description="Free spheres after SimBenchmark.")
-    parser.add_argument("--quick", action="store_true", help=f"two steps and 2 s of each scene, under {QUICK}")
-    parser.add_argument("--draw", action="store_true", help="only draw what spheres.json has")
-    parser.add_argument("--scenes", nargs="*", help="only these; the rest is kept as it is in spheres.json")
-    parser.add_argument("--cap", type=float, default=60.0, help="CPU time that a peer's run may take, s")
-    arguments = parser.parse_args()
-    output = QUICK if arguments.quick else CHART
-    output.mkdir(parents=True, exist_ok=True)
-    path = output / "spheres.json"
-    if not arguments.draw:
-        steps = STEPS[:2] if arguments.quick else STEPS
-        data = measure(steps, arguments.scenes, arguments.quick, arguments.cap, Console(width=120))
-        if arguments.scenes and path.exists():
-            old = json.loads(path.read_text(encoding="utf-8"))["points"]
-            data["points"] = [row for row in old if row["scene"] not in arguments.scenes] + data["points"]
-        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    data = json.loads(path.read_text(encoding="utf-8"))
+    quick = "two steps and 2 s of each scene"
+    given = command_line("spheres.json", "Free spheres after SimBenchmark.", quick, cap=60.0, has_scenes=True)
+    if not given.draw:
+        steps = STEPS[:2] if given.quick else STEPS
+        data = measure(steps, given.scenes, given.quick, given.cap, Console(width=120))
+        if given.scenes:
+            old = read_json(given.path, {"points": []})["points"]
+            data["points"] = [row for row in old if row["scene"] not in given.scenes] + data["points"]
+        write_json(given.path, data)
+    data = read_json(given.path)
     from comparison.spheres.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
 
-    draw(data, path.with_suffix(".png"))
-    fill(output, data)
+    draw(data, given.path.with_suffix(".png"))
+    fill(page_of(given.path.parent), "spheres", tables(data))
 
 
 if __name__ == "__main__":

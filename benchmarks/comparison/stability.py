@@ -4,20 +4,18 @@ Writes `docs/comparison/stability.json` and `docs/tables/stability.md` from it.
 """
 
 import argparse
-import json
+import itertools
 from collections.abc import Iterable
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
+from reports import TABLES, fill, left_out, read_json, table, write_json
 from rich.console import Console
 
 from comparison.failure import bodies, peers, rover
 from comparison.failure.finding import Finding
+from comparison.output import CHART
 from comparison.peers import load
-
-DOCS = Path(__file__).parents[2] / "docs"
-MARK = "<!-- tables: made by `make stability`, not by hand -->"
 
 
 def _report(console: Console, findings: Iterable[Finding]) -> list[Finding]:
@@ -34,29 +32,27 @@ def _report(console: Console, findings: Iterable[Finding]) -> list[Finding]:
 
 def measure(console: Console, *, with_peers: bool) -> dict[str, Any]:
     """All scenes: law and solver, rover, peers."""
+    spring = {"spring and damper": bodies.SPRING}
     groups = {
         "bodies": [f for scene in bodies.SCENES for f in _report(console, scene(bodies.SOLVERS))]
         + [f for scene in bodies.SLOW for f in _report(console, scene(bodies.PATIENT))]
-        + [f for scene in bodies.PERSISTENT for f in _report(console, scene({"spring and damper": bodies.SPRING}))],
+        + [f for scene in bodies.PERSISTENT for f in _report(console, scene(spring))],
         "rover": [f for scene in rover.SCENES for f in _report(console, scene())],
     }
     missing: dict[str, str] = {}
     if with_peers:
-        variants, missing = load()
+        variants, missing = load(console)
         # of ours the variants differ above; here one stands for all
-        chosen = [v for v in variants if v.engine != "rover-gym"]
-        chosen = [v for v in variants if v.engine == "rover-gym"][:1] + chosen
+        chosen = [v for v in variants if v.engine == "rover-gym"][:1] + [v for v in variants if v.engine != "rover-gym"]
         found: list[Finding] = []
-        for scene in peers.SCENES:
-            for variant in chosen:
-                try:
-                    found += _report(console, scene(variant))
-                except (RuntimeError, ArithmeticError) as error:
-                    name = f"{variant.engine}, {variant.name}"
-                    how = f"the engine stops: {str(error).splitlines()[0][:100]}"
-                    found += _report(
-                        console, [Finding(scene.__name__.replace("_", " "), "", name, float("inf"), 0.0, "", how)]
-                    )
+        for scene, variant in itertools.product(peers.SCENES, chosen):
+            name = f"{variant.engine}, {variant.name}"
+            try:
+                found += _report(console, scene({name: variant}))
+            except (RuntimeError, ArithmeticError) as error:
+                how = f"the engine stops: {str(error).splitlines()[0][:100]}"
+                title = scene.__name__.replace("_", " ")
+                found += _report(console, [Finding(title, "", name, float("inf"), 0.0, "", how)])
         groups["peers"] = found
     rows = {
         group: [asdict(f) | {"holds": f.holds, "number": _number(f.number)} for f in found]
@@ -75,22 +71,16 @@ def _cell(row: dict[str, Any]) -> str:
     return text if row["holds"] else f"**fails**: {text}"
 
 
-def table(rows: list[dict[str, Any]]) -> str:
+def table_of(rows: list[dict[str, Any]]) -> str:
     """One line a scene, one column a method."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    lines = [
-        "| scene | expected | within | " + " | ".join(methods) + " |",
-        "|---" * (3 + len(methods)) + "|",
-    ]
-    for scene in scenes:
+    lines = []
+    for scene in dict.fromkeys(row["scene"] for row in rows):
         own = {row["method"]: row for row in rows if row["scene"] == scene}
         first = next(iter(own.values()))
         cells = [_cell(own[m]) if m in own else "" for m in methods]
-        lines.append(
-            f"| {scene} | {first['expected']} | {first['limit']:g} {first['unit']} | " + " | ".join(cells) + " |"
-        )
-    return "\n".join(lines)
+        lines.append([scene, first["expected"], f"{first['limit']:g} {first['unit']}", *cells])
+    return table(["scene", "expected", "within", *methods], lines)
 
 
 def remarks(rows: list[dict[str, Any]]) -> str:
@@ -104,21 +94,13 @@ def remarks(rows: list[dict[str, Any]]) -> str:
 
 def page(data: dict[str, Any]) -> str:
     """The generated half of the page."""
-    found = data["findings"]
+    titles = {"bodies": "Law and solvers", "rover": "The rover", "peers": "Beside other engines"}
     parts = [
-        "## Law and solvers\n",
-        table(found["bodies"]),
-        "\nHow they fail:\n",
-        remarks(found["bodies"]),
-        "\n## The rover\n",
-        table(found["rover"]),
-        "\nHow they fail:\n",
-        remarks(found["rover"]),
+        f"## {titles[group]}\n\n{table_of(rows)}\n\nHow they fail:\n\n{remarks(rows)}\n"
+        for group, rows in data["findings"].items()
     ]
-    if "peers" in found:
-        parts += ["\n## Beside other engines\n", table(found["peers"]), "\nHow they fail:\n", remarks(found["peers"])]
-        parts += [f"\nLeft out, not installed: {engine}." for engine in data["meta"]["peers_missing"]]
-    return "\n".join(parts) + "\n"
+    missing = left_out(data["meta"]["peers_missing"]) if "peers" in data["findings"] else []
+    return "\n".join([*parts, *missing]).removesuffix("\n")
 
 
 def main() -> None:
@@ -127,17 +109,13 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="without the peers; writes nothing")
     parser.add_argument("--write", action="store_true", help="only write the page from stability.json")
     arguments = parser.parse_args()
-    console = Console(width=180)
-    path = DOCS / "comparison" / "stability.json"
+    path = CHART / "stability.json"
     if not arguments.write:
-        data = measure(console, with_peers=not arguments.quick)
+        data = measure(Console(width=180), with_peers=not arguments.quick)
         if arguments.quick:
             return
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    text = DOCS / "tables" / "stability.md"
-    head = text.read_text(encoding="utf-8").split(MARK)[0]
-    text.write_text(head + MARK + "\n\n" + page(json.loads(path.read_text(encoding="utf-8"))), encoding="utf-8")
+        write_json(path, data)
+    fill(TABLES / "stability.md", "tables", page(read_json(path)))
 
 
 if __name__ == "__main__":

@@ -5,39 +5,24 @@ level ground and hills. Writes `docs/comparison/surfaces.json`, `surfaces.png` a
 `docs/tables/comparison.md` between their marks.
 """
 
-import argparse
-import importlib
-import json
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
+from reports import fill, read_json, write_json
 from rich.console import Console
 
-from comparison.machine import processor, versions
-from comparison.output import CHART, QUICK
+from comparison.machine import meta
+from comparison.output import command_line, page_of
+from comparison.peers import installed
 from comparison.surfaces.bodies import measure_edges, measure_rest, measure_wave
 from comparison.surfaces.drives import SEEDS, hill_references, measure_hills, measure_level
-from comparison.surfaces.tables import fill
+from comparison.surfaces.tables import tables
 
 STEPS = (5e-3, 2e-3, 1e-3)
 #: One file an engine, each with `BODIES`, `ROVERS` and perhaps `ROVERS_ON_BALLS`; ImportError without its engine.
 ENGINES = ("our_surfaces", "mujoco_surfaces", "bullet_surfaces", "drake_surfaces")
 #: Of the ball over the edges, the ball on the sine, the rover on level ground and on hills, the box, s; of a quick run.
 DURATIONS, SHORT = (3.0, 4.0, 4.0, 3.0, 2.0), (1.0, 1.0, 1.0, 0.5, 0.5)
-
-
-def engines(console: Console) -> tuple[list[ModuleType], list[str]]:
-    """Those that are installed, and the names of the others."""
-    found, missing = [], []
-    for name in ENGINES:
-        try:
-            found.append(importlib.import_module(f"comparison.surfaces.{name}"))
-        except ImportError as error:
-            missing.append(name.removesuffix("_surfaces"))
-            console.print(f"left out, not installed: {name} ({error})")
-    return found, missing
 
 
 def said(row: dict[str, Any]) -> str:
@@ -50,7 +35,7 @@ def said(row: dict[str, Any]) -> str:
 
 def measure(steps: tuple[float, ...], durations: tuple[float, ...], cap: float, console: Console) -> dict[str, Any]:
     """Every engine in every scene; a run that takes more CPU time than `cap` (s) is left out."""
-    found, missing = engines(console)
+    found, missing = installed("comparison.surfaces", ENGINES, console)
     points: list[dict[str, Any]] = []
 
     def keep(scene: str, key: tuple[str, str], step: float, rows: list[dict[str, Any]]) -> None:
@@ -71,36 +56,25 @@ def measure(steps: tuple[float, ...], durations: tuple[float, ...], cap: float, 
             for variant in getattr(module, "ROVERS_ON_BALLS", module.ROVERS):
                 row = measure_hills(variant, step, references, cap)
                 keep("hills", (variant.engine, variant.name), step, [row])
-    meta = {
-        "command": "make chart",
-        "processor": processor(),
-        "packages": versions(),
-        "durations_s": durations,
-        "changes_of_references_m": [change for _, _, change in references.values()],
-        "missing": missing,
-    }
-    return {"meta": meta, "points": points}
+    about = meta(
+        durations_s=durations,
+        changes_of_references_m=[change for _, _, change in references.values()],
+        missing=[name.removesuffix("_surfaces") for name in missing],
+    )
+    return {"meta": about, "points": points}
 
 
 def main() -> None:
     """Measures, draws, fills."""
-    parser = argparse.ArgumentParser(description="Drives over maps.")
-    parser.add_argument("--quick", action="store_true", help=f"one step and short scenes, under {QUICK}")
-    parser.add_argument("--draw", action="store_true", help="only draw what surfaces.json has")
-    parser.add_argument("--cap", type=float, default=8.0, help="CPU time that a run may take, s")
-    arguments = parser.parse_args()
-    output = QUICK if arguments.quick else CHART
-    output.mkdir(parents=True, exist_ok=True)
-    path: Path = output / "surfaces.json"
-    if not arguments.draw:
-        steps, durations = (STEPS[:1], SHORT) if arguments.quick else (STEPS, DURATIONS)
-        data = measure(steps, durations, arguments.cap, Console(width=140))
-        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    data = json.loads(path.read_text(encoding="utf-8"))
+    given = command_line("surfaces.json", "Drives over maps.", "one step and short scenes", cap=8.0)
+    if not given.draw:
+        steps, durations = (STEPS[:1], SHORT) if given.quick else (STEPS, DURATIONS)
+        write_json(given.path, measure(steps, durations, given.cap, Console(width=140)))
+    data = read_json(given.path)
     from comparison.surfaces.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
 
-    draw(data, path.with_suffix(".png"))
-    fill(output, data)
+    draw(data, given.path.with_suffix(".png"))
+    fill(page_of(given.path.parent), "surfaces", tables(data))
 
 
 if __name__ == "__main__":

@@ -110,8 +110,7 @@ class Audit:
             ledger.not_converged += 1
             self._note("not converged", what)
         after = sim.q
-        if not (np.isfinite(after).all() and np.isfinite(sim.v).all()):
-            ledger.find("not finite")
+        if not ledger.is_finite(after, sim.v):
             return False
         stored, work = self._stored(q), self._work(after - q)
         at_hand = self._before.kinetic + self._weight + abs(work) + stored

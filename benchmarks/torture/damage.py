@@ -85,16 +85,21 @@ def shown(text: str, length: int) -> str:
 
 
 def attempt(
-    ledger: Ledger, what: str, call: Callable[[], Any], kind: type[RoverGymError] = RoverGymError, names: str = ""
+    ledger: Ledger,
+    what: str,
+    call: Callable[..., Any],
+    *arguments: Any,
+    kind: type[RoverGymError] = RoverGymError,
+    names: str = "",
 ) -> Any:
-    """What a call returns, None where it is refused.
+    """What a call with some arguments returns, None where it is refused.
 
     A refusal of another kind is a finding, and so is one that names no field, or not what it must name.
     """
     ledger.steps += 1
     try:
         with ledger.timed():
-            return call()
+            return call(*arguments)
     except RoverGymError as error:
         ledger.refused += 1
         if not isinstance(error, StepError) and not error.field:
@@ -111,8 +116,8 @@ def attempt(
 
 
 def use(ledger: Ledger, what: str, sim: Any) -> None:
-    """A few steps of a simulation that was accepted: finite, or a `StepError`."""
-    for _ in range(5):
+    """A few steps of a simulation that was accepted, and is not None: finite, or a `StepError`."""
+    for _ in range(5 if sim is not None else 0):
         if attempt(ledger, what, sim.step) is None:
             return
         state = (sim.position, sim.velocity) if isinstance(sim, DiskSimulation) else (sim.q, sim.v)
@@ -127,7 +132,7 @@ def runs(random: Random, ledger: Ledger) -> None:
         path.unlink(missing_ok=True)
         path.write_bytes(_sound_run("map" if turn % 2 else "plane"))
         mutate_hdf5(random, path, _elsewhere())
-        run = attempt(ledger, "read_run", lambda: read_run(path), RecordingError, str(path))
+        run = attempt(ledger, "read_run", read_run, path, kind=RecordingError, names=str(path))
         try:
             open_run(path, DiskRun)
         except RecordingError:
@@ -155,7 +160,7 @@ def policies(random: Random, ledger: Ledger) -> None:
     for k in range(15):
         change = mutate_npz if k % 2 else mutate_bytes
         (folder / ARCS_FILE).write_bytes(change(random, network))
-        policy = attempt(ledger, "ArcNetworkPolicy.load", lambda: ArcNetworkPolicy.load(_env(), folder), PolicyError)
+        policy = attempt(ledger, "ArcNetworkPolicy.load", ArcNetworkPolicy.load, _env(), folder, kind=PolicyError)
         if policy is not None:
             observation, _ = _env().reset(seed=0)
             action, _ = policy.predict(observation)
@@ -170,18 +175,16 @@ def models(random: Random, ledger: Ledger) -> None:
     for _ in range(15):
         if random.uniform() < 0.5:
             damaged = mutate_bytes(random, text.encode()).decode("utf-8", errors="replace")
-            found = attempt(ledger, "RoverModel.from_text", lambda damaged=damaged: RoverModel.from_text(damaged))
+            found = attempt(ledger, "RoverModel.from_text", RoverModel.from_text, damaged)
         else:
             value = mutate_value(random, description)
-            found = attempt(ledger, "RoverModel.from_dict", lambda value=value: RoverModel.from_dict(value))
+            found = attempt(ledger, "RoverModel.from_dict", RoverModel.from_dict, value)
         if found is None:
             continue
         back = attempt(ledger, "RoverModel.to_text", lambda found=found: RoverModel.from_text(found.to_text()))
         if back is not None and back.to_dict() != found.to_dict():
             ledger.find("a model is another after its way through a file")
-        sim = attempt(ledger, "Simulation", lambda found=found: Simulation(found))
-        if sim is not None:
-            use(ledger, "a damaged model", sim)
+        use(ledger, "a damaged model", attempt(ledger, "Simulation", Simulation, found))
 
 
 #: Writer, reader and ending of the kinds of robot files, by the package that reads them.
@@ -210,14 +213,12 @@ def robots(random: Random, ledger: Ledger) -> None:
         path.write_bytes(mutate_xml(random, _robot(package)).encode("utf-8", errors="surrogatepass"))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RobotFileWarning)  # a change may leave no wheel
-            found = attempt(ledger, f"{ending} {package}", lambda read=read, path=path: read(path))
+            found = attempt(ledger, f"{ending} {package}", read, path)
         if found is None:
             continue
         if attempt(ledger, "RoverModel.from_dict", lambda found=found: RoverModel.from_dict(found.to_dict())) != found:
             ledger.find("an imported model is another after its way through its description")
-        sim = attempt(ledger, "Simulation", lambda found=found: Simulation(found))
-        if sim is not None:
-            use(ledger, "a damaged robot", sim)
+        use(ledger, "a damaged robot", attempt(ledger, "Simulation", Simulation, found))
 
 
 def _moving() -> Simulation:
@@ -250,16 +251,12 @@ def snapshots(random: Random, ledger: Ledger) -> None:
     for _ in range(15):
         # With the checksum of the changed bytes, or as a disk damages them.
         damaged = sealed(mutate_bytes(random, data[:-4])) if random.random() < 0.7 else mutate_bytes(random, data)
-        snapshot = attempt(ledger, "from_bytes", lambda damaged=damaged: Snapshot.from_bytes(damaged))
+        snapshot = attempt(ledger, "from_bytes", Snapshot.from_bytes, damaged)
         if snapshot is None:
             continue
-        before = sim.snapshot().to_bytes()
-
-        def restore(snapshot: Any = snapshot) -> bool:
-            sim.restore(snapshot)
-            return True
-
-        if attempt(ledger, "restore", restore):
+        before, refused = sim.snapshot().to_bytes(), ledger.refused
+        attempt(ledger, "restore", sim.restore, snapshot)
+        if ledger.refused == refused:
             use(ledger, "a damaged snapshot", sim)
             sim.restore(Snapshot.from_bytes(data))
         elif sim.snapshot().to_bytes() != before:
@@ -273,11 +270,9 @@ def rocks(random: Random, ledger: Ledger) -> None:
     path = _folder() / "rocks.csv"
     for _ in range(15):
         path.write_bytes(mutate_bytes(random, ("x,y,z,radius\n" + rows[:3000]).encode()))
-        terrain = attempt(ledger, "SphereField.from_file", lambda: SphereField.from_file(path))
+        terrain = attempt(ledger, "SphereField.from_file", SphereField.from_file, path)
         if terrain is not None:
-            sim = attempt(ledger, "Simulation", lambda terrain=terrain: Simulation(terrain=terrain))
-            if sim is not None:
-                use(ledger, "a damaged field", sim)
+            use(ledger, "a damaged field", attempt(ledger, "Simulation", Simulation, RoverModel(), terrain))
 
 
 INPUTS = Bounds(not_converged=1.0, refused=1.0, slowest=2.0)

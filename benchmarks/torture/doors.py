@@ -56,6 +56,11 @@ def _instance(folder: str) -> Iterator[Any]:
         fmu.freeInstance()
 
 
+def _damaged(random: Random, sound: bytes, times: int) -> Iterator[bytes]:
+    """Damaged copies, without those that are as sound as before."""
+    yield from (copy for _ in range(times) if (copy := mutate_bytes(random, sound)) != sound)
+
+
 def states(random: Random, ledger: Ledger) -> None:
     """Saved states of a unit with bytes changed: each is refused, and the unit goes on as if nothing had been asked."""
     if not LIBRARIES.exists():
@@ -68,10 +73,7 @@ def states(random: Random, ledger: Ledger) -> None:
         fmu.doStep(0.0, 0.05)
         state = fmu.getFMUState()
         data = bytes(fmu.serializeFMUState(state))
-        for _ in range(15):
-            damaged = mutate_bytes(random, data)
-            if damaged == data:
-                continue
+        for damaged in _damaged(random, data, 15):
             ledger.steps += 1
             try:
                 fmu.deserializeFMUState(damaged)
@@ -93,10 +95,7 @@ def scenes(random: Random, ledger: Ledger) -> None:
     path = Path(folder) / "resources" / "scene.json"
     sound = path.read_bytes()
     try:
-        for _ in range(8):
-            damaged = mutate_bytes(random, sound)
-            if damaged == sound:
-                continue
+        for damaged in _damaged(random, sound, 8):
             path.write_bytes(damaged)
             ledger.steps += 1
             try:

@@ -1,5 +1,6 @@
 """The rover on ground of every kind: driven, dropped, thrown, buried."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -107,39 +108,27 @@ def standing(random: Random, terrain: Plane, **options: Any) -> Simulation:
     return sim
 
 
-def torques(most: float) -> Any:
+def torques(random: Random, ledger: Ledger, *, most: float) -> None:
     """Drives on the level with torques up to so many N m, at steps of 1 to 20 ms."""
-
-    def run(random: Random, ledger: Ledger) -> None:
-        step = float(random.choice([1e-3, 5e-3, 1e-2, 2e-2]))
-        sim = standing(random, LEVEL, variant=variant(random), time_step=step)
-        drive(random, Audit(sim, ledger), 30, 20, torque=most)
-
-    return run
+    step = float(random.choice([1e-3, 5e-3, 1e-2, 2e-2]))
+    sim = standing(random, LEVEL, variant=variant(random), time_step=step)
+    drive(random, Audit(sim, ledger), 30, 20, torque=most)
 
 
-def steps(chosen: str) -> Any:
+def steps(random: Random, ledger: Ledger, *, chosen: str) -> None:
     """Drives with one scheme at steps of 10 us to 100 ms."""
-
-    def run(random: Random, ledger: Ledger) -> None:
-        sim = standing(random, tilted(random, 20.0), variant=chosen, time_step=log_uniform(random, 1e-5, 0.1))
-        drive(random, Audit(sim, ledger), 30, 20, torque=150.0)
-
-    return run
+    sim = standing(random, tilted(random, 20.0), variant=chosen, time_step=log_uniform(random, 1e-5, 0.1))
+    drive(random, Audit(sim, ledger), 30, 20, torque=150.0)
 
 
-def full_throttle(chosen: str) -> Any:
+def full_throttle(random: Random, ledger: Ledger, *, chosen: str) -> None:
     """All motors forward on the level for twenty seconds, at steps of 5, 10 and 20 ms."""
-
-    def run(random: Random, ledger: Ledger) -> None:
-        step = float(random.choice([5e-3, 1e-2, 2e-2]))
-        sim = standing(random, LEVEL, variant=chosen, time_step=step)
-        sim.set_wheel_torques(np.full(6, 150.0))
-        if random.uniform() < 0.5:
-            steer(random, sim)
-        Audit(sim, ledger).run(round(20.0 / step))
-
-    return run
+    step = float(random.choice([5e-3, 1e-2, 2e-2]))
+    sim = standing(random, LEVEL, variant=chosen, time_step=step)
+    sim.set_wheel_torques(np.full(6, 150.0))
+    if random.uniform() < 0.5:
+        steer(random, sim)
+    Audit(sim, ledger).run(round(20.0 / step))
 
 
 def spin(random: Random, ledger: Ledger) -> None:
@@ -169,16 +158,12 @@ def landing(random: Random, ledger: Ledger) -> None:
     Audit(sim, ledger).run(400)
 
 
-def deep(stony: bool) -> Any:
+def deep(random: Random, ledger: Ledger, *, stony: bool) -> None:
     """Starts overlapping the ground, or rocks, by up to 0.4 m."""
-
-    def run(random: Random, ledger: Ledger) -> None:
-        terrain = rocks(random) if stony else LEVEL
-        sim = Simulation(terrain=terrain, variant=variant(random), time_step=log_uniform(random, 1e-3, 0.02))
-        sim.set_state(pose(random, terrain, above=random.uniform(-0.1, 0.3), lean=0.5))
-        drive(random, Audit(sim, ledger, deep=True), 10, 20, torque=150.0)
-
-    return run
+    terrain = rocks(random) if stony else LEVEL
+    sim = Simulation(terrain=terrain, variant=variant(random), time_step=log_uniform(random, 1e-3, 0.02))
+    sim.set_state(pose(random, terrain, above=random.uniform(-0.1, 0.3), lean=0.5))
+    drive(random, Audit(sim, ledger, deep=True), 10, 20, torque=150.0)
 
 
 def upside_down(random: Random, ledger: Ledger) -> None:
@@ -244,22 +229,18 @@ def weightless(random: Random, ledger: Ledger) -> None:
     drive(random, Audit(sim, ledger), 20, 20, torque=float(random.choice([2.0, 150.0])))
 
 
-def elastic(friction: float) -> Any:
+def elastic(random: Random, ledger: Ledger, *, friction: float) -> None:
     """Tumbles over the ground with e = 1 at steps of 5 to 50 ms."""
-
-    def run(random: Random, ledger: Ledger) -> None:
-        step = float(random.choice([5e-3, 2e-2, 5e-2]))
-        restitution = 1.0 if friction == 0.0 else random.uniform(0.1, 1.0)
-        terrain = LEVEL if random.uniform() < 0.5 else rocks(random)
-        sim = Simulation(
-            terrain=terrain, variant=variant(random), time_step=step, friction=friction, restitution=restitution
-        )
-        v = np.zeros(sim.model.nv)
-        v[3:6] = random.normal(0.0, 2.0, 3)
-        sim.set_state(pose(random, terrain, above=random.uniform(1.0, 2.0), lean=np.pi), v)
-        Audit(sim, ledger).run(300)
-
-    return run
+    step = float(random.choice([5e-3, 2e-2, 5e-2]))
+    restitution = 1.0 if friction == 0.0 else random.uniform(0.1, 1.0)
+    terrain = LEVEL if random.uniform() < 0.5 else rocks(random)
+    sim = Simulation(
+        terrain=terrain, variant=variant(random), time_step=step, friction=friction, restitution=restitution
+    )
+    v = np.zeros(sim.model.nv)
+    v[3:6] = random.normal(0.0, 2.0, 3)
+    sim.set_state(pose(random, terrain, above=random.uniform(1.0, 2.0), lean=np.pi), v)
+    Audit(sim, ledger).run(300)
 
 
 def wedged(random: Random, ledger: Ledger) -> None:
@@ -272,28 +253,24 @@ def wedged(random: Random, ledger: Ledger) -> None:
     drive(random, Audit(sim, ledger, deep=True), 5, 10, torque=150.0)
 
 
-def anything(most: float) -> Any:
+def anything(random: Random, ledger: Ledger, *, most: float) -> None:
     """Ground, law, step, torques, masses, pose and speed all drawn at once; restitution up to so much."""
-
-    def run(random: Random, ledger: Ledger) -> None:
-        ground = tilted(random, 60.0)
-        terrain = rocks(random, ground) if random.uniform() < 0.5 else ground
-        sim = Simulation(
-            MODEL.replace(mass_scale=log_uniform(random, 0.1, 10.0)),
-            terrain,
-            variant=variant(random),
-            time_step=log_uniform(random, 1e-5, 0.1),
-            friction=random.uniform(0.0, 2.0),
-            restitution=random.uniform(0.0, most),
-            theta=float(random.choice([0.5, 0.5, 0.7, 1.0])),
-        )
-        v = np.zeros(sim.model.nv)
-        v[:6] = log_uniform(random, 0.1, 100.0) * random.normal(0.0, 0.5, 6)
-        lean = float(random.choice([0.3, np.pi]))
-        sim.set_state(pose(random, terrain, above=random.uniform(0.0, 1.5), lean=lean), v)
-        drive(random, Audit(sim, ledger, deep=True), 10, 20, torque=log_uniform(random, 1.0, 1e4))
-
-    return run
+    ground = tilted(random, 60.0)
+    terrain = rocks(random, ground) if random.uniform() < 0.5 else ground
+    sim = Simulation(
+        MODEL.replace(mass_scale=log_uniform(random, 0.1, 10.0)),
+        terrain,
+        variant=variant(random),
+        time_step=log_uniform(random, 1e-5, 0.1),
+        friction=random.uniform(0.0, 2.0),
+        restitution=random.uniform(0.0, most),
+        theta=float(random.choice([0.5, 0.5, 0.7, 1.0])),
+    )
+    v = np.zeros(sim.model.nv)
+    v[:6] = log_uniform(random, 0.1, 100.0) * random.normal(0.0, 0.5, 6)
+    lean = float(random.choice([0.3, np.pi]))
+    sim.set_state(pose(random, terrain, above=random.uniform(0.0, 1.5), lean=lean), v)
+    drive(random, Audit(sim, ledger, deep=True), 10, 20, torque=log_uniform(random, 1.0, 1e4))
 
 
 FREE = Bounds(gained=None)
@@ -302,13 +279,13 @@ DEEP = Bounds(lifted=None)
 WEDGED = Bounds(lifted=None, not_converged=5e-3)
 
 REGIMES = [
-    *[Regime(f"full throttle, {v}", full_throttle(v), 12) for v in VARIANTS],
-    *[Regime(f"torques to {t:g} N m", torques(t), 40) for t in (20.0, 60.0, 150.0, 1e3, 1e4)],
-    *[Regime(f"steps of 10 us to 100 ms, {v}", steps(v), 40) for v in VARIANTS],
+    *[Regime(f"full throttle, {v}", partial(full_throttle, chosen=v), 12) for v in VARIANTS],
+    *[Regime(f"torques to {t:g} N m", partial(torques, most=t), 40) for t in (20.0, 60.0, 150.0, 1e3, 1e4)],
+    *[Regime(f"steps of 10 us to 100 ms, {v}", partial(steps, chosen=v), 40) for v in VARIANTS],
     Regime("free flight, to 1e4 rad/s", spin, 120),
     Regime("landing, to 1e3 rad/s", landing, 60),
-    Regime("starts deep in the ground", deep(False), 120, DEEP),
-    Regime("starts deep in rocks", deep(True), 120, DEEP),
+    Regime("starts deep in the ground", partial(deep, stony=False), 120, DEEP),
+    Regime("starts deep in rocks", partial(deep, stony=True), 120, DEEP),
     Regime("upside down", upside_down, 60),
     Regime("into rocks at 100 m/s", shot, 80),
     Regime("over rocks", stony, 40),
@@ -316,9 +293,9 @@ REGIMES = [
     Regime("masses times 0.1 to 10", masses, 40),
     Regime("friction 1e-12 to 1e16", extreme_friction, 40),
     Regime("gravity 0 and g/100", weightless, 40),
-    Regime("elastic, frictionless", elastic(0.0), 60),
-    Regime("elastic with friction", elastic(0.7), 40, FREE),
+    Regime("elastic, frictionless", partial(elastic, friction=0.0), 60),
+    Regime("elastic with friction", partial(elastic, friction=0.7), 40, FREE),
     Regime("wedged between spheres", wedged, 120, WEDGED),
-    Regime("anything, e = 0", anything(0.0), 200, DEEP),
-    Regime("anything, e to 1", anything(1.0), 100, Bounds(gained=None, lifted=None)),
+    Regime("anything, e = 0", partial(anything, most=0.0), 200, DEEP),
+    Regime("anything, e to 1", partial(anything, most=1.0), 100, Bounds(gained=None, lifted=None)),
 ]

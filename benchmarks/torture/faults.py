@@ -7,7 +7,8 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,18 @@ def _python(program: str, *arguments: str) -> subprocess.Popen[str]:
     return child
 
 
+@contextmanager
+def _run() -> Iterator[Path]:
+    """A place for a run."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder) / "run.h5"
+
+
+def _end(child: subprocess.Popen[str]) -> None:
+    child.kill()
+    child.communicate()
+
+
 def _whole(path: Path, ledger: Ledger) -> None:
     """What was flushed is there and right, or the file is refused with an error of ours."""
     try:
@@ -77,20 +90,17 @@ def _whole(path: Path, ledger: Ledger) -> None:
 
 def killed(random: Random, ledger: Ledger) -> None:
     """A recorder is killed in the middle: what it had flushed can be read."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.h5"
+    with _run() as path:
         child = _python(RECORD, str(path), "0")
         time.sleep(random.uniform(0.0, 0.3))
-        child.kill()
-        child.communicate()
+        _end(child)
         ledger.steps += 1
         _whole(path, ledger)
 
 
 def full_disk(random: Random, ledger: Ledger) -> None:
     """A limit of file sizes acts as a disk that fills up."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.h5"
+    with _run() as path:
         child = _python(RECORD, str(path), str(random.integers(0, 300_000) or 1))
         _, errors = child.communicate()
         ledger.steps += 1
@@ -103,8 +113,7 @@ def full_disk(random: Random, ledger: Ledger) -> None:
 
 def second_writer(random: Random, ledger: Ledger) -> None:
     """Another process opens the run that is being recorded: it is refused, and the run is whole."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.h5"
+    with _run() as path:
         channels = [Channel("time", "s", "time"), Channel("x", "m", "x", (10,))]
         with Recorder(path, channels, rows_per_flush=int(random.integers(1, 20))) as recorder:
             for i in range(int(random.integers(0, 50))):
@@ -113,8 +122,7 @@ def second_writer(random: Random, ledger: Ledger) -> None:
             try:
                 child.communicate(timeout=5.0)
             except subprocess.TimeoutExpired:
-                child.kill()
-                child.communicate()
+                _end(child)
             ledger.steps += 1
             if child.returncode == 0 or child.returncode < 0:
                 ledger.find("a second writer was let in")
@@ -158,8 +166,7 @@ def interrupt(random: Random, ledger: Ledger) -> None:
     try:
         output, _ = child.communicate(timeout=10.0)
     except subprocess.TimeoutExpired:
-        child.kill()
-        child.communicate()
+        _end(child)
         ledger.find("Ctrl-C is not heard within 10 s")
         return
     answer = output.split()

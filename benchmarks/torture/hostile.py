@@ -26,65 +26,25 @@ TEXTS = (
     "é\u202e\n\r\t",
     "x" * 70_000,
 )
+NAN, INFINITE = float("nan"), float("inf")
 #: Numbers at the ends of their types, and beyond.
 NUMBERS = (
-    0,
-    -1,
-    1,
-    2**31,
-    2**63,
-    -(2**64),
-    10**400,
-    0.0,
-    -0.0,
-    5e-324,
-    1e-300,
-    1e308,
-    -1e308,
-    float("nan"),
-    float("inf"),
-    float("-inf"),
+    *(0, -1, 1, 2**31, 2**63, -(2**64), 10**400),
+    *(0.0, -0.0, 5e-324, 1e-300, 1e308, -1e308, NAN, INFINITE, -INFINITE),
 )
 #: What hardly any argument takes.
 THINGS: tuple[Any, ...] = (
-    None,
-    True,
-    1j,
-    datetime.timedelta(seconds=1),
-    [],
-    [[]],
-    {},
-    [1e308] * 3,
-    [float("nan")] * 6,
-    [[0.0] * 6] * 6,
-    np.zeros((2, 0)),
-    np.zeros(3, dtype=complex),
-    np.array(["a", "b"]),
-    b"bytes",
-    object(),
-    lambda: None,
-    range(10**12),
-    (0.0, 10**400),
+    *(None, True, 1j, datetime.timedelta(seconds=1)),
+    *([], [[]], {}, [1e308] * 3, [NAN] * 6, [[0.0] * 6] * 6),
+    *(np.zeros((2, 0)), np.zeros(3, dtype=complex), np.array(["a", "b"])),
+    *(b"bytes", object(), lambda: None, range(10**12), (0.0, 10**400)),
 )
 
 #: What is close to a number, or converts to one, and is none.
 NO_NUMBERS: tuple[Any, ...] = (
-    datetime.timedelta(seconds=1),
-    np.timedelta64(1, "s"),
-    np.datetime64("2010-01-01"),
-    1.0 + 0.0j,
-    np.complex128(1.0),
-    np.array(1.0 + 0.0j),
-    True,
-    np.bool_(True),
-    "1.0",
-    b"1",
-    10**400,
-    [1.0],
-    {},
-    object(),
-    np.ones(1),
-    int,
+    *(datetime.timedelta(seconds=1), np.timedelta64(1, "s"), np.datetime64("2010-01-01")),
+    *(1.0 + 0.0j, np.complex128(1.0), np.array(1.0 + 0.0j), True, np.bool_(True)),
+    *("1.0", b"1", 10**400, [1.0], {}, object(), np.ones(1), int),
 )
 
 
@@ -106,13 +66,12 @@ class Odd:
 
 def hostile_values() -> list[Any]:
     """All values, made anew: some can be read only once."""
-    nan = float("nan")
     return [
         *(*NUMBERS, *TEXTS, *THINGS, *NO_NUMBERS),
         *(1.5, 1e16, 2**64, -(10**400), 10**5000, False, np.complex128(1 + 1j)),
         *("plane\0", bytearray(b"ab"), memoryview(b"ab")),
         *([1, 2], [1, 2, 3, 4], [[1, 2], [3, 4]], [[0.0], [0.0, 0.0]], {"a": 1}, {1: 2}, {1, 2}),
-        *((nan, 1.0), (1.0, nan, 1.0), ("a", "b"), (None, None), (True, False), (1j, 2j)),
+        *((NAN, 1.0), (1.0, NAN, 1.0), ("a", "b"), (None, None), (True, False), (1j, 2j)),
         *((2.0, 1.0), (1e308, 1e308), (-1e308, 1e308), (5e-324, 5e-324)),
         *(np.array([True, False]), np.array([1 + 1j, 2]), np.array(["1", "2"]), np.array([1, 2], dtype="m8[s]")),
         *(np.array(0.5), np.zeros((2, 2)), np.array([]), np.array([object(), object()]), np.zeros(12, complex)),

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from machines import machine
 
-from rover_gym import HeightField, Plane, RoverModel, Simulation, StepError
+from rover_gym import HeightField, Plane, RoverModel, Simulation
 from rover_gym.core import SimulationBatch
 from torture.drives import log_uniform
 from torture.ledger import Bounds, Ledger, Regime
+from torture.round_trips import restored
 
 Random = np.random.Generator
 
@@ -114,7 +115,7 @@ def together(random: Random, ledger: Ledger) -> None:
     for _ in range(n_rovers):
         command = limits * random.uniform(-0.3, 1.0, len(limits)) * log_uniform(random, 0.05, 1.0)
         sim.set_wheel_torques(command)
-        starts.append((_copy(sim), command))
+        starts.append((restored(sim, sim.snapshot()), command))
         if not _go(sim, steps, ledger):
             break
     batch = SimulationBatch([start for start, _ in starts], threads=1)
@@ -127,30 +128,13 @@ def together(random: Random, ledger: Ledger) -> None:
             ledger.find("a batch moves otherwise than each alone")
 
 
-def _copy(sim: Simulation) -> Simulation:
-    copy = Simulation(sim.model, sim.terrain, **sim.settings)
-    copy.restore(sim.snapshot())
-    return copy
-
-
 def _go(sim: Simulation, steps: int, ledger: Ledger) -> bool:
     """Takes steps; False where one was refused or went wrong."""
     for _ in range(steps):
-        ledger.steps += 1
-        try:
-            with ledger.timed():
-                report = sim.step()
-        except StepError as error:
-            ledger.refused += 1
-            ledger.note("refused", str(error))
-            return False
-        if report.status != "converged":
-            ledger.not_converged += 1
-            ledger.note("not converged", f"residual {report.residual:.1e}, {report.n_contacts} contacts")
-        if report.loop_gap > 1e-6 and report.status == "converged":
+        report = ledger.take(sim.step)
+        if report is not None and report.is_converged and report.loop_gap > 1e-6:
             ledger.find("a loop is open in a step that has converged")
-        if not (np.isfinite(sim.q).all() and np.isfinite(sim.v).all()):
-            ledger.find("not finite")
+        if report is None or not ledger.is_finite(sim.q, sim.v):
             return False
     return True
 

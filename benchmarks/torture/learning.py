@@ -1,6 +1,7 @@
 """The environments under every kind of action: what a learner meets."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -43,9 +44,9 @@ def bang_bang(random: Random, n: int) -> Callable[[], Actions]:
     return act
 
 
-def uniform(random: Random, n: int) -> Callable[[], Actions]:
+def uniform(random: Random, n: int, size: int = 12) -> Callable[[], Actions]:
     """Drawn anew each period: what untrained policies do."""
-    return lambda: random.uniform(-1.0, 1.0, (n, 12)).astype(np.float32)
+    return lambda: random.uniform(-1.0, 1.0, (n, size)).astype(np.float32)
 
 
 def gauss(random: Random, n: int) -> Callable[[], Actions]:
@@ -53,25 +54,42 @@ def gauss(random: Random, n: int) -> Callable[[], Actions]:
     return lambda: np.clip(random.normal(0.0, 2.0, (n, 12)), -1.0, 1.0).astype(np.float32)
 
 
-def episodes(policy: Policy, periods: int, **arguments: Any) -> Any:
+def play(env: RoverEnv, ledger: Ledger, act: Callable[[], Actions], periods: int, *, goes_on: bool = True) -> bool:
+    """Acts for so many control periods under audit; False where that ended early.
+
+    Args:
+        env: After its reset.
+        ledger: Of the case.
+        act: Gives the actions, (1, n) each.
+        periods: How many.
+        goes_on: Whether past the end of the episode.
+    """
+    audit = Audit(env.simulation, ledger)
+    for _ in range(periods):
+        audit.begin()
+        with ledger.timed():
+            observation, reward, terminated, _, info = env.step(act()[0])
+        ledger.raise_to("reward", abs(reward))
+        if not np.isfinite(observation).all():
+            ledger.find("an observation is not finite")
+        if not audit.end(env.task.substeps, info["solver"]["status"]) or (terminated and not goes_on):
+            return False
+    return True
+
+
+def _begin(env: RoverEnv, random: Random, **options: Any) -> None:
+    env.reset(seed=int(random.integers(2**31)), **options)
+
+
+#: A goal far away.
+FAR = {"options": {"goal": (80.0, 40.0)}}
+
+
+def episodes(random: Random, ledger: Ledger, *, policy: Policy, periods: int, **arguments: Any) -> None:
     """Drives on whatever an episode comes to, with a goal far away."""
-
-    def run(random: Random, ledger: Ledger) -> None:
-        env = RoverEnv(**arguments)
-        env.reset(seed=int(random.integers(2**31)), options={"goal": (80.0, 40.0)})
-        act = policy(random, 1)
-        audit = Audit(env.simulation, ledger)
-        for _ in range(periods):
-            audit.begin()
-            with ledger.timed():
-                observation, reward, _, _, info = env.step(act()[0])
-            ledger.raise_to("reward", abs(reward))
-            if not np.isfinite(observation).all():
-                ledger.find("an observation is not finite")
-            if not audit.end(env.task.substeps, info["solver"]["status"]):
-                return
-
-    return run
+    env = RoverEnv(**arguments)
+    _begin(env, random, **FAR)
+    play(env, ledger, policy(random, 1), periods)
 
 
 def settings(random: Random, ledger: Ledger) -> None:
@@ -93,17 +111,8 @@ def settings(random: Random, ledger: Ledger) -> None:
     )
     act = [constant, bang_bang, uniform, gauss][random.integers(4)](random, 1)
     for _ in range(3):
-        env.reset(seed=int(random.integers(2**31)))
-        audit = Audit(env.simulation, ledger)
-        for _ in range(100):
-            audit.begin()
-            with ledger.timed():
-                observation, reward, terminated, _, info = env.step(act()[0])
-            ledger.raise_to("reward", abs(reward))
-            if not np.isfinite(observation).all():
-                ledger.find("an observation is not finite")
-            if not audit.end(env.task.substeps, info["solver"]["status"]) or terminated:
-                break
+        _begin(env, random)
+        play(env, ledger, act, 100, goes_on=False)
 
 
 def vector(random: Random, ledger: Ledger) -> None:
@@ -131,16 +140,8 @@ def fine(random: Random, ledger: Ledger) -> None:
         control_frequency=1.0 / (step * random.integers(1, 10)),
         actuator_gain=log_uniform(random, 0.1, 1.0),
     )
-    env.reset(seed=int(random.integers(2**31)), options={"goal": (80.0, 40.0)})
-    audit = Audit(env.simulation, ledger)
-    act = full_throttle(random, 1)
-    while env.simulation.time < 20.0:
-        audit.begin()
-        with ledger.timed():
-            _, reward, _, _, info = env.step(act()[0])
-        ledger.raise_to("reward", abs(reward))
-        if not audit.end(env.task.substeps, info["solver"]["status"]):
-            return
+    _begin(env, random, **FAR)
+    play(env, ledger, full_throttle(random, 1), round(20.0 / (step * env.task.substeps)))
 
 
 # A period of ten steps: the time is theirs together.
@@ -148,14 +149,14 @@ PERIOD = Bounds(slowest=1.0)
 ROCKS = {"terrain": "rocks", "difficulty": (0.0, 2.0)}
 
 REGIMES = [
-    Regime("Rover-v0, full throttle, a minute", episodes(full_throttle, 1200), 8, PERIOD),
-    Regime("Rover-v0, constant actions", episodes(constant, 600), 12, PERIOD),
-    Regime("Rover-v0, bang-bang", episodes(bang_bang, 400), 8, PERIOD),
-    Regime("Rover-v0, random actions", episodes(uniform, 400), 8, PERIOD),
+    Regime("Rover-v0, full throttle, a minute", partial(episodes, policy=full_throttle, periods=1200), 8, PERIOD),
+    Regime("Rover-v0, constant actions", partial(episodes, policy=constant, periods=600), 12, PERIOD),
+    Regime("Rover-v0, bang-bang", partial(episodes, policy=bang_bang, periods=400), 8, PERIOD),
+    Regime("Rover-v0, random actions", partial(episodes, policy=uniform, periods=400), 8, PERIOD),
     Regime("Rover-v0, other steps and rates", fine, 8, PERIOD),
-    Regime("RoverRocks-v0, full throttle", episodes(full_throttle, 400, **ROCKS), 6, PERIOD),
-    Regime("RoverRocks-v0, bang-bang", episodes(bang_bang, 400, **ROCKS), 6, PERIOD),
-    Regime("RoverRocks-v0, random actions", episodes(gauss, 400, **ROCKS), 6, PERIOD),
+    Regime("RoverRocks-v0, full throttle", partial(episodes, policy=full_throttle, periods=400, **ROCKS), 6, PERIOD),
+    Regime("RoverRocks-v0, bang-bang", partial(episodes, policy=bang_bang, periods=400, **ROCKS), 6, PERIOD),
+    Regime("RoverRocks-v0, random actions", partial(episodes, policy=gauss, periods=400, **ROCKS), 6, PERIOD),
     Regime("environments with random arguments", settings, 20, PERIOD),
     Regime("sixteen at once", vector, 4, Bounds(slowest=8.0)),
 ]

@@ -7,8 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import thread_time
+from typing import Any
 
 import numpy as np
+
+from rover_gym import StepError
 
 #: Columns whose largest value counts, and with it the case that reached it.
 EXTREMES = ("gained", "lifted", "deepest", "slowest", "reward")
@@ -73,6 +76,29 @@ class Ledger:
         start = thread_time()
         yield
         self.raise_to("slowest", thread_time() - start)
+
+    def take(self, step: Callable[[], Any]) -> Any:
+        """Takes one step, enters what its report says and returns that; None where the step was refused."""
+        self.steps += 1
+        try:
+            with self.timed():
+                report = step()
+        except StepError as error:
+            self.refused += 1
+            self.note("refused", f"step {self.steps}: {error}")
+            return None
+        if not report.is_converged:
+            self.not_converged += 1
+            what = f"residual {report.residual:.1e}, {report.n_contacts} contacts"
+            self.note("not converged", f"step {self.steps}: {what}")
+        return report
+
+    def is_finite(self, *arrays: np.ndarray) -> bool:
+        """Whether a state has finite numbers only; if not, that is a finding."""
+        if all(np.isfinite(array).all() for array in arrays):
+            return True
+        self.find("not finite")
+        return False
 
     def merge(self, other: Ledger, case: int) -> None:
         """Adds what another case came to."""
@@ -150,7 +176,7 @@ class Regime:
             share, count = getattr(bounds, column), getattr(ledger, column)
             if share == 0.0 < count or count > share * ledger.steps + 1.0:
                 yield f"{column} {count} of {ledger.steps}"
-        for column in ("gained", "lifted", "deepest", "slowest", "reward"):
+        for column in EXTREMES:
             most, value = getattr(bounds, column), getattr(ledger, column)
             if most is not None and value > most:
                 yield f"{column} {value:.2g} > {most:g}"

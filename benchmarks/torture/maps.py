@@ -12,6 +12,7 @@ from rover_gym import HeightField, RoverEnv, RoverModel, Simulation, SphereField
 from torture.audit import Audit
 from torture.damage import INPUTS, _folder, attempt, use
 from torture.drives import log_uniform, variant
+from torture.learning import play, uniform
 from torture.ledger import Bounds, Ledger, Regime
 from torture.mutate import mutate_array, mutate_bytes, mutate_value
 
@@ -63,10 +64,10 @@ def _sound(ending: str) -> bytes:
 def _drive(ledger: Ledger, what: str, ground: Any) -> None:
     """Puts the rover on a ground that was accepted, if it can stand there."""
     model = RoverModel()
-    q = attempt(ledger, f"{what}: resting_pose", lambda: model.resting_pose(ground, (0.0, 0.0), 0.3))
+    q = attempt(ledger, f"{what}: resting_pose", model.resting_pose, ground, (0.0, 0.0), 0.3)
     if q is not None:
         sim = Simulation(model, ground)
-        attempt(ledger, f"{what}: set_state", lambda: sim.set_state(q))
+        attempt(ledger, f"{what}: set_state", sim.set_state, q)
         use(ledger, what, sim)
 
 
@@ -85,7 +86,7 @@ def files(random: Random, ledger: Ledger) -> None:
         path, sound = _folder() / f"ground.{ending}", _sound(ending)
         kept = 0 if turn < len(endings) else HEAD
         path.write_bytes(mutate_bytes(random, sound[: kept or None]) + sound[kept or len(sound) :])
-        found = attempt(ledger, f"a damaged .{ending}", lambda path=path: _read(path))
+        found = attempt(ledger, f"a damaged .{ending}", _read, path)
         if isinstance(found, HeightField):
             _drive(ledger, f"a damaged .{ending}", found)
         elif found is not None:
@@ -100,13 +101,13 @@ def arrays(random: Random, ledger: Ledger) -> None:
     for _ in range(8):
         heights = mutate_array(random, field.grid.astype(float))
         spacing = mutate_value(random, 0.25) if random.uniform() < 0.3 else 0.25
-        found = attempt(ledger, "HeightField", lambda heights=heights, spacing=spacing: HeightField(heights, spacing))
+        found = attempt(ledger, "HeightField", HeightField, heights, spacing)
         if found is not None:
             _drive(ledger, "a changed map", found)
         given = [corners, triangles]
         k = int(random.integers(2))
         given[k] = mutate_array(random, given[k].astype(float))
-        mesh = attempt(ledger, "TriangleMesh", lambda given=given: TriangleMesh(*given))
+        mesh = attempt(ledger, "TriangleMesh", TriangleMesh, *given)
         if mesh is not None:
             _drive(ledger, "a changed mesh", [field, mesh])
 
@@ -217,19 +218,10 @@ def episodes(random: Random, ledger: Ledger) -> None:
         height_scan=bool(random.uniform() < 0.5),
         steered=bool(random.uniform() < 0.8),
     )
-    n = env.action_space.shape[0]
+    act = uniform(random, 1, env.action_space.shape[0])
     for _ in range(2):
         env.reset(seed=int(random.integers(2**31)))
-        audit = Audit(env.simulation, ledger)
-        for _ in range(100):
-            audit.begin()
-            with ledger.timed():
-                observation, reward, terminated, _, info = env.step(random.uniform(-1.0, 1.0, n).astype(np.float32))
-            ledger.raise_to("reward", abs(reward))
-            if not np.isfinite(observation).all():
-                ledger.find("an observation is not finite")
-            if not audit.end(env.task.substeps, info["solver"]["status"]) or terminated:
-                break
+        play(env, ledger, act, 100, goes_on=False)
 
 
 REGIMES = [

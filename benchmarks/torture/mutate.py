@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 #: Deeper than Python's recursion limit, and than a parser's that calls itself.
 DEEP = 100_000
 
+METRES = np.bytes_(b"m")
+
 UNKIND_BYTES = (b"\x00", b"\xff", b"\x7f", b"\x80", b"\xff\xff\xff\xff", b"\xff" * 8, b"\x00" * 8, b"{", b'"', b"\n")
 
 
@@ -56,7 +58,8 @@ def mutate_json(rng: np.random.Generator, text: str) -> str:
     value = mutate_value(rng, json.loads(text))
     for _ in range(rng.integers(0, 3)):
         value = mutate_value(rng, value)
-    return _dump(value)
+    # A lone surrogate stays an escape, as JSON allows; Python writes NaN and Infinity, which its reader takes.
+    return json.dumps(value)
 
 
 def mutate_value(rng: np.random.Generator, value: Any) -> Any:
@@ -217,15 +220,8 @@ def _move(rng: np.random.Generator, data: bytearray) -> None:
     data[target : target + length] = data[start : start + length]
 
 
-_BYTE_CHANGES: tuple[Callable[[np.random.Generator, bytearray], None], ...] = (
-    _flip,
-    _cut,
-    _remove,
-    _overwrite,
-    _overwrite_head,
-    _double,
-    _move,
-)
+_BYTE_CHANGES: tuple[Callable[[np.random.Generator, bytearray], None], ...]
+_BYTE_CHANGES = (_flip, _cut, _remove, _overwrite, _overwrite_head, _double, _move)
 
 
 def _places(value: Any) -> Any:
@@ -249,11 +245,6 @@ def _unkind(rng: np.random.Generator) -> Any:
     if kind == 2:
         return [NUMBERS[rng.integers(len(NUMBERS))]] * int(rng.choice([0, 1, 3, 1000]))
     return NUMBERS[rng.integers(len(NUMBERS))]
-
-
-def _dump(value: Any) -> str:
-    # A lone surrogate stays an escape, as JSON allows; Python writes NaN and Infinity, which its reader takes.
-    return json.dumps(value)
 
 
 def _npy(array: np.ndarray[Any, Any]) -> bytes:
@@ -305,21 +296,20 @@ def _hdf5_array(rng: np.random.Generator, owner: h5py.Group, name: str, _elsewhe
         changed = changed.astype("S8")
     data = owner.create_dataset(name, data=changed)
     if rng.random() < 0.7:
-        data.attrs["unit"] = np.bytes_(b"m")
+        data.attrs["unit"] = METRES
 
 
 def _hdf5_huge(rng: np.random.Generator, owner: h5py.Group, name: str, _elsewhere: Path) -> None:
     """Two thousand million rows that take no space on the disk."""
     del owner[name]
     shape = (2 * 10**9, *((3,) * int(rng.integers(0, 3))))
-    data = owner.create_dataset(name, shape=shape, chunks=(1000, *shape[1:]), dtype="f8")
-    data.attrs["unit"] = np.bytes_(b"m")
+    owner.create_dataset(name, shape=shape, chunks=(1000, *shape[1:]), dtype="f8").attrs["unit"] = METRES
 
 
 def _hdf5_bomb(_rng: np.random.Generator, owner: h5py.Group, name: str, _elsewhere: Path) -> None:
     del owner[name]
-    data = owner.create_dataset(name, data=np.zeros(2_000_000), compression="gzip", chunks=(1_000_000,))
-    data.attrs["unit"] = np.bytes_(b"m")
+    zeros = np.zeros(2_000_000)
+    owner.create_dataset(name, data=zeros, compression="gzip", chunks=(1_000_000,)).attrs["unit"] = METRES
 
 
 def _hdf5_outside(rng: np.random.Generator, owner: h5py.Group, name: str, elsewhere: Path) -> None:
@@ -363,11 +353,5 @@ def _hdf5_kind(rng: np.random.Generator, owner: h5py.Group, name: str, _elsewher
         owner.create_dataset(name, shape=(3,), dtype=h5py.vlen_dtype(np.float64))
 
 
-_HDF5_CHANGES: tuple[Callable[[np.random.Generator, h5py.Group, str, Path], None], ...] = (
-    _hdf5_drop,
-    _hdf5_array,
-    _hdf5_huge,
-    _hdf5_bomb,
-    _hdf5_outside,
-    _hdf5_kind,
-)
+_HDF5_CHANGES: tuple[Callable[[np.random.Generator, h5py.Group, str, Path], None], ...]
+_HDF5_CHANGES = (_hdf5_drop, _hdf5_array, _hdf5_huge, _hdf5_bomb, _hdf5_outside, _hdf5_kind)

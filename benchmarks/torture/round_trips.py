@@ -26,6 +26,13 @@ def _again(random: Random, thing: Any) -> Any:
     return thing
 
 
+def restored(sim: Simulation, snapshot: Snapshot) -> Simulation:
+    """Another simulation of the same scene in the state of a snapshot."""
+    other = Simulation(sim.model, sim.terrain, **sim.settings)
+    other.restore(snapshot)
+    return other
+
+
 def _same(ledger: Ledger, what: str, first: Array, second: Array) -> None:
     ledger.steps += 1
     if first.tobytes() != second.tobytes():
@@ -81,11 +88,9 @@ def simulations(random: Random, ledger: Ledger) -> None:
     steer(random, sim)
     sim.step(int(random.integers(0, 100)))
     snapshot = sim.snapshot()
-    other = Simulation(sim.model, sim.terrain, **sim.settings)
-    other.restore(snapshot)
-    through = Simulation(sim.model, sim.terrain, **sim.settings)
-    through.restore(Snapshot.from_bytes(snapshot.to_bytes()))
-    copies = {"a pickle": _again(random, sim), "a snapshot": other, "a snapshot's bytes": through}
+    through = Snapshot.from_bytes(snapshot.to_bytes())
+    copies = {"a pickle": _again(random, sim), "a snapshot": restored(sim, snapshot)}
+    copies["a snapshot's bytes"] = restored(sim, through)
     for each in (sim, *copies.values()):
         each.step(50)
     for way, each in copies.items():

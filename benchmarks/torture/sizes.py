@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from reports import TABLES, fill, table
 from rich.table import Table
 
 from rover_gym import Plane, RoverEnv, RoverModel, Simulation, SphereField, solve_friction_contact
@@ -104,11 +105,7 @@ PATIENT = Bounds(not_converged=1.0, refused=1.0, slowest=5.0)
 
 REGIMES = [Regime("sizes and places", finds, len(FINDS), PATIENT, limit=60.0)]
 
-PAGE = Path(__file__).parents[2] / "docs" / "tables" / "torture.md"
-
-BEGIN = "<!-- campaign: made by `make torture`, not by hand -->"
-
-END = "<!-- end of the campaign's table -->"
+PAGE = TABLES / "torture.md"
 
 COLUMNS = {
     "steps": "steps",
@@ -154,27 +151,23 @@ class Row:
 
 def console_table(rows: Iterable[Row]) -> Table:
     """For people at a terminal."""
-    table = Table("regime", *COLUMNS.values())
+    found = Table("regime", *COLUMNS.values())
     for row in rows:
         broken = any(True for _ in row.regime.broken(row.ledger))
-        table.add_row(row.regime.name, *row.cells(), style="red" if broken else None)
-    return table
+        found.add_row(row.regime.name, *row.cells(), style="red" if broken else None)
+    return found
 
 
 def markdown(rows: Iterable[Row]) -> str:
     """For the page; what is beyond its bound is bold, and so is a regime with findings."""
-    lines = ["| regime | " + " | ".join(COLUMNS.values()) + " |", "|---" * (1 + len(COLUMNS)) + "|"]
+    lines = []
     for row in rows:
-        complaints = [what.split()[0] for what in row.regime.broken(row.ledger)]
-        cells = [f"**{cell}**" if name in complaints else cell for name, cell in zip(COLUMNS, row.cells(), strict=True)]
-        name = f"**{row.regime.name}**" if row.ledger.findings else row.regime.name
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        broken = [what.split()[0] for what in row.regime.broken(row.ledger)]
+        cells = [f"**{cell}**" if name in broken else cell for name, cell in zip(COLUMNS, row.cells(), strict=True)]
+        lines.append([f"**{row.regime.name}**" if row.ledger.findings else row.regime.name, *cells])
+    return table(["regime", *COLUMNS.values()], lines)
 
 
 def write(rows: Iterable[Row], page: Path = PAGE) -> None:
     """Replaces the table of the page."""
-    text = page.read_text(encoding="utf-8")
-    head, rest = text.split(BEGIN)
-    _, tail = rest.split(END)
-    page.write_text(f"{head}{BEGIN}\n\n{markdown(rows)}\n\n{END}{tail}", encoding="utf-8")
+    fill(page, "campaign", markdown(rows))

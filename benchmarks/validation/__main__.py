@@ -4,22 +4,18 @@ Writes `docs/validation/*.json` and pictures, and the tables of `docs/tables/val
 """
 
 import argparse
-import json
 import os
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
+from reports import DOCS, TABLES, fill, read_json, table, write_json
 from rich.console import Console
 
 from validation import drawing, findings
 from validation.watch import Ledger
 
-DOCS = Path(__file__).parents[2] / "docs"
 FOLDER = DOCS / "validation"
-MARK = "<!-- tables: made by `make validate`, not by hand -->"
 PARTS = {name: import_module(f"validation.{name}") for name in findings.PARTS}
-PICTURES = drawing.PICTURES
 
 
 def _cpu_seconds() -> float:
@@ -39,28 +35,26 @@ def _rounded(value: Any) -> Any:
 def page(parts: dict[str, dict[str, Any]]) -> tuple[str, list[findings.Finding]]:
     """The generated half of the page, and all findings."""
     found = [f for name, data in parts.items() for f in findings.PARTS[name](data)]
-    ledgers = {name: data["ledger"] for name, data in parts.items() if data["ledger"]["steps"]}
-    held = list(findings.everywhere(ledgers))
-    steps = "\n".join(
-        f"| {name} | {data['ledger']['steps']:.0f} | {data['ledger']['disk_steps']:.2e} "
-        f"| {100.0 * data['ledger']['unconverged'] / data['ledger']['steps']:.1f}% | {data['ledger']['residual']:.0e} "
-        f"| {data['ledger']['gain']:.1e} | {data['cpu_seconds']:.0f} s |"
-        for name, data in parts.items()
-        if data["ledger"]["steps"]
-    )
+    stepped = {name: data for name, data in parts.items() if data["ledger"]["steps"]}
+    held = list(findings.everywhere({name: data["ledger"] for name, data in stepped.items()}))
+    rows = []
+    for name, data in stepped.items():
+        own = data["ledger"]
+        unsolved, work = f"{100.0 * own['unconverged'] / own['steps']:.1f}%", f"{own['disk_steps']:.2e}"
+        worst = [f"{own['residual']:.0e}", f"{own['gain']:.1e}"]
+        rows.append([name, f"{own['steps']:.0f}", work, unsolved, *worst, f"{data['cpu_seconds']:.0f} s"])
+    heads = ["part", "steps", "disk-steps", "not solved to the tolerance", "worst residual", "gain", "CPU time"]
     text = "\n".join(
         [
             "## What was found\n",
-            findings.table(found),
+            findings.table_of(found),
             "\n## In every step of every run\n",
-            findings.table(held),
+            findings.table_of(held),
             "\n`gain` is the largest growth of the energy in one step, in weights of a disk times its diameter.\n",
-            "| part | steps | disk-steps | not solved to the tolerance | worst residual | gain | CPU time |",
-            "|---|---|---|---|---|---|---|",
-            steps,
+            table(heads, rows),
         ]
     )
-    return text + "\n", found + held
+    return text, found + held
 
 
 def main() -> None:
@@ -70,32 +64,21 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="only draw and write the page from the JSON files")
     arguments = parser.parse_args()
     console = Console(width=160)
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    for name in arguments.parts or PARTS:
-        if arguments.write:
-            break
+    for name in () if arguments.write else arguments.parts or PARTS:
         ledger, start = Ledger(), _cpu_seconds()
         data = PARTS[name].measure(ledger)
         data |= {"command": "make validate", "cpu_seconds": _cpu_seconds() - start, "ledger": ledger.as_dict()}
-        (FOLDER / f"{name}.json").write_text(json.dumps(_rounded(data), indent=1) + "\n", encoding="utf-8")
+        write_json(FOLDER / f"{name}.json", _rounded(data))
         console.print(f"{name}: {data['cpu_seconds']:.0f} s")
-    parts = {
-        name: json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-        for name in PARTS
-        if (FOLDER / f"{name}.json").exists()
-    }
-    for name in parts.keys() & PICTURES.keys():
-        PICTURES[name](parts[name], FOLDER / f"{name}.png")
+    files = {name: FOLDER / f"{name}.json" for name in PARTS}
+    parts = {name: read_json(file) for name, file in files.items() if file.exists()}
+    for name in parts.keys() & drawing.PICTURES.keys():
+        drawing.PICTURES[name](parts[name], FOLDER / f"{name}.png")
     text, found = page(parts)
-    target = DOCS / "tables" / "validation.md"
-    head = target.read_text(encoding="utf-8").split(MARK)[0]
-    target.write_text(head + MARK + "\n\n" + text, encoding="utf-8")
+    fill(TABLES / "validation.md", "tables", text)
     for f in found:
-        console.print(
-            f"{'holds  ' if f.holds else 'OUTSIDE'} {f.what}: {f.number:{f.digits}} {f.unit} ({f.expected})",
-            markup=False,
-            highlight=False,
-        )
+        line = f"{'holds  ' if f.holds else 'OUTSIDE'} {f.what}: {f.number:{f.digits}} {f.unit} ({f.expected})"
+        console.print(line, markup=False, highlight=False)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from validation.balls import DIAMETER, RADIUS, Balls, box, loose
-from validation.watch import GRAVITY, Ledger
+from validation.watch import GRAVITY, Ledger, fly, meet
 
 
 def cloud(count: int, friction: float, seed: int, ledger: Ledger, *, steps: int = 200) -> dict[str, float]:
@@ -17,15 +17,9 @@ def cloud(count: int, friction: float, seed: int, ledger: Ledger, *, steps: int 
     speeds = random.standard_normal((2, count, 3)) * 0.5
     sim.set_state(sim.position, speeds[0], speeds[1] / RADIUS)
     watched.restart()
-    start = sim.energy().kinetic
-    watched.step(steps)
+    found = fly(watched, steps)
     ledger.merge(watched.ledger)
-    return {
-        "friction": friction,
-        "seed": seed,
-        "lost": 1.0 - sim.energy().kinetic / start,
-        "grown": watched.ledger.growth / start,
-    }
+    return {"friction": friction, "seed": seed} | found
 
 
 def meeting(count: int, friction: float, seed: int, ledger: Ledger) -> dict[str, float]:
@@ -39,18 +33,9 @@ def meeting(count: int, friction: float, seed: int, ledger: Ledger) -> dict[str,
     velocity[:, 0] = np.where(np.arange(len(velocity)) < len(left.radius), 1.0, -1.0)
     sim.set_state(sim.position, velocity)
     watched.restart()
-    before = sim.momentum()
-    moved = float((sim.mass * np.linalg.norm(velocity, axis=1)).sum())
-    turned = float((sim.mass * np.linalg.norm(np.cross(sim.position, velocity), axis=1)).sum())
-    watched.step(round(width / sim.time_step))
+    found = meet(watched, width)
     ledger.merge(watched.ledger)
-    change = np.abs(sim.momentum() - before)
-    return {
-        "friction": friction,
-        "momentum_error": float(change[:3].max()) / moved,
-        "moment_error": float(change[3:].max()) / turned,
-        "energy_left": float(sim.energy().kinetic / (0.5 * sim.mass.sum())),
-    }
+    return {"friction": friction} | found
 
 
 def similar(count: int, slow: float, seed: int, *, steps: int = 150) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rover_gym.core import Silo
 from validation.balls import DIAMETER, Balls, free, glued_disc, loose, settle
-from validation.watch import GRAVITY, Ledger
+from validation.watch import GRAVITY, Ledger, line
 
 FRICTION = 0.5
 #: Packing fraction that turns a number of balls into a radius of the column.
@@ -85,5 +85,4 @@ def limit(runs: list[dict[str, Any]]) -> dict[str, float]:
     """Run-out over the paper's law where balls are ever smaller: a straight line in d/R0."""
     inverse = np.array([1.0 / run["grains"] for run in runs])
     ratio = np.array([run["run_out"] / lube(run["aspect"]) for run in runs])
-    (slope, value), covariance = np.polyfit(inverse, ratio, 1, cov=True)
-    return {"value": float(value), "error": float(np.sqrt(covariance[1, 1])), "slope": float(slope)}
+    return line(inverse, ratio)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from validation.balls import DENSITY, DIAMETER, Balls, box, free, loose, settle
-from validation.watch import GRAVITY, Ledger
+from validation.watch import GRAVITY, Ledger, line
 
 FRICTION = 0.5
 #: Tangent of the angle of repose, taken; beds of as many balls gave 24.1 degrees (`larger` of ball_repose.json).
@@ -81,5 +81,5 @@ def exponent(runs: list[dict[str, Any]]) -> dict[str, float]:
     """Exponent of the whole drop, at the density of the grains, and its standard error."""
     chosen = [run for run in runs if run["density"] == DENSITY]
     x, y = (np.log([run[name] for run in chosen]) for name in ("fall", "depth"))
-    (slope, _), covariance = np.polyfit(x, y, 1, cov=True)
-    return {"value": float(slope), "error": float(np.sqrt(covariance[0, 0]))}
+    found = line(x, y)
+    return {"value": found["slope"], "error": found["slope_error"]}

@@ -9,7 +9,7 @@ import numpy as np
 from rover_gym.core import Silo
 from validation.ball_silo import filled
 from validation.balls import DENSITY, DIAMETER, Array
-from validation.janssen import determination, law, saturation
+from validation.janssen import columns, determination, jackknife, law, saturation, without_each
 from validation.watch import GRAVITY, Ledger, Watched, means_by
 
 FRICTION = 0.5
@@ -85,28 +85,21 @@ def measure(ledger: Ledger) -> dict[str, object]:
     smooth = weigh(500, 0, ledger, wall_friction=0.0)
     slower = weigh(800, 0, ledger, speed=0.5 * SPEED)
     rows = means(runs)
-    mass = fitted(runs)
-    without = [fitted([run for run in runs if run["seed"] != seed]) for seed in SEEDS]
+    mass, without = saturation(*columns(runs)), without_each(runs, SEEDS)
     tall = float(np.mean([row["wall_friction"] for row in rows if row["filling"] > 1.0]))
-    columns = (np.array([row[name] for row in rows]) for name in ("filling", "borne"))
     return {
         "runs": runs,
         "means": rows,
         "smooth": smooth,
         "slower": slower,
         "saturation": mass,
-        "saturation_error": float(np.sqrt((len(SEEDS) - 1) * np.var(without))),  # jackknife
-        "determination": determination(*columns, mass),
+        "saturation_error": jackknife(without),
+        "determination": determination(*columns(rows), mass),
         "wall_friction": tall,
-        "K_error": float(np.sqrt((len(SEEDS) - 1) * np.var([1.0 / (4.0 * FRICTION * m) for m in without]))),
+        "K_error": jackknife([1.0 / (4.0 * FRICTION * m) for m in without]),
         "K": 1.0 / (4.0 * tall * mass),
         "K_of_coulomb": 1.0 / (4.0 * FRICTION * mass),
     }
-
-
-def fitted(runs: list[dict[str, float]]) -> float:
-    """Janssen's m of runs."""
-    return saturation(*(np.array([run[name] for run in runs]) for name in ("filling", "borne")))
 
 
 def means(runs: list[dict[str, float]]) -> list[dict[str, float]]:

@@ -7,9 +7,9 @@ import numpy as np
 from rich.console import Console
 
 from rover_gym.ground.grains import surface_map
-from validation.balls import DIAMETER, RADIUS, Array, Balls, free, loose, settle, slow
-from validation.repose import angle
-from validation.watch import Ledger, means_by
+from validation.balls import DIAMETER, Array, Balls, free, glued, loose, settle
+from validation.repose import row_of
+from validation.watch import Ledger, means_by, run_off
 
 FRICTIONS = (0.1, 0.2, 0.3, 0.5, 0.8)
 SEEDS = range(4)
@@ -20,11 +20,10 @@ TIME_STEP = 2e-3  # s
 
 
 def floor(length: float, width: float, seed: int) -> Balls:
-    """Kinematic balls at random heights in a square array, their tops at height 0 or less."""
+    """A rectangular rough floor."""
     pitch = 1.05 * DIAMETER
     x, z = np.meshgrid(np.arange(0.0, length, pitch), np.arange(0.0, width + 0.5 * pitch, pitch))
-    y = -RADIUS * np.random.default_rng(seed).uniform(1.0, 1.3, x.size)
-    return Balls(np.full(x.size, RADIUS), np.stack((x.ravel(), y, z.ravel()), axis=1), np.ones(x.size, dtype=bool))
+    return glued(x.ravel(), z.ravel(), seed)
 
 
 def profile(position: Array, radius: Array, length: float) -> tuple[Array, Array]:
@@ -72,24 +71,12 @@ def slope(
     watched = (free(sim.radius[kept], sim.position[kept]) + floor(long, wide, 200 + seed)).watched(
         walls=sides, **options
     )
-    sim = watched.sim
-    quiet = 0
-    while sim.time < 6.0 and quiet < 4:
-        watched.step(round(0.05 / TIME_STEP))
-        fallen = sim.position[:, 1] < -2.0 * DIAMETER
-        watched.remove(fallen)
-        quiet = quiet + 1 if slow(watched) and not fallen.any() else 0
+    run_off(watched, looks=4, most=6.0)
     ledger.merge(watched.ledger)
+    sim = watched.sim
     kept = ~sim.kinematic
-    x, y = profile(sim.position[kept], sim.radius[kept], long)
-    return {
-        "friction": friction,
-        "seed": seed,
-        "angle": angle(x, y),
-        "stays": float(kept.sum() / count),
-        "seconds": float(sim.time),
-        "surface": [(x / DIAMETER).round(3).tolist(), (y / DIAMETER).round(3).tolist()],
-    }
+    row = row_of(watched, count, *profile(sim.position[kept], sim.radius[kept], long))
+    return {"friction": friction, "seed": seed, **row}
 
 
 def measure(ledger: Ledger) -> dict[str, object]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rover_gym.core import Silo
 from validation.balls import DENSITY, DIAMETER, free, loose, settle
-from validation.watch import GRAVITY, Ledger
+from validation.watch import GRAVITY, Ledger, line
 
 FRICTION = 0.5
 TUBE = 6.0 * DIAMETER  # radius of the silo
@@ -72,13 +72,12 @@ def beverloo(runs: list[dict[str, Any]]) -> dict[str, float]:
     """C and k of a straight line through scaled^(2/5), and the exponent that k = 1.4 gives."""
     hole = np.array([run["hole"] for run in runs])
     scaled = np.array([run["scaled"] for run in runs])
-    slope, intercept = np.polyfit(hole, scaled**0.4, 1)
-    (exponent, _), covariance = np.polyfit(np.log(hole - 1.4), np.log(scaled), 1, cov=True)
+    straight, power = line(hole, scaled**0.4), line(np.log(hole - 1.4), np.log(scaled))
     return {
-        "C": float(slope**2.5),
-        "k": float(-intercept / slope),
-        "exponent": float(exponent),
-        "error": float(np.sqrt(covariance[0, 0])),
+        "C": straight["slope"] ** 2.5,
+        "k": -straight["value"] / straight["slope"],
+        "exponent": power["slope"],
+        "error": power["slope_error"],
     }
 
 

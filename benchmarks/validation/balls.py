@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy.typing as npt
 from rover_gym.core import GrainSimulation, arrange_balls
 from rover_gym.ground.grains import even_radii
 from rover_gym.ground.grains.ball_bed import box_walls
-from validation.watch import GRAVITY, Watched
+from validation import watch
+from validation.watch import Watched
 
 Array = npt.NDArray[np.float64]
 
@@ -25,6 +27,8 @@ TIME_STEP = 1e-3
 #: Of the contact solver: at the default, 1e-3, overlaps reach 1% of a radius where a column falls.
 TOLERANCE = 3e-4
 
+settle = partial(watch.settle, least=0.15, most=2.0)
+
 
 @dataclass(frozen=True)
 class Balls:
@@ -35,8 +39,7 @@ class Balls:
     kinematic: npt.NDArray[np.bool_]
 
     def __add__(self, other: Balls) -> Balls:
-        names = ("radius", "position", "kinematic")
-        return Balls(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in names))
+        return Balls(*map(np.concatenate, zip(astuple(self), astuple(other), strict=True)))
 
     def watched(
         self, *, friction: float = 0.5, has_energy: bool = True, density: object = DENSITY, **o: Any
@@ -45,7 +48,7 @@ class Balls:
         mass = 4.0 / 3.0 * np.pi * np.asarray(density) * self.radius**3
         options = {"wall_friction": friction, "time_step": TIME_STEP, "tolerance": TOLERANCE} | o
         sim = GrainSimulation(self.radius, mass, self.position, kinematic=self.kinematic, friction=friction, **options)
-        return Watched(sim, has_energy=has_energy)
+        return Watched(sim, DIAMETER, has_energy=has_energy)
 
 
 def free(radius: Array, position: Array) -> Balls:
@@ -60,32 +63,18 @@ def loose(count: int, width: float, seed: int, *, left: float = 0.0, depth: floa
     return free(radius, position)
 
 
-def glued_disc(reach: float, seed: int) -> Balls:
-    """A rough floor: kinematic balls at random heights in a square array, their tops at height 0 or less."""
-    random = np.random.default_rng(seed)
-    place = np.arange(-reach, reach, 1.05 * DIAMETER)
-    x, z = (a.ravel() for a in np.meshgrid(place, place))
-    within = np.hypot(x, z) < reach
-    x, z = x[within], z[within]
-    y = -RADIUS * (1.0 + random.uniform(0.0, 0.3, len(x)))
+def glued(x: Array, z: Array, seed: int) -> Balls:
+    """A rough floor: kinematic balls at random heights at places (n,), their tops at height 0 or less."""
+    y = -RADIUS * np.random.default_rng(seed).uniform(1.0, 1.3, len(x))
     return Balls(np.full(len(x), RADIUS), np.stack([x, y, z], axis=1), np.ones(len(x), dtype=bool))
 
 
-def slow(watched: Watched, speed: float = 0.01) -> bool:
-    """Whether the free balls' root mean square speed is below `speed` times sqrt(9.81 DIAMETER)."""
-    sim = watched.sim
-    mass = float(sim.mass[~sim.kinematic].sum())
-    return bool(np.sqrt(2.0 * sim.energy().kinetic / mass) < speed * np.sqrt(GRAVITY * DIAMETER))
-
-
-def settle(watched: Watched, *, speed: float = 0.01, most: float = 2.0) -> None:
-    """Steps until the balls are `slow`, or `most` seconds."""
-    elapsed = 0.0
-    while elapsed < most:
-        watched.step(round(0.05 / watched.sim.time_step))
-        elapsed += 0.05
-        if elapsed > 0.15 and slow(watched, speed):
-            break
+def glued_disc(reach: float, seed: int) -> Balls:
+    """A round rough floor."""
+    place = np.arange(-reach, reach, 1.05 * DIAMETER)
+    x, z = (a.ravel() for a in np.meshgrid(place, place))
+    within = np.hypot(x, z) < reach
+    return glued(x[within], z[within], seed)
 
 
 def box(width: float) -> Array:

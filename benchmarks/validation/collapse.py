@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from validation.pool import side_by_side
 from validation.samples import DIAMETER, RADIUS, Array, Sample, box, glued_row, loose, settle
-from validation.watch import GRAVITY, Ledger
+from validation.watch import GRAVITY, Ledger, line
 
 FRICTION = 1.0
 #: Paper's power laws of (R - R0)/R0 in the aspect ratio: prefactor, exponent; the first below ASPECT, the second above.
@@ -172,8 +172,7 @@ def limit(found: dict[str, Any]) -> dict[str, Any]:
     runs = found["sizes"] + [run for run in found["flat"] if abs(run["aspect"] - ASPECT) < 0.1 * ASPECT]
     inverse = np.array([1.0 / run["half_width"] for run in runs])
     ratio = np.array([run["run_out"] / run["aspect"] for run in runs])
-    (slope, value), covariance = np.polyfit(inverse, ratio, 1, cov=True)
-    return {"value": float(value), "error": float(np.sqrt(covariance[1, 1])), "slope": float(slope), "runs": runs}
+    return {**line(inverse, ratio), "runs": runs}
 
 
 def fits(runs: list[dict[str, Any]], name: str = "run_out") -> list[dict[str, float]]:

@@ -50,6 +50,21 @@ def picture(name: str, size: tuple[float, float], *shape: int, layout: str | Non
     return decorate
 
 
+def columns(rows: list[dict[str, Any]], *names: str) -> list[list[float]]:
+    """Values of quantities, one list each."""
+    return [[row[name] for row in rows] for name in names]
+
+
+def dots(axes: Axes, rows: list[dict[str, Any]], x: str, y: str, marker: str, color: str = OURS, **style: Any) -> None:
+    """One mark a row."""
+    axes.plot(*columns(rows, x, y), marker, color=color, **style)
+
+
+def legend(axes: Axes) -> None:
+    """Small and without a frame."""
+    axes.legend(frameon=False, fontsize=8.5)
+
+
 @picture("collapse", (10.4, 4.6), 1, 2, width_ratios=(1.5, 1.0))
 def collapse(panels: Any, data: dict[str, Any]) -> None:
     """Run-out against aspect ratio, both logarithmic; and against the size of the disks, at one aspect ratio."""
@@ -67,9 +82,7 @@ def collapse(panels: Any, data: dict[str, Any]) -> None:
     )
     for name, marker, colour, label in series:
         runs = data[name]
-        axes.plot(
-            [r["aspect"] for r in runs], [r["run_out"] for r in runs], marker, color=colour, markersize=5, label=label
-        )
+        dots(axes, runs, "aspect", "run_out", marker, color=colour, markersize=5, label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis in (axes.xaxis, axes.yaxis):
@@ -79,7 +92,7 @@ def collapse(panels: Any, data: dict[str, Any]) -> None:
     axes.set_yticks([1, 2, 5, 10])
     axes.set_xlabel("aspect ratio a = H$_0$/R$_0$")
     axes.set_ylabel("run-out (R - R$_0$)/R$_0$")
-    axes.legend(frameon=False, fontsize=8.5)
+    legend(axes)
     limit = data["limit"]
     inverse = np.array([0.0, 0.1])
     line = f"{limit['value']:.2f} ± {limit['error']:.2f} at 0"
@@ -90,7 +103,7 @@ def collapse(panels: Any, data: dict[str, Any]) -> None:
     sizes.set_xlabel("mean diameter / R$_0$")
     sizes.set_ylabel("run-out / a, at a = 2")
     sizes.set_ylim(bottom=0.0)
-    sizes.legend(frameon=False, fontsize=8.5)
+    legend(sizes)
 
 
 @picture("packing", (8.4, 3.6), 1, 2)
@@ -100,11 +113,11 @@ def packing(panels: Any, data: dict[str, Any]) -> None:
         series = (("poured", 0, "o", OURS), ("20 shakes", 20, "^", OTHER), ("60 shakes", 60, "s", "#3f8f4f"))
         for label, shakes, marker, colour in series:
             runs = [r for r in data["poured"] + data["shaken"] if r["shakes"] == shakes]
-            axes.plot([r["friction"] for r in runs], [r[name] for r in runs], marker, color=colour, label=label)
+            dots(axes, runs, "friction", name, marker, color=colour, label=label)
         axes.set_xlabel("friction µ")
     panels[0].axhspan(0.81, 0.84, color=PAPER, alpha=0.12, label="0.81 to 0.84")
     panels[0].set_ylabel("packing fraction")
-    panels[0].legend(frameon=False, fontsize=8.5)
+    legend(panels[0])
     for level, text in ((4.0, "isostatic, no friction"), (3.0, "isostatic, friction")):
         panels[1].axhline(level, color=PAPER, linewidth=1.0, linestyle=":")
         panels[1].text(1.0, level + 0.02, text, fontsize=8, color=PAPER, ha="right")
@@ -124,27 +137,12 @@ def repose(panels: Any, data: dict[str, Any]) -> None:
 @picture("janssen", (5.8, 4.2))
 def janssen(axes: Any, data: dict[str, Any]) -> None:
     """Borne against filled mass."""
-    runs = data["runs"]
-    filling = np.linspace(0.0, 1.05 * max(r["filling"] for r in runs), 200)
-    mass = data["saturation"]
-    axes.plot(filling, filling, ":", color=OTHER, label="all of it")
-    axes.plot(filling, mass * -np.expm1(-filling / mass), color=PAPER, label=f"Janssen, m = {mass:.2f}")
-    axes.plot([r["filling"] for r in runs], [r["borne"] for r in runs], ".", color=OURS, alpha=0.5)
-    axes.errorbar(
-        [r["filling"] for r in data["means"]],
-        [r["borne"] for r in data["means"]],
-        [2.0 * r["error"] for r in data["means"]],
-        fmt="o",
-        color=OURS,
-        capsize=3.0,
-        label="walls with µ 0.5, means and two standard errors",
-    )
-    smooth = data["smooth"]
-    axes.plot([r["filling"] for r in smooth], [r["borne"] for r in smooth], "s", color=OTHER, label="smooth walls")
-    axes.set_ylim(0.0, 1.2 * max([r["borne"] for r in runs] + [r["borne"] for r in smooth]))
+    _janssen(axes, data, "all of it", f"{data['saturation']:.2f}", "walls with µ 0.5, means and two standard errors")
+    dots(axes, data["smooth"], "filling", "borne", "s", OTHER, label="smooth walls")
+    axes.set_ylim(0.0, 1.2 * max(r["borne"] for r in data["runs"] + data["smooth"]))
     axes.set_xlabel("mass of the filling, in fillings as high as wide")
     axes.set_ylabel("mass that the bottom bears")
-    axes.legend(frameon=False, fontsize=8.5)
+    legend(axes)
 
 
 @picture("hourglass", (8.4, 3.6), 1, 2)
@@ -154,38 +152,26 @@ def hourglass(panels: Any, data: dict[str, Any]) -> None:
     runs, fixed, free = data["runs"], data["fixed"], data["free"]
     opening, rate, error = (np.array([r[name] for r in runs], dtype=float) for name in ("opening", "rate", "error"))
     spans = np.linspace(fixed["k"], 1.05 * opening.max(), 200)
-    left.plot(
-        spans,
-        fixed["C"] ** (2.0 / 3.0) * (spans - fixed["k"]),
-        color=PAPER,
-        label=f"{fixed['C']:.2f} (D/d - {fixed['k']:.2f})$^{{3/2}}$",
-    )
-    left.errorbar(
-        opening, rate ** (2.0 / 3.0), 4.0 / 3.0 * error / rate ** (1.0 / 3.0), fmt="o", color=OURS, capsize=3.0
-    )
+    label = f"{fixed['C']:.2f} (D/d - {fixed['k']:.2f})$^{{3/2}}$"
+    left.plot(spans, fixed["C"] ** (2.0 / 3.0) * (spans - fixed["k"]), color=PAPER, label=label)
+    bars = {"fmt": "o", "color": OURS, "capsize": 3.0}
+    left.errorbar(opening, rate ** (2.0 / 3.0), 4.0 / 3.0 * error / rate ** (1.0 / 3.0), **bars)
     left.set_xlim(left=0.0)
     left.set_ylim(bottom=0.0)
     left.set_ylabel(r"W$^{2/3}$, W in $\rho\sqrt{g}\,$d$^{3/2}$")
-    left.legend(frameon=False, fontsize=8.5)
+    legend(left)
     spans = np.linspace(0.9 * opening.min(), 1.05 * opening.max(), 200)
     over = (opening - fixed["k"]) ** 1.5
     right.axhline(fixed["C"], color=PAPER)
-    right.plot(
-        spans,
-        free["C"] * (spans - free["k"]) ** free["n"] / (spans - fixed["k"]) ** 1.5,
-        "--",
-        color=OURS,
-        linewidth=1.2,
-        label=f"{free['C']:.2f} (D/d - {free['k']:.2f})$^{{{free['n']:.2f}}}$",
-    )
-    right.errorbar(opening, rate / over, 2.0 * error / over, fmt="o", color=OURS, capsize=3.0)
+    label = f"{free['C']:.2f} (D/d - {free['k']:.2f})$^{{{free['n']:.2f}}}$"
+    fit = free["C"] * (spans - free["k"]) ** free["n"] / (spans - fixed["k"]) ** 1.5
+    right.plot(spans, fit, "--", color=OURS, linewidth=1.2, label=label)
+    right.errorbar(opening, rate / over, 2.0 * error / over, **bars)
     for name, marker, label in (("lower", "s", "half the filling"), ("finer", "^", "and half the step")):
-        run = data[name]
-        right.plot(
-            run["opening"] + 0.3, run["rate"] / (run["opening"] - fixed["k"]) ** 1.5, marker, color=OTHER, label=label
-        )
+        place, height = data[name]["opening"] + 0.3, data[name]["rate"] / (data[name]["opening"] - fixed["k"]) ** 1.5
+        right.plot(place, height, marker, color=OTHER, label=label)
     right.set_ylabel(f"W / (D/d - {fixed['k']:.2f})$^{{3/2}}$")
-    right.legend(frameon=False, fontsize=8.5)
+    legend(right)
     for axes in (left, right):
         axes.set_xlabel("opening D, diameters d")
 
@@ -194,18 +180,17 @@ def hourglass(panels: Any, data: dict[str, Any]) -> None:
 def ball_packing(panels: Any, data: dict[str, Any]) -> None:
     """Packing fraction and contacts against friction."""
     left, right = panels
-    friction = [row["friction"] for row in data["means"]]
     for axes, name, lines in (
         (left, "fraction", ((0.64, "random close, 0.64"), (0.55, "random loose, 0.55"))),
         (right, "coordination", ((6.0, "isostatic, 6"), (4.0, "isostatic with friction, 4"))),
     ):
         for (value, label), style in zip(lines, ("-", "--"), strict=True):
             axes.axhline(value, color=PAPER, linestyle=style, linewidth=1.2, label=label)
-        axes.plot([r["friction"] for r in data["poured"]], [r[name] for r in data["poured"]], ".", color=OTHER)
-        values, errors = ([row[key] for row in data["means"]] for key in (name, f"{name}_error"))
-        axes.errorbar(friction, values, errors, fmt="o", color=OURS, capsize=3, label="900 balls, 3 beds")
+        dots(axes, data["poured"], "friction", name, ".", color=OTHER)
+        means = columns(data["means"], "friction", name, f"{name}_error")
+        axes.errorbar(*means, fmt="o", color=OURS, capsize=3, label="900 balls, 3 beds")
         axes.set_xlabel("friction µ")
-        axes.legend(frameon=False, fontsize=8.5)
+        legend(axes)
     left.set_ylabel("packing fraction")
     right.set_ylabel("contacts that bear load")
 
@@ -223,7 +208,7 @@ def ball_impact(axes: Any, data: dict[str, Any]) -> None:
     axes.plot([0.0, top], [0.0, top], color=PAPER, label="equal")
     axes.set_xlabel(r"0.14/µ ($\rho_p/\rho_g$)$^{1/2}$ D$^{2/3}$ H$^{1/3}$, mm (Uehara et al. 2003)")
     axes.set_ylabel("depth of the sphere, mm")
-    axes.legend(frameon=False, fontsize=8.5)
+    legend(axes)
 
 
 @picture("ball_collapse", (9.2, 3.9), 1, 2)
@@ -235,7 +220,7 @@ def ball_collapse(panels: Any, data: dict[str, Any]) -> None:
         label = "Lube et al. 2004: 1.24 a, 1.6 a$^{1/2}$" if span[0] < 1.0 else None
         left.plot(span, [lube(a) for a in span], color=PAPER, label=label)
     runs = data["runs"]
-    left.plot([r["aspect"] for r in runs], [r["run_out"] for r in runs], "o", color=OURS, label="700 balls")
+    dots(left, runs, "aspect", "run_out", "o", color=OURS, label="700 balls")
     left.set_xlabel("aspect ratio a = H$_0$/R$_0$")
     left.set_ylabel("run-out (R - R$_0$)/R$_0$")
     limit = data["limit"]
@@ -249,7 +234,7 @@ def ball_collapse(panels: Any, data: dict[str, Any]) -> None:
     right.set_ylabel("run-out over the law, a = 1")
     for axes in (left, right):
         axes.set_ylim(bottom=0.0)
-        axes.legend(frameon=False, fontsize=8.5)
+        legend(axes)
 
 
 @picture("ball_silo", (5.2, 3.9))
@@ -263,26 +248,19 @@ def ball_silo(axes: Any, data: dict[str, Any]) -> None:
     axes.plot([r["hole"] for r in data["runs"]], [r["scaled"] ** 0.4 for r in data["runs"]], "o", color=OURS)
     axes.set_xlabel("width of the hole, diameters of a ball")
     axes.set_ylabel(r"(W / $\rho_b$ g$^{1/2}$ d$^{5/2}$)$^{2/5}$")
-    axes.legend(frameon=False, fontsize=8.5)
+    legend(axes)
 
 
 @picture("ball_janssen", (5.6, 4.0))
 def ball_janssen(axes: Any, data: dict[str, Any]) -> None:
     """Load against filling."""
-    runs, rows, mass = data["runs"], data["means"], data["saturation"]
-    filling = np.linspace(0.0, 1.05 * max(run["filling"] for run in runs), 100)
-    axes.plot(filling, filling, ":", color=OTHER, label="whole weight")
-    label = f"Janssen, m = {mass:.2f} ± {data['saturation_error']:.2f}"
-    axes.plot(filling, mass * -np.expm1(-filling / mass), color=PAPER, label=label)
-    axes.plot([r["filling"] for r in runs], [r["borne"] for r in runs], ".", color=OURS, alpha=0.5)
-    columns = ([row[name] for row in rows] for name in ("filling", "borne"))
-    errors = [2.0 * row["error"] for row in rows]
-    axes.errorbar(*columns, errors, fmt="o", color=OURS, capsize=3, label="means and two standard errors")
-    axes.plot(data["smooth"]["filling"], data["smooth"]["borne"], "s", color=OTHER, label="smooth tube")
+    mass = f"{data['saturation']:.2f} ± {data['saturation_error']:.2f}"
+    _janssen(axes, data, "whole weight", mass, "means and two standard errors")
+    dots(axes, [data["smooth"]], "filling", "borne", "s", OTHER, label="smooth tube")
     axes.set_ylim(0.0, 1.25 * data["smooth"]["borne"])
     axes.set_xlabel("filling, in fillings as high as wide")
     axes.set_ylabel("load on the bottom")
-    axes.legend(frameon=False, fontsize=8.5)
+    legend(axes)
 
 
 @picture("ball_drum", (9.6, 7.4), 2, 2)
@@ -290,18 +268,13 @@ def ball_drum(panels: Any, data: dict[str, Any]) -> None:
     """Surfaces in a drum, and their slope against friction, against the rate and against the size of the balls."""
     (surfaces, frictions), (rates, sizes) = panels
     _surfaces(surfaces, data)
-    frictions.plot(
-        list(YIELD),
-        list(YIELD.values()),
-        "s",
-        color=PAPER,
-        label="slow shear: Peyneau and Roux 2008, Chialvo et al. 2012",
-    )
+    label = "slow shear: Peyneau and Roux 2008, Chialvo et al. 2012"
+    frictions.plot(list(YIELD), list(YIELD.values()), "s", color=PAPER, label=label)
     frictions.axhspan(*GLASS, color=PAPER, alpha=0.12, label="glass beads: Jop et al. 2006")
     _angles(frictions, data, "drum with a rough wall")
     smooth = data["smooth"]
     label = "drum with a smooth wall"
-    frictions.plot([r["friction"] for r in smooth], [r["angle"] for r in smooth], "D", color=OTHER, label=label)
+    dots(frictions, smooth, "friction", "angle", "D", color=OTHER, label=label)
     for mu, marker in ((0.5, "o"), (0.0, "^")):
         runs = [run for run in data["rates"] + data["runs"] if run["friction"] == mu]
         _runs(rates, "rate", runs, marker, f"µ {mu:g}")
@@ -331,7 +304,7 @@ def ball_repose(panels: Any, data: dict[str, Any]) -> None:
     _angles(right, data, "slope that remains")
     larger = data["larger"]
     label = "a bed half as long and high again"
-    right.plot([r["friction"] for r in larger], [r["angle"] for r in larger], "x", color=OTHER, label=label)
+    dots(right, larger, "friction", "angle", "x", color=OTHER, label=label)
     right.set_ylabel("angle of repose, degrees")
     right.set_ylim(0.0, 40.0)
     right.legend(frameon=False, fontsize=8)
@@ -378,12 +351,21 @@ def plate_on_balls(axes: Any, data: dict[str, Any]) -> None:
     axes.set_ylim(bottom=0.0)
 
 
+def _janssen(axes: Axes, data: dict[str, Any], whole: str, mass: str, means: str) -> None:
+    """The whole weight, Janssen's law, runs, and means with errors, with their labels."""
+    filling, m = np.linspace(0.0, 1.05 * max(run["filling"] for run in data["runs"]), 200), data["saturation"]
+    axes.plot(filling, filling, ":", color=OTHER, label=whole)
+    axes.plot(filling, m * -np.expm1(-filling / m), color=PAPER, label=f"Janssen, m = {mass}")
+    dots(axes, data["runs"], "filling", "borne", ".", alpha=0.5)
+    errors = [2.0 * row["error"] for row in data["means"]]
+    axes.errorbar(*columns(data["means"], "filling", "borne"), errors, fmt="o", color=OURS, capsize=3, label=means)
+
+
 def _runs(axes: Axes, name: str, runs: list[dict[str, Any]], marker: str, label: str) -> None:
     """Slopes of runs, with the standard errors over their quarters."""
     blocks = np.array([run["blocks"] for run in runs])
     errors = blocks.std(axis=1, ddof=1) / np.sqrt(blocks.shape[1])
-    places, values = ([run[key] for run in runs] for key in (name, "angle"))
-    axes.errorbar(places, values, errors, fmt=marker, color=OURS, capsize=3, label=label)
+    axes.errorbar(*columns(runs, name, "angle"), errors, fmt=marker, color=OURS, capsize=3, label=label)
 
 
 def _surfaces(axes: Axes, data: dict[str, Any]) -> None:
@@ -399,7 +381,7 @@ def _surfaces(axes: Axes, data: dict[str, Any]) -> None:
 
 def _angles(axes: Axes, data: dict[str, Any], label: str | None = None) -> None:
     """Angles of all runs, and their means with standard errors."""
-    axes.plot([r["friction"] for r in data["runs"]], [r["angle"] for r in data["runs"]], ".", color=OURS, alpha=0.4)
-    columns = ([row[name] for row in data["means"]] for name in ("friction", "angle", "error"))
-    axes.errorbar(*columns, fmt="o-", color=OURS, markersize=5, capsize=3, linewidth=1.0, label=label)
+    dots(axes, data["runs"], "friction", "angle", ".", color=OURS, alpha=0.4)
+    means = columns(data["means"], "friction", "angle", "error")
+    axes.errorbar(*means, fmt="o-", color=OURS, markersize=5, capsize=3, linewidth=1.0, label=label)
     axes.set_xlabel("friction µ")

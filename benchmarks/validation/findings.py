@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+from reports import table
 
 from validation.ball_drum import GLASS, YIELD
 from validation.ball_janssen import farthest
@@ -42,31 +44,21 @@ class Finding:
         """Whether the number is in its range; one that is not finite is not."""
         return bool(self.low <= self.number <= self.high)
 
-    def row(self) -> str:
-        """A line of a table."""
+    def cells(self) -> list[str]:
+        """Of a line of a table."""
         number = f"{self.number:{self.digits}} {self.unit}".strip()
-        return (
-            f"| {self.what} | {self.expected} | {self.source} | {number if self.holds else f'**outside**: {number}'} |"
-        )
+        return [self.what, self.expected, self.source, number if self.holds else f"**outside**: {number}"]
 
 
 def collapse(data: dict[str, Any]) -> Iterator[Finding]:
     """Power laws of the run-out."""
     for fit, where in zip(data["fits"], ("a ≤ 2", "a ≥ 2"), strict=True):
-        n, c = fit["paper_exponent"], fit["paper_prefactor"]
+        n, c, ratio = fit["paper_exponent"], fit["paper_prefactor"], fit["with_paper_exponent"]
         yield Finding(f"run-out, exponent, {where}", f"{n:g} ± 0.1", STARON, fit["exponent"], n - 0.1, n + 0.1)
-        yield Finding(
-            f"run-out / a^{n:g}, {where}", f"{c:g} ± 20%", STARON, fit["with_paper_exponent"], 0.8 * c, 1.2 * c
-        )
+        yield Finding(f"run-out / a^{n:g}, {where}", f"{c:g} ± 20%", STARON, ratio, 0.8 * c, 1.2 * c)
     small = data["limit"]
-    yield Finding(
-        f"run-out / a at a = 2, disks ever smaller, ± {small['error']:.2f}",
-        "2.5 ± 20%",
-        STARON,
-        small["value"],
-        2.0,
-        3.0,
-    )
+    what = f"run-out / a at a = 2, disks ever smaller, ± {small['error']:.2f}"
+    yield Finding(what, "2.5 ± 20%", STARON, small["value"], 2.0, 3.0)
 
 
 def packing(data: dict[str, Any]) -> Iterator[Finding]:
@@ -77,35 +69,13 @@ def packing(data: dict[str, Any]) -> Iterator[Finding]:
         runs = poured + data["shaken"]
         return float(np.mean([r[name] for r in runs if (r["friction"], r["shakes"]) == (friction, shakes)]))
 
-    yield Finding(
-        "packing fraction, no friction",
-        "0.84 ± 0.01",
-        "random close packing",
-        mean("fraction", 0.0),
-        0.83,
-        0.85,
-        digits=".3f",
-    )
+    dense, what = mean("fraction", 0.0), "packing fraction, no friction"
+    yield Finding(what, "0.84 ± 0.01", "random close packing", dense, 0.83, 0.85, digits=".3f")
     yield Finding("contacts of a disk, no friction", "4 ± 0.1", "isostatic, 2d", mean("coordination", 0.0), 3.9, 4.1)
-    yield Finding(
-        "packing fraction, µ 0.5, poured",
-        "0.81 to 0.84",
-        "random packings of disks",
-        mean("fraction", 0.5),
-        0.81,
-        0.84,
-        digits=".3f",
-    )
-    for shakes in sorted({r["shakes"] for r in data["shaken"] if r["friction"] == 0.5}):
-        yield Finding(
-            f"the same after {shakes} shakes",
-            "0.81 to 0.84",
-            "random packings of disks",
-            mean("fraction", 0.5, shakes),
-            0.81,
-            0.84,
-            digits=".3f",
-        )
+    for shakes in (0, *sorted({r["shakes"] for r in data["shaken"] if r["friction"] == 0.5})):
+        what = f"the same after {shakes} shakes" if shakes else "packing fraction, µ 0.5, poured"
+        found = mean("fraction", 0.5, shakes)
+        yield Finding(what, "0.81 to 0.84", "random packings of disks", found, 0.81, 0.84, digits=".3f")
     rough = mean("coordination", 1.0)
     yield Finding("contacts of a disk, µ 1", "3 to 3.3", "isostatic with friction, d + 1", rough, 2.95, 3.3)
     frictions = sorted({r["friction"] for r in poured})
@@ -119,27 +89,20 @@ def repose(data: dict[str, Any]) -> Iterator[Finding]:
         ("angle of repose", "angle", "error"),
         ("share of a bed that stays", "stays", "stays_error"),
     ):
-        values = np.array([row[name] for row in data["means"]])
-        errors = np.array([row[error] for row in data["means"]])
-        falls = -np.diff(values) / np.hypot(errors[1:], errors[:-1])
+        values, errors = _columns(data["means"], name, error)
+        yield _fall(what, values, errors)
         rise = float((values[-1] - values[0]) / np.hypot(errors[-1], errors[0]))
-        yield Finding(
-            f"{what}, largest fall with µ in standard errors", "below 2: monotone", "", float(falls.max()), -90.0, 2.0
-        )
         yield Finding(f"{what}, rise from µ 0.05 to 0.7 in standard errors", "above 4", "", rise, 4.0, np.inf)
 
 
 def janssen(data: dict[str, Any]) -> Iterator[Finding]:
     """Saturation of what a silo's bottom bears."""
-    for what, name in (("samples", "determination"), ("means of a height", "determination_of_means")):
-        yield Finding(
-            f"silo, R² of Janssen's law, {what}", "above 0.95", "Janssen 1895", data[name], 0.95, 1.0, digits=".3f"
-        )
-    mass = data["saturation"]
-    off = [row["borne"] / (mass * -np.expm1(-row["filling"] / mass)) - 1.0 for row in data["means"]]
-    yield Finding(
-        "silo, mean of a height farthest from the law", "0 ± 10%", "the fit", max(off, key=abs), -0.1, 0.1, digits=".3f"
-    )
+    source = "Janssen 1895"
+    for rows, name in (("samples", "determination"), ("means of a height", "determination_of_means")):
+        what = f"silo, R² of Janssen's law, {rows}"
+        yield Finding(what, "above 0.95", source, data[name], 0.95, 1.0, digits=".3f")
+    what, worst = "silo, mean of a height farthest from the law", farthest(data["means"], data["saturation"])
+    yield Finding(what, "0 ± 10%", "the fit", worst, -0.1, 0.1, digits=".3f")
     worst = max((abs(r["borne"] / r["filling"] - 1.0) for r in data["smooth"]), default=np.nan)
     yield Finding("smooth walls, error of the borne weight", "0", "balance of forces", worst, 0.0, 0.03, digits=".1e")
 
@@ -148,56 +111,30 @@ def hourglass(data: dict[str, Any]) -> Iterator[Finding]:
     """Beverloo's law of the discharge in the plane."""
     yield Finding("hourglass, exponent of D - k d", "1.5 ± 0.1", BEVERLOO, data["free"]["n"], 1.4, 1.6)
     yield Finding("hourglass, k with the exponent 1.5", "1 to 2", "Nedderman 1992", data["fixed"]["k"], 1.0, 2.0)
-    yield Finding(
-        "hourglass, R² of a line through W^(2/3)", "above 0.99", BEVERLOO, data["straight"], 0.99, 1.0, digits=".4f"
-    )
-    drifts = []
-    for run in data["runs"]:
-        early, late = np.array_split(run["blocks"], 2)
-        drifts.append((np.mean(late) - np.mean(early)) / (2.0 * run["error"]))
-    yield Finding(
-        "hourglass, rate of a run's halves, largest difference in standard errors",
-        "below 3: steady",
-        "",
-        float(np.abs(drifts).max()),
-        0.0,
-        3.0,
-    )
+    what = "hourglass, R² of a line through W^(2/3)"
+    yield Finding(what, "above 0.99", BEVERLOO, data["straight"], 0.99, 1.0, digits=".4f")
+    halves = [[np.mean(half) for half in np.array_split(run["blocks"], 2)] for run in data["runs"]]
+    drifts = [abs(late - early) / (2.0 * r["error"]) for (early, late), r in zip(halves, data["runs"], strict=True)]
+    what = "hourglass, rate of a run's halves, largest difference in standard errors"
+    yield Finding(what, "below 3: steady", "", float(max(drifts)), 0.0, 3.0)
     same = next(r for r in data["runs"] if r["opening"] == data["lower"]["opening"])
-    for what, run, other in (
+    for how, run, other in (
         ("half as much filling", data["lower"], same),
         ("half the time step", data["finer"], data["lower"]),
     ):
         share = run["rate"] / other["rate"]
-        yield Finding(f"hourglass, rate with {what}", "the same, 5%", "", share, 0.95, 1.05, "of the other")
+        yield Finding(f"hourglass, rate with {how}", "the same, 5%", "", share, 0.95, 1.05, "of the other")
 
 
 def balance(data: dict[str, Any]) -> Iterator[Finding]:
     """Energy and momentum of the runs made for them."""
-    for name, chosen in (
-        ("e = 0, any µ", [r for r in data["boxes"] if r["restitution"] == 0.0]),
-        ("µ = 0, e = 0.5 and 0.9", [r for r in data["boxes"] if r["friction"] == 0.0 and r["restitution"] > 0.0]),
-    ):
-        worst = max(r["grown"] for r in chosen)
-        yield Finding(
-            f"growth of the energy in a box, {name}",
-            "0",
-            "proof in the manual",
-            worst,
-            0.0,
-            1e-12,
-            "of the start's",
-            ".1e",
-        )
-    yield Finding(
-        "momentum of two clouds that meet",
-        "0",
-        "exact",
-        max(r["momentum_error"] for r in data["clouds"]),
-        0.0,
-        1e-12,
-        digits=".1e",
-    )
+    rigid = [r for r in data["boxes"] if r["restitution"] == 0.0]
+    smooth = [r for r in data["boxes"] if r["friction"] == 0.0 and r["restitution"] > 0.0]
+    for name, chosen in (("e = 0, any µ", rigid), ("µ = 0, e = 0.5 and 0.9", smooth)):
+        worst, what = max(r["grown"] for r in chosen), f"growth of the energy in a box, {name}"
+        yield Finding(what, "0", "proof in the manual", worst, 0.0, 1e-12, "of the start's", ".1e")
+    worst = max(r["momentum_error"] for r in data["clouds"])
+    yield Finding("momentum of two clouds that meet", "0", "exact", worst, 0.0, 1e-12, digits=".1e")
     kept = [r["kept"] for r in data["cooling"] if r["restitution"] == 0.9]
     error = abs(kept[0] / kept[-1] - 1.0)
     yield Finding("energy kept at e = 0.9, step 1 against 0.02 ms", "the same, 5%", "", error, 0.0, 0.05, digits=".3f")
@@ -293,9 +230,8 @@ def ball_drum(data: dict[str, Any]) -> Iterator[Finding]:
         yield Finding(what, f"{angle:.1f} ± 3: slow shear", source, row["angle"], angle - 3.0, angle + 3.0, "°", ".1f")
     low, high = GLASS
     what = f"balls: drum, slope, µ 0.5, ± {rows[0.5]['error']:.1f}"
-    yield Finding(
-        what, f"{low:g} to {high:g}: glass beads", "Jop et al. 2006", rows[0.5]["angle"], low, high, "°", ".1f"
-    )
+    beads, source = f"{low:g} to {high:g}: glass beads", "Jop et al. 2006"
+    yield Finding(what, beads, source, rows[0.5]["angle"], low, high, "°", ".1f")
     yield from _rising("balls: drum, slope", data["means"], "angle", "error")
     change = data["finer"]["angle"] - rows[0.5]["angle"]
     yield Finding("balls: drum, slope with half the time step", "the same, 2", "", change, -2.0, 2.0, "° more", ".1f")
@@ -310,24 +246,30 @@ def ball_repose(data: dict[str, Any]) -> Iterator[Finding]:
     rows = {row["friction"]: row for row in data["means"]}
     what = f"balls: angle of repose, µ 0.5, ± {rows[0.5]['error']:.1f}"
     low, high = GLASS
-    yield Finding(
-        what, f"{low:g} to {high:g}: glass beads", "Jop et al. 2006", rows[0.5]["angle"], low, high, "°", ".1f"
-    )
+    beads, source = f"{low:g} to {high:g}: glass beads", "Jop et al. 2006"
+    yield Finding(what, beads, source, rows[0.5]["angle"], low, high, "°", ".1f")
     yield from _rising("balls: angle of repose", data["means"], "angle", "error")
     yield from _rising("balls: share of a bed that stays", data["means"], "stays", "stays_error")
 
 
+def _columns(rows: list[dict[str, float]], *names: str) -> list[npt.NDArray[np.float64]]:
+    return [np.array([row[name] for row in rows]) for name in names]
+
+
+def _fall(what: str, values: npt.NDArray[np.float64], errors: npt.NDArray[np.float64]) -> Finding:
+    """That a quantity does not fall with friction."""
+    fall = float((-np.diff(values) / np.hypot(errors[1:], errors[:-1])).max())
+    return Finding(f"{what}, largest fall with µ in standard errors", "below 2: monotone", "", fall, -90.0, 2.0)
+
+
 def _rising(what: str, rows: list[dict[str, float]], name: str, error: str) -> Iterator[Finding]:
     """That a quantity rises with friction, and less and less."""
-    values, errors = (np.array([row[key] for row in rows]) for key in (name, error))
-    friction = [row["friction"] for row in rows]
-    fall = float((-np.diff(values) / np.hypot(errors[1:], errors[:-1])).max())
-    yield Finding(f"{what}, largest fall with µ in standard errors", "below 2: monotone", "", fall, -90.0, 2.0)
-    half = float(np.interp(0.3, friction, values) - values[0])
-    late = float(values[-1] - np.interp(0.3, friction, values))
-    share = late / (half + late)
+    values, errors, friction = _columns(rows, name, error, "friction")
+    yield _fall(what, values, errors)
+    middle = float(np.interp(0.3, friction, values))
+    share = (values[-1] - middle) / (values[-1] - values[0])
     text = f"{what}, share of the rise from µ {friction[0]:g} to 0.8 that lies above 0.3"
-    yield Finding(text, "below a half: saturation", "", share, -np.inf, 0.5)
+    yield Finding(text, "below a half: saturation", "", float(share), -np.inf, 0.5)
 
 
 def wheel_on_balls(data: dict[str, Any]) -> Iterator[Finding]:
@@ -355,23 +297,13 @@ def plate_on_balls(data: dict[str, Any]) -> Iterator[Finding]:
 def everywhere(ledgers: dict[str, dict[str, float]]) -> Iterator[Finding]:
     """What must hold in every step of all parts."""
     for part, ledger in ledgers.items():
-        yield Finding(
-            f"{part}: deepest overlap", "below 1% of a radius", "", 100.0 * ledger["overlap"], 0.0, 1.0, "%", ".2g"
-        )
-        yield Finding(
-            f"{part}: momentum balance of a step", "rounding", "exact", ledger["momentum"], 0.0, 1e-12, "", ".1e"
-        )
+        deepest = 100.0 * ledger["overlap"]
+        yield Finding(f"{part}: deepest overlap", "below 1% of a radius", "", deepest, 0.0, 1.0, "%", ".2g")
+        error, what = ledger["momentum"], f"{part}: momentum balance of a step"
+        yield Finding(what, "rounding", "exact", error, 0.0, 1e-12, "", ".1e")
         if ledger["spent"] > 0.0:
-            yield Finding(
-                f"{part}: energy regained",
-                "0",
-                "proof in the manual",
-                ledger["regained"],
-                0.0,
-                1e-6,
-                "of what was lost",
-                ".1e",
-            )
+            back, source = ledger["regained"], "proof in the manual"
+            yield Finding(f"{part}: energy regained", "0", source, back, 0.0, 1e-6, "of what was lost", ".1e")
 
 
 #: What each part must have found, by the name of its module.
@@ -398,7 +330,6 @@ PARTS = {
 }
 
 
-def table(found: list[Finding]) -> str:
+def table_of(found: list[Finding]) -> str:
     """All rows."""
-    head = ["| what | expected | source | measured |", "|---|---|---|---|"]
-    return "\n".join(head + [f.row() for f in found])
+    return table(["what", "expected", "source", "measured"], [f.cells() for f in found])

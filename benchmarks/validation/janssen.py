@@ -1,5 +1,7 @@
 """Janssen effect: a silo's bottom carries less than the weight of the filling; the walls carry the rest."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from validation.samples import DIAMETER, Array, glued_row, loose, settle, sides
@@ -91,6 +93,21 @@ def saturation(filling: Array, borne: Array) -> float:
     return float(candidates[np.argmin(squares)])
 
 
+def columns(runs: list[dict[str, float]]) -> list[Array]:
+    """Fillings and borne masses of runs."""
+    return [np.array([run[name] for run in runs]) for name in ("filling", "borne")]
+
+
+def without_each(runs: list[dict[str, float]], seeds: Sequence[int]) -> list[float]:
+    """Janssen's m of the runs without each of the seeds."""
+    return [saturation(*columns([run for run in runs if run["seed"] != seed])) for seed in seeds]
+
+
+def jackknife(values: Sequence[float]) -> float:
+    """The standard error of a quantity from its values without each of the seeds."""
+    return float(np.sqrt((len(values) - 1) * np.var(values)))
+
+
 def means(runs: list[dict[str, float]]) -> list[dict[str, float]]:
     """Means of each height over the seeds, with the standard error of the borne mass."""
     return means_by(runs, "height", HEIGHTS, {"borne": "error"}, ("filling", "wall_friction"))
@@ -101,21 +118,13 @@ def measure(ledger: Ledger) -> dict[str, object]:
     runs = [weigh(height, seed, ledger) for seed in SEEDS for height in HEIGHTS]
     smooth = [weigh(height, 0, ledger, wall_friction=0.0) for height in (1.0, 3.0)]
     rows = means(runs)
-    filling, borne = (np.array([r[name] for r in runs]) for name in ("filling", "borne"))
-    mass = saturation(filling, borne)
-    # jackknife over the seeds: the fit without each of them
-    without = [
-        saturation(*(np.array([r[name] for r in runs if r["seed"] != seed]) for name in ("filling", "borne")))
-        for seed in SEEDS
-    ]
-    n = len(without)
-    of_means = determination(*(np.array([r[name] for r in rows]) for name in ("filling", "borne")), mass)
+    mass = saturation(*columns(runs))
     return {
         "runs": runs,
         "means": rows,
         "smooth": smooth,
         "saturation": mass,
-        "saturation_error": float(np.sqrt((n - 1) * np.var(without))),
-        "determination": determination(filling, borne, mass),
-        "determination_of_means": of_means,
+        "saturation_error": jackknife(without_each(runs, SEEDS)),
+        "determination": determination(*columns(runs), mass),
+        "determination_of_means": determination(*columns(rows), mass),
     }

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 
 from validation.pool import Run, side_by_side
-from validation.samples import DIAMETER, Array, box, glued_row, loose, settle, slow
-from validation.watch import Ledger, means_by
+from validation.samples import DIAMETER, Array, box, glued_row, loose, settle
+from validation.watch import Ledger, Watched, means_by, run_off
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
 LENGTH, COUNT = 60.0, 900
@@ -36,6 +36,16 @@ def angle(x: Array, y: Array) -> float:
     return float(np.degrees(np.arctan(-np.polyfit(x[flank], y[flank], 1)[0])))
 
 
+def row_of(watched: Watched, count: int, x: Array, y: Array) -> Run:
+    """Angle, share of so many grains that stays, time, s, and surface (x, y) of a slope that rests."""
+    return {
+        "angle": angle(x, y),
+        "stays": float((~watched.sim.kinematic).sum() / count),
+        "seconds": float(watched.sim.time),
+        "surface": [(along / watched.diameter).round(3).tolist() for along in (x, y)],
+    }
+
+
 def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: float = LENGTH) -> Run:
     """Angle of repose of one bed.
 
@@ -58,24 +68,12 @@ def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: flo
     settle(watched)
     ledger.merge(watched.ledger)
     watched = sample.after(watched.sim).watched(walls=[[0.0, 0.0, 1.0, 0.0]], friction=friction, wall_friction=0.0)
-    sim = watched.sim
-    quiet = 0.0
-    while sim.time < 8.0 and quiet < 0.3:
-        watched.step(round(0.05 / sim.time_step))
-        fallen = sim.position[:, 1] < -2.0 * DIAMETER
-        watched.remove(fallen)
-        quiet = quiet + 0.05 if slow(watched, 0.01) and not fallen.any() else 0.0
+    run_off(watched, looks=6, most=8.0)
     ledger.merge(watched.ledger)
+    sim = watched.sim
     free = ~sim.kinematic
-    x, y = surface(sim.position[free], sim.radius[free], 0.0, edge)
-    return {
-        "friction": friction,
-        "seed": seed,
-        "angle": angle(x, y),
-        "stays": float(free.sum() / count),
-        "seconds": float(sim.time),
-        "surface": [(x / DIAMETER).round(3).tolist(), (y / DIAMETER).round(3).tolist()],
-    }
+    row = row_of(watched, count, *surface(sim.position[free], sim.radius[free], 0.0, edge))
+    return {"friction": friction, "seed": seed, **row}
 
 
 def measure(ledger: Ledger) -> dict[str, object]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import DiskSimulation, disk_packing
-from validation.watch import GRAVITY, Watched
+from validation import watch
+from validation.watch import Watched
 
 Array = npt.NDArray[np.float64]
 
@@ -21,6 +23,8 @@ SPREAD = 0.2
 MASS = 0.1
 #: s; sqrt(d/g) is 45 ms.
 TIME_STEP = 5e-4
+
+settle = partial(watch.settle, least=0.2, most=5.0)
 
 
 @dataclass(frozen=True)
@@ -49,15 +53,10 @@ class Sample:
         return Sample(radius, mass, np.hstack([position, angles]), np.zeros((n, 3)), np.zeros(n, dtype=bool))
 
     def __add__(self, other: Sample) -> Sample:
-        return Sample(
-            *(
-                np.concatenate([getattr(self, name), getattr(other, name)])
-                for name in ("radius", "mass", "position", "velocity", "kinematic")
-            )
-        )
+        return Sample(*map(np.concatenate, zip(astuple(self), astuple(other), strict=True)))
 
     def __getitem__(self, kept: npt.NDArray[np.bool_]) -> Sample:
-        return Sample(*(getattr(self, n)[kept] for n in ("radius", "mass", "position", "velocity", "kinematic")))
+        return Sample(*(of[kept] for of in astuple(self)))
 
     @property
     def free(self) -> Sample:
@@ -75,7 +74,7 @@ class Sample:
             self.radius, self.mass, self.position, kinematic=self.kinematic, walls=walls, friction=friction, **given
         )
         sim.set_state(self.position, self.velocity)
-        return Watched(sim, has_energy=has_energy)
+        return Watched(sim, DIAMETER, has_energy=has_energy)
 
 
 def loose(count: int, width: float, seed: int, *, left: float = 0.0, bottom: float = 0.0) -> Sample:
@@ -116,19 +115,3 @@ def box(left: float, right: float, floor: float = 0.0) -> list[list[float]]:
 def sides(left: float, right: float) -> list[list[float]]:
     """Two walls."""
     return [[left, 0.0, 1.0, 0.0], [right, 0.0, -1.0, 0.0]]
-
-
-def slow(watched: Watched, speed: float) -> bool:
-    """Whether the free disks' root mean square speed is below `speed` times sqrt(9.81 DIAMETER)."""
-    sim = watched.sim
-    mass = float(sim.mass[~sim.kinematic].sum())
-    return bool(np.sqrt(2.0 * sim.energy().kinetic / mass) < speed * np.sqrt(GRAVITY * DIAMETER))
-
-
-def settle(watched: Watched, *, least: float = 0.2, most: float = 5.0, speed: float = 0.01) -> None:
-    """Steps until the disks are `slow`, for `least` seconds at least and `most` at most."""
-    every = 0.05
-    elapsed = 0.0
-    while elapsed < least or (elapsed < most and not slow(watched, speed)):
-        watched.step(round(every / watched.sim.time_step))
-        elapsed += every

@@ -9,12 +9,14 @@ import csv
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
+from reports import DOCS
+from reports import table as table_of
 
 from rover_gym.ground.sand import (
     FittedSoil,
@@ -31,7 +33,7 @@ from rover_gym.ground.sand import (
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "validation"
+FOLDER = DOCS / "validation"
 VARIABLE = "ROVER_GYM_SOIL_DATA"
 
 #: The wheel of the data set. The number of grousers is not stated there; 30 hold sand all around the rim.
@@ -43,6 +45,9 @@ PUBLISHED = {"smooth": (6.8, 7.3, 7.5), "grousered": (5.1, 6.9, 9.0)}
 #: NASA's MGRU3 wheel on GRC-1: slope, degrees, and slip, as Project Chrono's scripts quote the measurement.
 MGRU3 = ((0.3, 0.032), (5.2, 0.052), (10.0, 0.135), (15.0, 0.434), (20.2, 0.756), (25.1, 0.885))
 MGRU3_MASS = 17.5
+
+#: Heads of columns of errors.
+QUANTITIES = ("pull, N", "across, N", "sinkage, mm")
 
 SIDEWAYS = math.radians(89.0)
 
@@ -57,24 +62,27 @@ def weights(runs: Sequence[Runs]) -> list[npt.NDArray[np.float64]]:
     return found
 
 
-def rms(errors: npt.NDArray[np.float64]) -> str:
+def cells(values: Iterable[float]) -> list[str]:
+    """Of a table, with one decimal."""
+    return [f"{value:.1f}" for value in values]
+
+
+def rms(errors: npt.NDArray[np.float64]) -> list[str]:
     """Root mean squares of errors (n, 3) in N, N and mm, as cells of a table."""
-    values = np.sqrt((errors**2).mean(axis=0)) * (1.0, 1.0, 1e3)
-    return " | ".join(f"{value:.1f}" for value in values)
+    return cells(np.sqrt((errors**2).mean(axis=0)) * (1.0, 1.0, 1e3))
 
 
-def table(soil: Soil, runs: Sequence[Runs]) -> list[str]:
+def table(soil: Soil, runs: Sequence[Runs]) -> str:
     """Errors by wheel and slip angle."""
-    lines = ["| wheel | slip angles | pull, N | across, N | sinkage, mm |", "|---|---|---|---|---|"]
+    lines = []
     for own in runs:
         errors = errors_of(soil, [own], WHEELS)
         degrees = np.degrees(own.slip_angle).round()
-        lines += [f"| {own.wheel} | {angle:.0f}° | {rms(errors[degrees == angle])} |" for angle in np.unique(degrees)]
-        lines.append(f"| {own.wheel} | below 90° | {rms(errors[own.slip_angle < SIDEWAYS])} |")
-        lines.append(f"| {own.wheel} | all | {rms(errors)} |")
-        published = " | ".join(f"{value:.1f}" for value in PUBLISHED[own.wheel])
-        lines.append(f"| {own.wheel} | all, published model | {published} |")
-    return lines
+        lines += [[own.wheel, f"{angle:.0f}°", *rms(errors[degrees == angle])] for angle in np.unique(degrees)]
+        lines.append([own.wheel, "below 90°", *rms(errors[own.slip_angle < SIDEWAYS])])
+        lines.append([own.wheel, "all", *rms(errors)])
+        lines.append([own.wheel, "all, published model", *cells(PUBLISHED[own.wheel])])
+    return table_of(["wheel", "slip angles", *QUANTITIES], lines)
 
 
 def fitted(fit: FittedSoil) -> str:
@@ -83,34 +91,34 @@ def fitted(fit: FittedSoil) -> str:
     return ", ".join(f"`{name}` {fit.soil.numbers[name]:.3f} ± {deviation:.3f}" for name, deviation in pairs)
 
 
-def predictions(start: Soil, runs: Sequence[Runs]) -> list[str]:
+def predictions(start: Soil, runs: Sequence[Runs]) -> str:
     """Fits on some of the runs, and the errors of the others."""
-    lines = ["| fitted on | predicted | pull, N | across, N | sinkage, mm |", "|---|---|---|---|---|"]
+    lines = []
     for wheel, other in (("grousered", "smooth"), ("smooth", "grousered")):
         chosen = [own for own in runs if own.wheel == wheel]
         fit = fit_soil(start, chosen, WHEELS, weights=weights(chosen))
         rest = [own for own in runs if own.wheel == other]
         below = [own.where(own.slip_angle < SIDEWAYS) for own in rest]
-        lines.append(f"| the {wheel} wheel | the {other} wheel | {rms(errors_of(fit.soil, rest, WHEELS))} |")
-        lines.append(f"| | the same below 90° | {rms(errors_of(fit.soil, below, WHEELS))} |")
+        lines.append([f"the {wheel} wheel", f"the {other} wheel", *rms(errors_of(fit.soil, rest, WHEELS))])
+        lines.append(["", "the same below 90°", *rms(errors_of(fit.soil, below, WHEELS))])
     degrees = [np.degrees(own.slip_angle).round() for own in runs]
     chosen = [own.where(np.isin(angle, (0, 45))) for own, angle in zip(runs, degrees, strict=True)]
     fit = fit_soil(start, chosen, WHEELS, weights=weights(chosen))
     for angle in (15, 60, 90):
         rest = [own.where(of == angle) for own, of in zip(runs, degrees, strict=True)]
-        lines.append(f"| 0° and 45°, both wheels | {angle}° | {rms(errors_of(fit.soil, rest, WHEELS))} |")
-    return lines
+        lines.append(["0° and 45°, both wheels", f"{angle}°", *rms(errors_of(fit.soil, rest, WHEELS))])
+    return table_of(["fitted on", "predicted", *QUANTITIES], lines)
 
 
-def mgru3() -> list[str]:
+def mgru3() -> str:
     """Slope at equal slip of the MGRU3 wheel, nothing fitted."""
-    lines = ["| slip | slope measured | without grousers | 24 grousers of 10 mm |", "|---|---|---|---|"]
+    lines = []
     soil = named_soil("grc-1")
     wheels = (SingleWheel(0.225, 0.2), SingleWheel(0.225, 0.2, 0.01, 24))
     for slope, slip in MGRU3:
         found = [math.degrees(climbed_slope(wheel, soil, MGRU3_MASS, slip)[0]) for wheel in wheels]
-        lines.append(f"| {slip:.3f} | {slope}° | {found[0]:.1f}° | {found[1]:.1f}° |")
-    return lines
+        lines.append([f"{slip:.3f}", f"{slope}°", *(f"{angle:.1f}°" for angle in found)])
+    return table_of(["slip", "slope measured", "without grousers", "24 grousers of 10 mm"], lines)
 
 
 def own_soils(cells: dict[str, str]) -> list[Soil]:
@@ -131,29 +139,26 @@ def own_soils(cells: dict[str, str]) -> list[Soil]:
     return [grains, bekker]
 
 
-def single_wheels(path: Path) -> list[str]:
+def single_wheels(path: Path) -> str:
     """Pull and torque of other wheels from their soils' own numbers, nothing fitted."""
-    lines = [
-        "| wheel | slip | pull, N | resistive | Bekker | torque / radius, N | resistive | Bekker |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    lines = []
     groups: dict[str, list[npt.NDArray[np.float64]]] = {}
     with path.open(newline="", encoding="utf-8") as file:
-        for cells in csv.DictReader(file):
-            radius, height = float(cells["wheel_radius_m"]), float(cells["grouser_height_m"])
-            wheel = SingleWheel(radius, float(cells["wheel_width_m"]), height, int(cells["grouser_count"]))
-            slip, pull, rim = float(cells["slip"]), float(cells["drawbar_N"]), float(cells["torque_Nm"]) / radius
-            drive = [0.1 * (1.0 - slip), 0.1 / radius, 0.0, float(cells["load_N"]), 9.81]
-            found = np.array([wheel.on(soil).steady([drive])[0, [1, 4]] / (1.0, radius) for soil in own_soils(cells)])
-            name = f"{cells['source']}, grousers {1e3 * height:.0f} mm"
-            for group in (name, f"{cells['source']}, all"):
+        for row in csv.DictReader(file):
+            radius, height = float(row["wheel_radius_m"]), float(row["grouser_height_m"])
+            wheel = SingleWheel(radius, float(row["wheel_width_m"]), height, int(row["grouser_count"]))
+            slip, pull, rim = float(row["slip"]), float(row["drawbar_N"]), float(row["torque_Nm"]) / radius
+            drive = [0.1 * (1.0 - slip), 0.1 / radius, 0.0, float(row["load_N"]), 9.81]
+            found = np.array([wheel.on(soil).steady([drive])[0, [1, 4]] / (1.0, radius) for soil in own_soils(row)])
+            name = f"{row['source']}, grousers {1e3 * height:.0f} mm"
+            for group in (name, f"{row['source']}, all"):
                 groups.setdefault(group, []).append(np.abs(found[:, 0] - pull) / abs(pull))
-            pulls, rims = (" | ".join(f"{value:.1f}" for value in values) for values in found.T)
-            lines.append(f"| {name} | {slip} | {pull} | {pulls} | {rim:.1f} | {rims} |")
+            lines.append([name, f"{slip}", f"{pull}", *cells(found[:, 0]), f"{rim:.1f}", *cells(found[:, 1])])
     for name, errors in groups.items():
-        medians = " | ".join(f"{100.0 * value:.0f}%" for value in np.median(errors, axis=0))
-        lines.append(f"| {name} | median error | | {medians} | | | |")
-    return lines
+        medians = [f"{100.0 * value:.0f}%" for value in np.median(errors, axis=0)]
+        lines.append([name, "median error", "", *medians, "", "", ""])
+    heads = ["wheel", "slip", "pull, N", "resistive", "Bekker", "torque / radius, N", "resistive", "Bekker"]
+    return table_of(heads, lines)
 
 
 def draw(soil: Soil, runs: Sequence[Runs], path: Path) -> None:
@@ -190,16 +195,16 @@ def main() -> None:
     start = named_soil("cmu-sand")
     fit = fit_soil(start, runs, WHEELS, weights=weights(runs))
     parts = {
-        "Fitted numbers": [fitted(fit)],
+        "Fitted numbers": fitted(fit),
         "Errors of the soil `cmu-sand`, root mean squares": table(start, runs),
         "Errors of predictions, root mean squares": predictions(start, runs),
         "MGRU3 wheel on GRC-1, nothing fitted": mgru3(),
         "Other wheels, nothing fitted": single_wheels(Path(data) / "single_wheels.csv"),
     }
-    text = "\n\n".join(f"## {title}\n\n" + "\n".join(lines) for title, lines in parts.items())
+    text = "\n\n".join(f"## {title}\n\n{part}" for title, part in parts.items())
     head = "---\norphan: true\n---\n\n# Sand: tables\n\nBy `make validate-sand`; [sand](../sand.md) explains them."
-    (DOCS / "sand.md").write_text(f"{head}\n\n{text}\n", encoding="utf-8")
-    draw(start, runs, DOCS / "sand.png")
+    (FOLDER / "sand.md").write_text(f"{head}\n\n{text}\n", encoding="utf-8")
+    draw(start, runs, FOLDER / "sand.png")
     sys.stdout.write(text + "\n")
 
 

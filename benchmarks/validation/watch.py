@@ -61,11 +61,14 @@ class Watched:
 
     Args:
         sim: The simulation.
+        diameter: Mean diameter, m.
         has_energy: False where kinematic disks move and do work: the energy is not looked at then.
     """
 
-    def __init__(self, sim: DiskSimulation | GrainSimulation, *, has_energy: bool = True) -> None:
-        self.sim = sim
+    def __init__(
+        self, sim: DiskSimulation | GrainSimulation, diameter: float = 1.0, *, has_energy: bool = True
+    ) -> None:
+        self.sim, self.diameter = sim, diameter
         self.ledger = Ledger()
         #: Impulse of kinematic disks on the free ones in the last step, N s.
         self.from_kinematic = np.zeros(len(sim.settings["gravity"]))
@@ -135,6 +138,61 @@ class Watched:
         scale = float(np.abs(impulse).sum() + np.abs(pull).sum() + self._mass @ speeds)
         if scale > 0.0:
             self.ledger.momentum = max(self.ledger.momentum, float(error) / scale)
+
+
+def slow(watched: Watched, speed: float = 0.01) -> bool:
+    """Whether the free grains' root mean square speed is below `speed` times the root of 9.81 times their diameter."""
+    sim = watched.sim
+    mass = float(sim.mass[~sim.kinematic].sum())
+    return bool(np.sqrt(2.0 * sim.energy().kinetic / mass) < speed * np.sqrt(GRAVITY * watched.diameter))
+
+
+def settle(watched: Watched, *, least: float, most: float, speed: float = 0.01) -> None:
+    """Steps until the grains are `slow`, for `least` seconds at least and `most` at most."""
+    every = 0.05
+    elapsed = 0.0
+    while elapsed < least or (elapsed < most and not slow(watched, speed)):
+        watched.step(round(every / watched.sim.time_step))
+        elapsed += every
+
+
+def run_off(watched: Watched, *, looks: int, most: float) -> None:
+    """Removes grains that fall below the floor, until the others are slow at so many looks in turn or for `most` s."""
+    sim, quiet = watched.sim, 0
+    while sim.time < most and quiet < looks:
+        watched.step(round(0.05 / sim.time_step))
+        fallen = sim.position[:, 1] < -2.0 * watched.diameter
+        watched.remove(fallen)
+        quiet = quiet + 1 if slow(watched) and not fallen.any() else 0
+
+
+def fly(watched: Watched, steps: int) -> dict[str, float]:
+    """Takes steps: how much of the kinetic energy is lost, and how much all growth of the energy adds up to."""
+    start = watched.sim.energy().kinetic
+    watched.step(steps)
+    return {"lost": 1.0 - watched.sim.energy().kinetic / start, "grown": watched.ledger.growth / start}
+
+
+def meet(watched: Watched, duration: float) -> dict[str, float]:
+    """Lets clouds meet: relative changes of their momentum and its moment, and the share of energy that is left."""
+    sim, d = watched.sim, len(watched.sim.settings["gravity"])
+    x, v = np.zeros((2, len(sim.radius), 3))
+    x[:, :d], v[:, :d] = sim.position[:, :d], sim.velocity[:, :d]
+    sizes = (float(sim.mass @ np.linalg.norm(of, axis=1)) for of in (v, np.cross(x, v)))
+    before, kinetic = sim.momentum(), sim.energy().kinetic
+    watched.step(round(duration / sim.time_step))
+    change = np.abs(sim.momentum() - before)
+    parts = (change[:d], change[d:])
+    momentum, moment = (float(part.max()) / size for part, size in zip(parts, sizes, strict=True))
+    left = float(sim.energy().kinetic / kinetic)
+    return {"momentum_error": momentum, "moment_error": moment, "energy_left": left}
+
+
+def line(x: np.ndarray, y: np.ndarray) -> dict[str, float]:
+    """The straight line through points: its value at 0 with the standard error, and its slope with its own."""
+    (slope, value), covariance = np.polyfit(x, y, 1, cov=True)
+    slope_error, error = np.sqrt(np.diag(covariance))
+    return {"value": float(value), "error": float(error), "slope": float(slope), "slope_error": float(slope_error)}
 
 
 def means_by(

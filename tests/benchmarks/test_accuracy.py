@@ -1,6 +1,7 @@
 """Accuracy by request keeps its word on the flat drive, against a path that another program computed."""
 
 import math
+from functools import partial
 
 import pytest
 from comparison.peers.base import Variant
@@ -17,11 +18,9 @@ BOUNDS = {"fast": 0.005, "balanced": 0.00125, "reference": 0.00005}
 
 
 def drive_error(accuracy: str | float) -> float:
-    def build(scene: object, _: float) -> OurRunner:
-        return OurRunner(scene, **rover_gym.accuracy_options(accuracy))  # type: ignore[arg-type]
-
-    step = rover_gym.accuracy_options(accuracy)["time_step"]
-    trace = run(Variant("rover-gym", str(accuracy), build, "", ""), flat_drive.scene(), step, cap=100.0)
+    options = rover_gym.accuracy_options(accuracy)  # type: ignore[arg-type]
+    step = options.pop("time_step")
+    trace = run(Variant("rover-gym", "", partial(OurRunner, **options)), flat_drive.scene(), step, cap=100.0)
     assert not trace.failure
     return flat_drive.error(trace, load("flat_drive"))
 

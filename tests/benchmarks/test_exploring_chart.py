@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from comparison import exploring_chart as chart
-from comparison.ensembles import distance, drive
+from comparison.ensembles import drive
+from comparison.scene import distance
 
 
 @pytest.mark.parametrize(("ground", "torque"), chart.SCENES)
@@ -36,4 +37,4 @@ def test_an_engine_without_a_figure_leaves_a_gap_in_the_table() -> None:
     engine = {"engine": "E", "variant": "v"}
     done = point | {"step": 0.01, "error": 2e-3, "cpu_ms_per_s": 1.5}
     data = {"points": [done, point | {"step": 0.005, "failure": "no"}], "changes": {"s": 3e-6}, "engines": [engine]}
-    assert chart.table(data, "s").splitlines()[-1] == "| E, v | 2, 1.5 ms/s | - |"
+    assert chart.table_of(data, "s").splitlines()[-1] == "| E, v | 2, 1.5 ms/s | - |"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from comparison import output
+import reports
 from comparison.spheres.scene import FreeScene, Slab, energy, penetration, velocity_error
 from comparison.spheres.tables import tables
 
@@ -41,19 +41,18 @@ def test_the_slabs_inertia_is_a_boxes() -> None:
 def test_a_run_without_a_figure_leaves_a_gap_in_the_table() -> None:
     point = {"scene": "666", "engine": "E", "variant": "v"}
     done = point | {"step": 0.01, "penetration": 2e-5, "us_per_step": 480.0}
-    data = {"meta": {"processor": "P", "packages": {}}, "points": [done, point | {"step": 0.005, "failure": "no"}]}
+    meta = {"command": "make chart", "processor": "P", "packages": {}}
+    data = {"meta": meta, "points": [done, point | {"step": 0.005, "failure": "no"}]}
     assert "| E, v | 2.0e-05, 480 us | - |" in tables(data)
 
 
-def test_text_goes_between_its_marks_and_a_page_without_them_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_text_goes_between_its_marks_and_a_page_without_them_is_refused(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    monkeypatch.setattr(output, "CHART", tmp_path / "page")
-    monkeypatch.setattr(output, "TABLES", page)
-    page.write_text("a\n<b>\nold\n<e>\nz\n")
-    output.between(tmp_path / "page", "<b>", "<e>", "new")
-    assert page.read_text() == "a\n<b>\n\nnew\n\n<e>\nz\n"
-    with pytest.raises(ValueError, match="'<c>' is there 0 times"):
-        output.between(tmp_path / "page", "<c>", "<e>", "new")
-    assert page.read_text() == "a\n<b>\n\nnew\n\n<e>\nz\n"
+    begin, end = "<!-- scene: made by `make it`, not by hand -->", "<!-- end of scene -->"
+    page.write_text(f"a\n{begin}\nold\n{end}\nz\n")
+    reports.fill(page, "scene", "new")
+    filled = f"a\n{begin}\n\nnew\n\n{end}\nz\n"
+    assert page.read_text() == filled
+    with pytest.raises(ValueError, match="'other' are there 0 times"):
+        reports.fill(page, "other", "newer")
+    assert page.read_text() == filled

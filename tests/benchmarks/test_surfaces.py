@@ -5,9 +5,9 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from comparison.ensembles import distance
 from comparison.peers.grid import corners, middle, triangles
 from comparison.run import run
+from comparison.scene import distance
 from comparison.surfaces import bodies, drives
 from comparison.surfaces.our_surfaces import ROVERS, ROVERS_ON_BALLS, OurBody
 from comparison.surfaces.rolling import over_curve, over_facets, rolled
@@ -182,13 +182,8 @@ def test_what_is_left_out_leaves_a_gap_in_the_table_and_says_why() -> None:
     point = {"scene": "edges", "engine": "E", "variant": "v", "step": 0.001}
     done = {"spacing": None, "error": 2e-3, "from_plane": 0.0, "impulse": 0.5, "cpu_ms_per_s": 1.5}
     hill = {"scene": "hills", "error": 2e-3, "errors": [1e-3, 2e-3, 3e-3], "cpu_ms_per_s": 4.0}
-    meta = {
-        "processor": "P",
-        "packages": {},
-        "missing": ["drake"],
-        "durations_s": [1.0],
-        "changes_of_references_m": [1e-4],
-    }
+    meta = {"command": "make chart", "processor": "P", "packages": {}, "missing": ["drake"]}
+    meta |= {"durations_s": [1.0], "changes_of_references_m": [1e-4]}
     points = [point | done, point | {"spacing": 0.1, "failure": "9 prisms"}, point | hill]
     text = tables({"meta": meta, "points": points})
     assert "| engine | plane | cells of 0.1 m, 20 edges |" in text

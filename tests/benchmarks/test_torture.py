@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from torture.law import violation
 from torture.ledger import Bounds, Ledger, Regime
 from torture.pool import play, side_by_side
 from torture.regimes import BY_NAME, REGIMES
-from torture.sizes import BEGIN, END, FINDS, Row, write
+from torture.sizes import FINDS, Row, write
 
 from rover_gym import Simulation, SphereField
 
@@ -23,6 +24,16 @@ def complaints(tasks: list[tuple[str, int]]) -> list[str]:
     for (name, case), ledger in side_by_side(tasks, 2):
         rows[name].ledger.merge(ledger, case)
     return [line for row in rows.values() for line in row.complaints()]
+
+
+def played(name: str, cases: int) -> Row:
+    """The first cases of a regime, of which nothing may break."""
+    row = Row(BY_NAME[name], Ledger())
+    for case in range(cases):
+        row.ledger.merge(play(name, case), case)
+    broken = list(row.complaints())
+    assert not broken, "\n".join(broken)
+    return row
 
 
 @pytest.mark.takes_long("the campaign, cut to ten seconds")
@@ -40,11 +51,7 @@ def test_sizes_and_places_that_hung_or_aborted_are_refused_or_done_in_time() -> 
 @pytest.mark.parametrize("name", ["damaged runs", "damaged policies"])
 def test_damaged_recordings_and_policies_are_refused_or_sound(name: str) -> None:
     """KeyError, RecursionError and others came out; some files were read for ever, one asked for 186 GiB."""
-    row = Row(BY_NAME[name], Ledger())
-    for case in range(row.regime.cases):
-        row.ledger.merge(play(name, case), case)
-    broken = list(row.complaints())
-    assert not broken, "\n".join(broken)
+    row = played(name, BY_NAME[name].cases)
     assert row.ledger.steps >= 150
     assert row.ledger.refused > row.ledger.steps // 2, "or nothing was damaged"
 
@@ -53,12 +60,7 @@ def test_damaged_recordings_and_policies_are_refused_or_sound(name: str) -> None
 def test_doors_to_other_programs_refuse_what_is_wrong(regime: Regime, whole: bool) -> None:
     for package in ("fmpy", "websockets"):
         pytest.importorskip(package)
-    row = Row(regime, Ledger())
-    for case in range(min(4 if whole else 1, regime.cases)):
-        row.ledger.merge(play(regime.name, case), case)
-    broken = list(row.complaints())
-    assert not broken, "\n".join(broken)
-    assert row.ledger.steps
+    assert played(regime.name, min(4 if whole else 1, regime.cases)).ledger.steps
 
 
 def test_a_case_is_the_same_twice() -> None:
@@ -78,11 +80,17 @@ def test_hangs_aborts_and_segmentation_faults_are_findings_and_the_next_case_is_
     assert found["on purpose: sound"] == ""
 
 
-def test_energy_from_nowhere_is_noticed_and_a_motors_work_is_not_taken_for_it() -> None:
-    sim, ledger = Simulation(gravity=(0.0, 0.0, 0.0)), Ledger()
+def at_height(height: float, **options: Any) -> Simulation:
+    """The rover with its trunk's origin at a height, m."""
+    sim = Simulation(**options)
     q = np.zeros(MODEL.nq)
-    q[1] = 5.0
+    q[1] = height
     sim.set_state(q)
+    return sim
+
+
+def test_energy_from_nowhere_is_noticed_and_a_motors_work_is_not_taken_for_it() -> None:
+    sim, ledger = at_height(5.0, gravity=(0.0, 0.0, 0.0)), Ledger()
     sim.set_wheel_torques(np.full(6, 100.0))
     audit = Audit(sim, ledger)
     assert audit.run(3)
@@ -96,11 +104,8 @@ def test_energy_from_nowhere_is_noticed_and_a_motors_work_is_not_taken_for_it() 
 
 
 def test_what_the_projection_lifts_is_counted_apart() -> None:
-    sim, ledger = Simulation(), Ledger()
-    q = np.zeros(MODEL.nq)
-    q[1] = 0.3
-    sim.set_state(q)
-    assert Audit(sim, ledger, deep=True).run(5)
+    ledger = Ledger()
+    assert Audit(at_height(0.3), ledger, deep=True).run(5)
     # 5 cm of the 1 m that energies are measured by
     assert 0.02 < ledger.lifted < 0.055
     assert ledger.gained < 1e-9
@@ -108,12 +113,9 @@ def test_what_the_projection_lifts_is_counted_apart() -> None:
 
 def test_overlap_counts_once_the_rover_is_out_of_what_it_started_in() -> None:
     terrain = SphereField([[0.0, -10.0, 0.0]], [10.0])
-    q = np.zeros(MODEL.nq)
-    q[1] = 0.3
     for deep in (True, False):
-        sim, ledger = Simulation(terrain=terrain, stabilisation="none"), Ledger()
-        sim.set_state(q)
-        Audit(sim, ledger, deep=deep).run(3)
+        ledger = Ledger()
+        Audit(at_height(0.3, terrain=terrain, stabilisation="none"), ledger, deep=deep).run(3)
         assert (ledger.deepest > 0.01) is not deep
 
 
@@ -146,7 +148,8 @@ def test_a_regime_worse_than_its_bound_complains_with_the_case_that_shows_it() -
 
 def test_the_table_is_written_between_its_marks_and_nothing_else_changes(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n", encoding="utf-8")
+    marks = "<!-- campaign: made by `make torture`, not by hand -->\nold\n<!-- end of campaign -->"
+    page.write_text(f"before\n{marks}\nafter\n", encoding="utf-8")
     ledger = Ledger()
     ledger.merge(Ledger(steps=12, gained=2e-10), 0)
     write([Row(REGIMES[0], ledger)], page)

@@ -21,6 +21,10 @@ from validation.packing import bed, covered
 from validation.repose import slope
 from validation.watch import Ledger
 
+SLOPES = pytest.mark.nightly(
+    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
+)
+
 
 def held(ledger: Ledger) -> None:
     """What must hold in every step."""
@@ -28,9 +32,7 @@ def held(ledger: Ledger) -> None:
     assert [f for f in findings.everywhere({"run": ledger.as_dict()}) if not f.holds] == []
 
 
-@pytest.mark.nightly(
-    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
-)
+@SLOPES
 def test_columns_run_out_the_farther_the_taller_and_nearly_in_proportion() -> None:
     ledger = Ledger()
     runs = [run_out(220, aspect, 0, ledger, rough=True) for aspect in (0.7, 2.0)]
@@ -53,9 +55,7 @@ def test_disks_without_friction_pack_at_random_and_isostatically_those_with_fric
     held(ledger)
 
 
-@pytest.mark.nightly(
-    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
-)
+@SLOPES
 def test_a_slope_stays_the_steeper_the_more_friction() -> None:
     # A bed of so few disks is off by some four degrees: the mean of three.
     ledger = Ledger()
@@ -142,7 +142,7 @@ def test_beverloos_law_is_found_again_in_its_own_points(exponent: float | None) 
 def test_a_number_out_of_its_range_is_marked() -> None:
     inside, outside = (findings.Finding("x", "1", "y", number, 0.9, 1.1) for number in (1.0, float("nan")))
     assert inside.holds
-    assert "**outside**" in outside.row()
+    assert "**outside**" in outside.cells()[-1]
 
 
 @pytest.mark.nightly("tests/physics/grains.rs::balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows")
@@ -179,9 +179,7 @@ def test_a_sphere_sinks_the_deeper_the_faster_it_strikes_balls() -> None:
     assert ledger.overlap < 0.015, "a small sphere in a small bed; the page holds the large ones to 1%"
 
 
-@pytest.mark.nightly(
-    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
-)
+@SLOPES
 def test_columns_of_balls_run_out_and_a_silo_of_them_flows() -> None:
     ledger = Ledger()
     run = ball_collapse.run_out(150, 1.0, 0, ledger)
@@ -192,9 +190,7 @@ def test_columns_of_balls_run_out_and_a_silo_of_them_flows() -> None:
     held(ledger)
 
 
-@pytest.mark.nightly(
-    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
-)
+@SLOPES
 def test_a_drum_carries_balls_up_only_by_friction_or_a_rough_wall() -> None:
     ledger = Ledger()
     options = {"wall": 0.045, "rate": 0.6, "start": 0.42, "turn": 0.3}
@@ -207,9 +203,7 @@ def test_a_drum_carries_balls_up_only_by_friction_or_a_rough_wall() -> None:
     held(ledger)
 
 
-@pytest.mark.nightly(
-    "tests/physics/grains.rs::on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_three_and_a_half"
-)
+@SLOPES
 def test_a_bed_of_balls_without_friction_flows_out_farther() -> None:
     ledger = Ledger()
     low, high = (ball_repose.slope(240, mu, 1, ledger, length=12.0, width=5.0) for mu in (0.0, 0.8))

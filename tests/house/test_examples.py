@@ -15,30 +15,9 @@ from rover_gym.cli import app
 from rover_gym.cli.usage import UsageError
 
 ROOT = Path(__file__).parents[2]
-PAGES = (
-    "README.md",
-    "docs/accuracy.md",
-    "docs/derivatives.md",
-    "docs/economy.md",
-    "docs/exchange.md",
-    "docs/first-steps.md",
-    "docs/grains.md",
-    "docs/identification.md",
-    "docs/models.md",
-    "docs/planar.md",
-    "docs/policies.md",
-    "docs/recording.md",
-    "docs/sensors.md",
-    "docs/solvers.md",
-    "docs/tasks.md",
-    "docs/training.md",
-    "docs/vector.md",
-    "docs/watching.md",
-    "docs/wheel-forces.md",
-    "docs/your-map.md",
-    "docs/several-machines.md",
-    "docs/your-rover.md",
-)
+#: Pages whose blocks build on each other, or need a cluster or a file of measurements.
+TOGETHER = {"cluster.md", "contact-problems.md", "sand.md"}
+PAGES = ["README.md", *(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md") if page.name not in TOGETHER)]
 #: Packages of extras that a block needs if it holds these words.
 EXTRAS = {
     "McapWriter": "mcap",
@@ -48,8 +27,6 @@ EXTRAS = {
     "stable_baselines3": "stable_baselines3",
     "torch_rollout": "torch",
 }
-
-
 #: Blocks of the manual, not of the README or a tutorial, that take long.
 NIGHTLY = {
     "docs/identification.md-1": pytest.mark.nightly("tests/api/test_identification.py::test_the_stated_noise_is_taken"),
@@ -62,7 +39,7 @@ NIGHTLY = {
 
 def blocks() -> list[pytest.param]:
     found = []
-    for page in PAGES:
+    for page in sorted(PAGES):
         text = (ROOT / page).read_text(encoding="utf-8")
         for number, code in enumerate(re.findall(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL), 1):
             name = f"{page}-{number}"

@@ -5,6 +5,7 @@ import runpy
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import scripts_run
@@ -47,22 +48,10 @@ def test_a_whole_run_in_which_a_script_was_not_run_fails(tmp_path: Path) -> None
     environment = {**os.environ, "PYTHONPATH": path, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
 
     def session(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-p",
-            "xdist",
-            "-p",
-            "scripts_run",
-            "-p",
-            "no:cacheprovider",
-            "-q",
-            *arguments,
-        ]
-        return subprocess.run(
-            command, cwd=tmp_path, env=environment, check=False, capture_output=True, text=True, timeout=100
-        )
+        plugins = ["-p", "xdist", "-p", "scripts_run", "-p", "no:cacheprovider", "-q"]
+        command = [sys.executable, "-m", "pytest", *plugins, *arguments]
+        settings: dict[str, Any] = {"capture_output": True, "text": True, "timeout": 100}
+        return subprocess.run(command, cwd=tmp_path, env=environment, check=False, **settings)
 
     whole = session("--numprocesses", "1")
     assert whole.returncode == 1, whole.stderr

@@ -1,6 +1,9 @@
-"""Result of a check."""
+"""Result of a check, and scenes that give results for several methods."""
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import wraps
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -29,3 +32,30 @@ class Finding:
     def holds(self) -> bool:
         """Whether the number is within its limit; a number that is not finite is not."""
         return bool(self.number <= self.limit)
+
+
+#: A finding without its method: scene, expected, number, limit, unit and perhaps how.
+Row = tuple[Any, ...]
+Scene = Callable[..., Iterator[Finding]]
+
+
+def for_each(
+    methods: Mapping[str, Any] | None = None, beside: Mapping[str, Any] | None = None
+) -> Callable[[Callable[..., Iterator[Row]]], Scene]:
+    """Makes a scene for one method a scene for several.
+
+    Args:
+        methods: By name, where the caller gives none.
+        beside: Further ones, always.
+    """
+
+    def decorate(scene: Callable[..., Iterator[Row]]) -> Scene:
+        @wraps(scene)
+        def of_each(given: Mapping[str, Any] | None = methods, **options: Any) -> Iterator[Finding]:
+            for name, method in {**(given or {}), **(beside or {})}.items():
+                for title, expected, *rest in scene(method, **options):
+                    yield Finding(title, expected, name, *rest)
+
+        return of_each
+
+    return decorate

@@ -6,6 +6,7 @@ little in these scenes, so inertia is taken about the axes of the world.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,40 +17,22 @@ Array = npt.NDArray[np.float64]
 #: W, q, mu, last impulses -> impulses (n, d), whether it converged, iterations.
 Solver = Callable[[Array, Array, Array, Array | None], tuple[Array, bool, int]]
 G = 9.81  # m/s²; here z is up, as where these scenes come from
+UP = (0.0, 0.0, 1.0)
 
 
 def ours(name: str, tolerance: float = 1e-12, dimension: int = 3, max_iterations: int = 1000) -> Solver:
-    """This project's solver of a name; `max_iterations` are sweeps of "nsgs" and steps of "newton"."""
+    """This project's solver of a name; `max_iterations` are sweeps of "nsgs" and steps of "newton".
+
+    "relaxed" solves the convex law (no mu |u_T| in the normal row), as convex engines do.
+    """
 
     def solve(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array, bool, int]:
-        answer = solve_friction_contact(
-            W,
-            q,
-            mu,
-            tolerance,
-            dimension=3 if dimension == 3 else 2,
-            solver=name,
-            initial=initial,  # type: ignore[arg-type]
-            max_iterations=max_iterations,
-        )
-        return answer.impulses, answer.report.is_converged, answer.report.iterations
+        options: dict[str, Any] = {"dimension": dimension, "solver": name, "max_iterations": max_iterations}
+        answer = solve_friction_contact(W, q, mu, tolerance, initial=initial, **options)
+        report = answer.report
+        return answer.impulses, report.status in ("converged", "relaxed"), report.iterations
 
     return solve
-
-
-def relaxed(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array, bool, int]:  # noqa: ARG001
-    """The convex law (no mu |u_T| in the normal row), by projected gradient steps: what convex engines solve."""
-    n = len(mu)
-    p = np.zeros((n, 3))
-    step = 1.0 / np.linalg.eigvalsh(W).max()
-    for iteration in range(20_000):
-        new = p - step * (W @ p.ravel() + q).reshape(n, 3)
-        for k in range(n):
-            new[k] = onto_cone(new[k], mu[k])
-        change, p = np.abs(new - p).max(), new
-        if change <= 1e-13 * max(np.abs(p).max(), 1e-300):
-            return p, True, iteration
-    return p, False, 20_000
 
 
 @dataclass
@@ -85,17 +68,6 @@ class Spring:
         self.gaps = self.gaps + h * u[::3]
 
 
-def onto_cone(p: Array, mu: float) -> Array:
-    """Projection onto Coulomb's cone."""
-    size = float(np.hypot(p[1], p[2]))
-    if size <= mu * p[0]:
-        return p
-    if mu * size <= -p[0]:
-        return np.zeros(3)
-    normal = (p[0] + mu * size) / (1.0 + mu * mu)
-    return np.array([normal, *(p[1:] * (mu * normal / size))])
-
-
 @dataclass
 class Contact:
     """Between body `a` (the normal points to it) and body `b`, or the ground where b is -1."""
@@ -109,30 +81,30 @@ class Contact:
 
 @dataclass
 class World:
-    """Bodies by mass, (3,) inertia, place and velocity (linear and angular)."""
+    """Bodies by place, mass and (3,) inertia, where one number holds for all; `v` (n, 6) is linear and angular."""
 
-    masses: Array
-    inertias: Array
     places: Array
     contacts: Callable[["World"], list[Contact]]
-    h: float
+    masses: Array | float = 1.0
+    inertias: Array | float = 1.0
+    h: float = 1e-3  # s
     restitution: float = 0.0
     forces: Array | None = None
     gravity: float = G
-    v: Array = field(default_factory=lambda: np.zeros(0))
     impulses: Array = field(default_factory=lambda: np.zeros((0, 3)))
     converged: bool = True
     iterations: int = 0
 
     def __post_init__(self) -> None:
-        if self.v.size == 0:
-            self.v = np.zeros((len(self.masses), 6))
+        self.places = np.array(self.places, dtype=float)
+        n = len(self.places)
+        self.masses = np.broadcast_to(self.masses, n)
+        self.inertias = np.broadcast_to(self.inertias, (n, 3))
+        self.v = np.zeros((n, 6))
 
     def inverse_masses(self) -> Array:
         """(6 n,) of the diagonal mass matrix."""
-        return np.concatenate(
-            [np.concatenate([np.full(3, 1.0 / m), 1.0 / J]) for m, J in zip(self.masses, self.inertias, strict=True)]
-        )
+        return 1.0 / np.column_stack([*[self.masses] * 3, self.inertias]).ravel()
 
     def jacobian(self, contacts: list[Contact]) -> Array:
         """(3 n_c, 6 n) local velocities from body velocities."""
@@ -149,7 +121,7 @@ class World:
                     H[3 * k : 3 * k + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(r, frame)
         return H
 
-    def step(self, solver: Solver | Spring, *, warm: bool = True) -> None:
+    def step(self, solver: Solver | Spring) -> None:
         """One step, theta = 1/2."""
         h = self.h
         free = self.v.copy()
@@ -166,7 +138,7 @@ class World:
             else:
                 q = H @ free.ravel()
                 q[::3] += self.restitution * np.minimum(before[::3], 0.0)
-                initial = self.impulses.ravel() if warm and len(self.impulses) == len(contacts) else None
+                initial = self.impulses.ravel() if len(self.impulses) == len(contacts) else None
                 self.impulses, converged, iterations = solver((H * inverse) @ H.T, q, mu, initial)
                 self.converged &= converged
                 self.iterations += iterations
@@ -190,22 +162,15 @@ def corners(size: Sequence[float]) -> list[tuple[float, float]]:
     return [(sx * size[0] / 2.0, sy * size[1] / 2.0) for sx in (-1, 1) for sy in (-1, 1)]
 
 
-def stack(
-    masses: Sequence[float], h: float, friction: Sequence[float], size: Sequence[float] = (0.2, 0.2, 0.2)
-) -> World:
+def stack(masses: Sequence[float], friction: Sequence[float], size: Sequence[float] = (0.2, 0.2, 0.2)) -> World:
     """Boxes on each other, four contacts between neighbours; `friction` from the ground up."""
-    n = len(masses)
 
     def contacts(world: World) -> list[Contact]:
-        found = []
-        for level in range(n):
-            x, y, _ = world.places[level]
-            found += [
-                Contact(level, level - 1, (x + cx, y + cy, level * size[2]), (0.0, 0.0, 1.0), friction[level])
-                for cx, cy in corners(size)
-            ]
-        return found
+        return [
+            Contact(level, level - 1, (x + cx, y + cy, level * size[2]), UP, friction[level])
+            for level, (x, y, _) in enumerate(world.places)
+            for cx, cy in corners(size)
+        ]
 
-    places = np.array([(0.0, 0.0, (level + 0.5) * size[2]) for level in range(n)])
-    inertias = np.array([box_inertia(m, size) for m in masses])
-    return World(np.array(masses, dtype=float), inertias, places, contacts, h)
+    places = [(0.0, 0.0, (level + 0.5) * size[2]) for level in range(len(masses))]
+    return World(np.array(places), contacts, np.array(masses), np.array([box_inertia(m, size) for m in masses]))

@@ -8,6 +8,7 @@ import numpy as np
 
 from comparison.mujoco_rover import contact_radius, principal_inertia
 from comparison.scene import Array, Phase, RoverScene
+from rover_gym.core.rotations import quaternions, rotation_matrix
 
 
 class LeftOut(Exception):  # noqa: N818 - no error: the chart has a gap there
@@ -57,9 +58,19 @@ class Variant:
     engine: str
     name: str
     build: Callable[[RoverScene, float], Runner]
-    settings: str
-    differs: str
+    settings: str = ""
+    differs: str = ""
     best: bool = True
+
+    @property
+    def key(self) -> dict[str, str]:
+        """Engine and name, as files of results have them."""
+        return {"engine": self.engine, "variant": self.name}
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What files of results say about the variant."""
+        return self.key | {"settings": self.settings, "differs": self.differs, "best": self.best}
 
 
 @dataclass(frozen=True)
@@ -115,29 +126,10 @@ def held(scene: RoverScene, body: Body) -> bool:
 
 def rotation_of(q: Array) -> Array:
     """(3, 3) attitude of public coordinates: Ry(q4) Rz(q5) Rx(q3)."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(q[3:6]), np.sin(q[3:6])
-    Rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    Ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    Rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return np.asarray(Ry @ Rz @ Rx)
+    about_x, about_y, about_z = map(rotation_matrix, np.diag(q[3:6]))
+    return about_y @ about_z @ about_x
 
 
-def quaternion_of(R: Array) -> Array:
-    """(4,) w, x, y, z of a rotation matrix."""
-    w = np.sqrt(max(1.0 + R[0, 0] + R[1, 1] + R[2, 2], 0.0)) / 2.0
-    if w > 1e-6:
-        x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-        return np.array([w, x / (4 * w), y / (4 * w), z / (4 * w)])
-    axis = np.sqrt(np.maximum((np.diag(R) + 1.0) / 2.0, 0.0))
-    i = int(np.argmax(axis))
-    axis = np.where(np.arange(3) == i, axis, (R[i] + R[:, i]) / (4.0 * axis[i]))
-    return np.array([w, *axis])
-
-
-def turn_z_to(normal: Array) -> Array:
-    """A rotation that takes the z axis to a unit vector: engines lay planes with their normal along z."""
-    n = normal / np.linalg.norm(normal)
-    helper = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    x = np.cross(helper, n)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(n, x), n])
+def quaternion_of(q: Array) -> Array:
+    """(4,) w, x, y, z of the attitude of public coordinates."""
+    return quaternions(rotation_of(q))

@@ -5,6 +5,7 @@ implicit PD would have without load, and is stiff against load; the steering's l
 """
 
 import tempfile
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,19 +14,32 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
+from comparison.mujoco_rover import HALF_WIDTH, text_of
+from comparison.peers.base import Variant, bodies, held, quaternion_of
 from comparison.peers.grid import corners, middle, triangles, wavefront
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
 
-HALF_WIDTH = 0.002  # m, where a wheel must not be a sphere
 SERVO_TORQUE = 1e6  # N m
 #: Distance at which Bullet drops a contact of the last step, its default; the last world that sets it sets it for all.
 CONTACT_THRESHOLD = 0.02  # m
 
 
-def _text(values: Array) -> str:
-    return " ".join(repr(float(v)) for v in values)
+def new_client(gravity: Sequence[float], time_step: float, *, iterations: int = 50, **more: float) -> BulletClient:
+    """A world whose impulses take so many iterations and no shortcuts."""
+    c = BulletClient(pybullet.DIRECT)
+    c.setGravity(*gravity)
+    exact = {"numSubSteps": 0, "solverResidualThreshold": 0.0, "restitutionVelocityThreshold": 0.0}
+    c.setPhysicsEngineParameter(fixedTimeStep=time_step, numSolverIterations=iterations, **exact, **more)
+    return c
+
+
+def set_contact(c: BulletClient, body: int, friction: float, restitution: float = 0.0) -> None:
+    """Friction and restitution of a body, and no damping: Bullet multiplies those of the two that touch."""
+    # one call each: a combined call left the friction at its default
+    c.changeDynamics(body, -1, restitution=restitution)
+    c.changeDynamics(body, -1, lateralFriction=friction)
+    c.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
 
 
 def description(scene: RoverScene) -> str:
@@ -35,7 +49,7 @@ def description(scene: RoverScene) -> str:
     for body in all_bodies:
         link = ElementTree.SubElement(root, "link", name=body.name)
         inertial = ElementTree.SubElement(link, "inertial")
-        ElementTree.SubElement(inertial, "origin", xyz=_text(body.centre), rpy="0 0 0")
+        ElementTree.SubElement(inertial, "origin", xyz=text_of(body.centre), rpy="0 0 0")
         ElementTree.SubElement(inertial, "mass", value=repr(body.mass))
         ixx, iyy, izz = (repr(float(v)) for v in body.inertia)
         ElementTree.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
@@ -47,8 +61,8 @@ def description(scene: RoverScene) -> str:
                 ElementTree.SubElement(geometry, "sphere", radius=repr(body.radius))
         if body.parent >= 0:
             joint = ElementTree.SubElement(root, "joint", name=body.name, type="continuous")
-            ElementTree.SubElement(joint, "origin", xyz=_text(body.position), rpy="0 0 0")
-            ElementTree.SubElement(joint, "axis", xyz=_text(body.axis))
+            ElementTree.SubElement(joint, "origin", xyz=text_of(body.position), rpy="0 0 0")
+            ElementTree.SubElement(joint, "axis", xyz=text_of(body.axis))
             ElementTree.SubElement(joint, "parent", link=all_bodies[body.parent].name)
             ElementTree.SubElement(joint, "child", link=body.name)
     return ElementTree.tostring(root, encoding="unicode")
@@ -92,17 +106,8 @@ class BulletRunner:
         as_mesh: bool = False,
         contact_threshold: float = CONTACT_THRESHOLD,
     ) -> None:
-        self.client = BulletClient(pybullet.DIRECT)
-        c = self.client
-        c.setGravity(*scene.gravity)
-        c.setPhysicsEngineParameter(
-            fixedTimeStep=time_step,
-            numSolverIterations=iterations,
-            numSubSteps=0,
-            solverResidualThreshold=0.0,
-            restitutionVelocityThreshold=0.0,
-            contactBreakingThreshold=contact_threshold,
-        )
+        more = {"iterations": iterations, "contactBreakingThreshold": contact_threshold}
+        self.client = c = new_client(scene.gravity, time_step, **more)
         grounds = []
         if scene.normal is not None:
             n = np.array(scene.normal) / np.linalg.norm(scene.normal)
@@ -116,7 +121,7 @@ class BulletRunner:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "rover.urdf"
             path.write_text(description(scene), encoding="utf-8")
-            w, x, y, z = quaternion_of(rotation_of(scene.q))
+            w, x, y, z = quaternion_of(scene.q)
             self.rover = c.loadURDF(str(path), list(scene.q[:3]), [x, y, z, w], flags=c.URDF_USE_INERTIA_FROM_FILE)
         for ground in grounds:
             c.changeDynamics(ground, -1, lateralFriction=1.0)  # Bullet multiplies the two

@@ -17,6 +17,7 @@ from pydrake.geometry import (
     InMemoryMesh,
     Mesh,
     ProximityProperties,
+    Shape,
     Sphere,
 )
 from pydrake.math import RigidTransform, RotationMatrix
@@ -31,21 +32,20 @@ from pydrake.multibody.tree import (
     FixedOffsetFrame,
     PdControllerGains,
     RevoluteJoint,
+    RigidBody,
     RotationalInertia,
     SpatialInertia,
 )
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from comparison.peers.base import LeftOut, Variant, bodies, held, rotation_of, turn_z_to
+from comparison.mujoco_rover import HALF_WIDTH
+from comparison.peers.base import LeftOut, Variant, bodies, held, rotation_of
 from comparison.peers.grid import corners, triangles, wavefront
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
 
-HALF_WIDTH = 0.002  # m, where a wheel must not be a sphere
 GROUND = 500.0  # m, edge of the box that is the plane: a half-space with many spheres beside it crashed
-
-
 #: A sphere's pressure field: tetrahedra of this share of its radius, and a modulus.
 TETRAHEDRON, MODULUS = 0.1, 1e8  # 1, Pa
 #: Registering prisms takes time with the square of their number: these take ten seconds.
@@ -77,7 +77,7 @@ def hydroelastic(friction: float, radius: float | None = None) -> ProximityPrope
 
 def add_plane(plant: MultibodyPlant, normal: Array, properties: ProximityProperties, *, is_hydroelastic: bool) -> None:
     """The plane through the origin: a half-space, or in point contact a large box."""
-    turn = RotationMatrix(turn_z_to(normal))
+    turn = RotationMatrix.MakeFromOneVector(normal, axis_index=2)
     pose, shape = RigidTransform(turn, -5.0 * normal), Box(GROUND, GROUND, 10.0)
     if is_hydroelastic:
         pose, shape = RigidTransform(turn, np.zeros(3)), HalfSpace()
@@ -106,7 +106,47 @@ def add_map(
         plant.RegisterCollisionGeometry(world, RigidTransform(centre), prism, f"prism{k}", properties)
 
 
-class DrakeRunner:
+def add_body(
+    plant: MultibodyPlant, name: str, mass: float, inertia: Array, shape: Shape, properties: ProximityProperties
+) -> RigidBody:
+    """A free body about its mass centre, from its (3,) principal moments."""
+    moments = RotationalInertia(*inertia.tolist())
+    body = plant.AddRigidBody(name, SpatialInertia.MakeFromCentralInertia(mass, np.zeros(3), moments))
+    plant.RegisterCollisionGeometry(body, RigidTransform(), shape, name, properties)
+    return body
+
+
+class DrakePlant:
+    """A `MultibodyPlant` that steps: discrete with an approximation, else continuous."""
+
+    def __init__(
+        self,
+        gravity: tuple[float, float, float],
+        time_step: float,
+        approximation: DiscreteContactApproximation | None,
+        *,
+        is_hydroelastic: bool = False,
+    ) -> None:
+        self.h, self.steps, self.builder = time_step, 0, DiagramBuilder()
+        self.plant, self.graph = AddMultibodyPlantSceneGraph(self.builder, time_step if approximation else 0.0)
+        self.plant.set_contact_model(ContactModel.kHydroelastic if is_hydroelastic else ContactModel.kPoint)
+        if approximation:
+            self.plant.set_discrete_contact_approximation(approximation)
+        self.plant.mutable_gravity_field().set_gravity_vector(np.array(gravity))
+
+    def finish(self) -> None:
+        """After all bodies are there: makes simulator and context."""
+        if not self.plant.is_finalized():
+            self.plant.Finalize()
+        self.simulator = Simulator(self.builder.Build())
+        self.context = self.plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+
+    def advance(self, steps: int) -> None:
+        self.steps += steps
+        self.simulator.AdvanceTo(self.steps * self.h)
+
+
+class DrakeRunner(DrakePlant):
     """A discrete plant behind the common interface."""
 
     def __init__(
@@ -119,12 +159,8 @@ class DrakeRunner:
         dissipation: float = 50.0,
         is_hydroelastic: bool = False,
     ) -> None:
-        self.h = time_step
-        builder = DiagramBuilder()
-        plant, graph = AddMultibodyPlantSceneGraph(builder, time_step)
-        plant.set_contact_model(ContactModel.kHydroelastic if is_hydroelastic else ContactModel.kPoint)
-        plant.set_discrete_contact_approximation(approximation)
-        plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
+        super().__init__(scene.gravity, time_step, approximation, is_hydroelastic=is_hydroelastic)
+        plant = self.plant
         properties = of_ground = material(scene.friction, stiffness, dissipation)
         if is_hydroelastic:
             of_ground = hydroelastic(scene.friction)
@@ -161,13 +197,9 @@ class DrakeRunner:
                     actuator.set_controller_gains(PdControllerGains(p=body.hold[0], d=body.hold[1]))
                 self.actuators.append((i, actuator))
         plant.Finalize()
-        manager = graph.collision_filter_manager()
         rover = GeometrySet([g for s in solids for g in plant.GetCollisionGeometriesForBody(s)])
-        manager.Apply(CollisionFilterDeclaration().ExcludeWithin(rover))
-        diagram = builder.Build()
-        self.plant = plant
-        self.simulator = Simulator(diagram)
-        self.context = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+        self.graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(rover))
+        self.finish()
         self.trunk = solids[0]
         pose = RigidTransform(RotationMatrix(rotation_of(scene.q)), scene.q[:3])
         plant.SetFreeBodyPose(self.context, self.trunk, pose)
@@ -179,7 +211,6 @@ class DrakeRunner:
         self.start = {i: scene.q[5 + i] for _, i in self.held}
         self.command(Phase(0.0))
         self.simulator.Initialize()
-        self.time = 0.0
 
     def command(self, phase: Phase) -> None:
         torques = np.zeros(len(self.actuators))
@@ -194,10 +225,6 @@ class DrakeRunner:
             desired[place[i]] = phase.steering[body.steers] if body.steers >= 0 else self.start[i]
         self.plant.get_actuation_input_port(self.instance).FixValue(self.context, torques)
         self.plant.get_desired_state_input_port(self.instance).FixValue(self.context, desired)
-
-    def advance(self, steps: int) -> None:
-        self.time += steps * self.h
-        self.simulator.AdvanceTo(self.time)
 
     def position(self) -> Array:
         return np.array(self.plant.EvalBodyPoseInWorld(self.context, self.trunk).translation())

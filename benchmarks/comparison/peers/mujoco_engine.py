@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from comparison.mujoco_rover import rover_xml
-from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
+from comparison.peers.base import Variant, bodies, held, quaternion_of
 from comparison.peers.grid import middle
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
@@ -85,7 +85,7 @@ class MuJoCoRunner:
         self.data = mujoco.MjData(self.model)
         self.bodies = bodies(scene.machine)
         self.data.qpos[:3] = scene.q[:3]
-        self.data.qpos[3:7] = quaternion_of(rotation_of(scene.q))
+        self.data.qpos[3:7] = quaternion_of(scene.q)
         for i, body in enumerate(self.bodies[1:], 1):
             self.data.qpos[self.model.joint(body.name).qposadr[0]] = scene.q[5 + i]
             if held(scene, body):

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 
-from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
+from comparison.peers.base import Variant, bodies, held, quaternion_of
 from comparison.peers.contacts import contacts
 from comparison.scene import Array, Phase, RoverScene
 
@@ -28,7 +28,7 @@ class PinocchioRunner:
         self._add(0)
         self.data = self.model.createData()
         self.q = pin.neutral(self.model)
-        w, x, y, z = quaternion_of(rotation_of(scene.q))
+        w, x, y, z = quaternion_of(scene.q)
         self.q[:7] = [*scene.q[:3], x, y, z, w]
         self.v = np.zeros(self.model.nv)
         self.stiffness, self.damping = np.zeros(self.model.nv), np.zeros(self.model.nv)

@@ -5,9 +5,7 @@ and contact Jacobians there are this project's, through the same compiled module
 mechanics, which assembles the rover in Python too, is slower.
 """
 
-import json
 import os
-import subprocess
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,25 +14,14 @@ import numpy as np
 
 from comparison.peers.base import LeftOut, Variant
 from comparison.scene import Array, Phase, RoverScene
+from comparison.worker import Worker, says
 from rover_gym import _core
 
 SYSTEM_PYTHON = "/usr/bin/python3"
-CHILD = Path(__file__).with_name("siconos_child.py")
+COMMAND = [SYSTEM_PYTHON, str(Path(__file__).with_name("siconos_child.py")), str(_core.__file__)]
 
-
-def _check() -> None:
-    try:
-        probe = subprocess.run(
-            [SYSTEM_PYTHON, str(CHILD), str(_core.__file__), "--probe"], capture_output=True, text=True, check=False
-        )
-    except OSError as error:
-        raise ImportError(str(error)) from None
-    if probe.returncode != 0:
-        lines = probe.stderr.strip().splitlines() or ["it ended without a word"]
-        raise ImportError(f"Siconos in {SYSTEM_PYTHON}: {lines[-1]}")
-
-
-_check()
+if reason := says([*COMMAND, "--probe"]):
+    raise ImportError(f"Siconos in {SYSTEM_PYTHON}: {reason}")
 
 
 class SiconosRunner:
@@ -43,13 +30,7 @@ class SiconosRunner:
     def __init__(self, scene: RoverScene, time_step: float, *, tolerance: float) -> None:
         if len(scene.spheres):
             raise LeftOut("only one contact a wheel: no scenes of spheres")
-        self.child = subprocess.Popen(
-            [SYSTEM_PYTHON, str(CHILD), str(_core.__file__)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-        )
+        self.worker = Worker(COMMAND, env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"})
         start = {
             "machine": scene.machine,
             "normal": scene.normal,
@@ -63,14 +44,9 @@ class SiconosRunner:
         self.state = self._ask(start)
 
     def _ask(self, message: dict[str, Any]) -> dict[str, Any]:
-        if self.child.stdin is None or self.child.stdout is None:
-            raise RuntimeError("no pipe to Siconos")
-        self.child.stdin.write(json.dumps(message) + "\n")
-        self.child.stdin.flush()
-        line = self.child.stdout.readline()
-        if not line:
-            raise RuntimeError(f"Siconos ended with {self.child.wait()}")
-        answer: dict[str, Any] = json.loads(line)
+        answer = self.worker.ask(message)
+        if answer is None:
+            raise RuntimeError(f"Siconos ended with {self.worker.child.wait()}")
         return answer
 
     def command(self, phase: Phase) -> None:
@@ -94,11 +70,8 @@ class SiconosRunner:
         return float(self.state["cpu"])
 
     def __del__(self) -> None:
-        child = getattr(self, "child", None)
-        if child is not None and child.stdin is not None and child.stdout is not None:
-            child.stdin.close()
-            child.stdout.close()
-            child.wait()
+        if hasattr(self, "worker"):
+            self.worker.close()
 
 
 VARIANTS = (

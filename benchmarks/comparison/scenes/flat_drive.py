@@ -7,8 +7,7 @@ three engines end 12.585 m ahead and 18.770 m to the right of where they started
 
 import numpy as np
 
-from comparison.scene import SAMPLE, Array, Phase, RoverScene, Trace
-from rover_gym import RoverModel
+from comparison.scene import SAMPLE, Array, Phase, RoverScene, Trace, distance, rigid
 
 #: Displacement (m) along and across the start's heading at the end: three engines at 0.1 ms.
 END = (12.585, 18.770)
@@ -17,7 +16,7 @@ REST = 2.0  # s
 
 def machine() -> dict[str, object]:
     """The rover of the independent check."""
-    description = RoverModel().replace(contact_radius=0.20, wheel_stiffness=0.0, motor=None).to_dict()
+    description = rigid(contact_radius=0.20)
     for solid in description["solids"]:
         if solid["name"].startswith("steering"):
             solid["hold"] = {"stiffness": 15_000.0, "damping": 15_000.0}
@@ -47,5 +46,4 @@ def driven(trace: Trace) -> Array:
 
 def error(trace: Trace, reference: Array) -> float:
     """Root mean square over the drive of the distance from the reference path, m."""
-    path = driven(trace)
-    return float(np.sqrt(np.mean(np.sum((path - reference) ** 2, axis=1))))
+    return distance(driven(trace), reference)

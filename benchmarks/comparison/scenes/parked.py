@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from comparison.scene import Array, Phase, RoverScene, Trace
-from rover_gym import RoverModel
+from comparison.scene import Array, Phase, RoverScene, Trace, rigid
 
 WINDOW = 5.0  # s, the end of the run, over which the creep is measured
 
@@ -18,7 +17,7 @@ def scene(degrees: float = 30.0, duration: float = 10.0) -> RoverScene:
     return RoverScene(
         name="parked",
         title=f"parked on {degrees:g} degrees",
-        machine=RoverModel().replace(wheel_stiffness=0.0, motor=None).to_dict(),
+        machine=rigid(),
         q=q,
         phases=(Phase(duration),),
         normal=(-math.sin(a), math.cos(a), 0.0),

@@ -6,9 +6,9 @@ drop; the path still converges. Reference: this project's Newton variant at a st
 
 import numpy as np
 
-from comparison.scene import Phase, RoverScene
+from comparison.scene import Phase, RoverScene, rigid
 from comparison.scenes.rug import error
-from rover_gym import RoverModel, SphereField
+from rover_gym import SphereField
 
 __all__ = ["error", "scene"]
 
@@ -23,7 +23,7 @@ def scene() -> RoverScene:
     return RoverScene(
         name="rocks",
         title="7 s over small rocks",
-        machine=RoverModel().replace(contact_radius=0.20, wheel_stiffness=0.0, motor=None).to_dict(),
+        machine=rigid(contact_radius=0.20),
         q=q,
         phases=(Phase(1.0), Phase(6.0, torques=(20.0,) * 6)),
         spheres=np.column_stack([field.centres, field.radii]),

@@ -7,7 +7,7 @@ variant at a step of 0.05 ms.
 
 import numpy as np
 
-from comparison.scene import Array, Phase, RoverScene, Trace
+from comparison.scene import Array, Phase, RoverScene, Trace, distance
 from rover_gym import SphereField
 from rover_gym.scenes import sphere_rug
 from rover_gym.scenes.report_scenes import FRONT_STEERING, GRAVITY, report_model
@@ -37,4 +37,4 @@ def scene() -> RoverScene:
 
 def error(trace: Trace, reference: Array) -> float:
     """Root mean square distance of the trunk's path from the reference, m."""
-    return float(np.sqrt(np.mean(np.sum((trace.positions - reference) ** 2, axis=1))))
+    return distance(trace.positions, reference)

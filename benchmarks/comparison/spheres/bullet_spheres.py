@@ -1,9 +1,8 @@
 """Bullet: rigid bodies in maximal coordinates, 50 iterations, damping and sleeping off."""
 
 import numpy as np
-import pybullet
-from pybullet_utils.bullet_client import BulletClient
 
+from comparison.peers.bullet import new_client, set_contact
 from comparison.spheres.scene import Array, FreeScene, G
 
 #: Of the spheres in a scene with a slab: Bullet multiplies the frictions of the two that touch.
@@ -14,15 +13,7 @@ class BulletSpheres:
     """`stepSimulation`."""
 
     def __init__(self, scene: FreeScene, time_step: float) -> None:
-        self.client = c = BulletClient(pybullet.DIRECT)
-        c.setGravity(0.0, -G, 0.0)
-        c.setPhysicsEngineParameter(
-            fixedTimeStep=time_step,
-            numSolverIterations=50,
-            numSubSteps=0,
-            solverResidualThreshold=0.0,
-            restitutionVelocityThreshold=0.0,
-        )
+        self.client = c = new_client((0.0, -G, 0.0), time_step)
         plane = c.createMultiBody(0, c.createCollisionShape(c.GEOM_PLANE, planeNormal=[0, 1, 0]))
         shape = c.createCollisionShape(c.GEOM_SPHERE, radius=scene.radius)
         self.bodies = [
@@ -38,10 +29,7 @@ class BulletSpheres:
             frictions = dict.fromkeys(self.bodies, BALL)
             frictions |= {self.bodies[-1]: self.slab.friction / BALL, plane: scene.friction * BALL / self.slab.friction}
         for body, friction in frictions.items():
-            # It multiplies the restitutions, too.
-            c.changeDynamics(body, -1, restitution=scene.restitution)
-            c.changeDynamics(body, -1, lateralFriction=friction)
-            c.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
+            set_contact(c, body, friction, scene.restitution)
 
     def push(self) -> None:
         self.is_pushed = self.slab is not None

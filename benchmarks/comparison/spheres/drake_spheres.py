@@ -9,29 +9,17 @@ from functools import partial
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.geometry import (
-    Box,
-    CollisionFilterDeclaration,
-    GeometrySet,
-    Sphere,
-)
+from pydrake.geometry import Box, CollisionFilterDeclaration, GeometrySet, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.plant import (
-    AddMultibodyPlantSceneGraph,
-    ContactModel,
-    DiscreteContactApproximation,
-    ExternallyAppliedSpatialForce,
-)
-from pydrake.multibody.tree import RotationalInertia, SpatialInertia
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.multibody.plant import DiscreteContactApproximation, ExternallyAppliedSpatialForce
+from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 
 from comparison.peers.base import LeftOut
+from comparison.peers.drake import GROUND, DrakePlant, add_body
 from comparison.peers.drake import material as properties_of
 from comparison.spheres.scene import Array, FreeScene, G
 
-GROUND = 500.0  # m, edge of the box that is the plane
 FOOT = 0.05  # m, radius of a slab's feet
 #: Point stiffness, N/m. Under a slab stiffer is better; in the block 1e8 left more penetration and cost thrice as much.
 STIFFNESS_OF_SLAB, STIFFNESS = 1e8, 1e6
@@ -40,20 +28,11 @@ DISSIPATION = 50.0  # s/m
 RESOLVED, SOFTEST = 0.3, 1e5
 
 
-def _inertia(mass: float, own: Array) -> SpatialInertia:
-    """About the centre of mass from its (3,) principal moments."""
-    return SpatialInertia.MakeFromCentralInertia(mass, np.zeros(3), RotationalInertia(*own.tolist()))
-
-
-class DrakeSpheres:
+class DrakeSpheres(DrakePlant):
     """A `MultibodyPlant` of free bodies: discrete with an approximation, else continuous with Runge-Kutta 3."""
 
     def __init__(
-        self,
-        scene: FreeScene,
-        time_step: float,
-        *,
-        approximation: DiscreteContactApproximation | None,
+        self, scene: FreeScene, time_step: float, *, approximation: DiscreteContactApproximation | None
     ) -> None:
         is_elastic, is_discrete = scene.restitution > 0.0, approximation is not None
         if is_elastic and is_discrete:
@@ -64,53 +43,39 @@ class DrakeSpheres:
         stiffness, dissipation = STIFFNESS_OF_SLAB if slab else STIFFNESS, DISSIPATION
         if not is_discrete:
             stiffness, dissipation = max(scene.mass * (RESOLVED / time_step) ** 2, SOFTEST), 0.0
-        builder = DiagramBuilder()
-        plant, graph = AddMultibodyPlantSceneGraph(builder, time_step if is_discrete else 0.0)
-        plant.set_contact_model(ContactModel.kPoint)
-        if approximation is not None:
-            plant.set_discrete_contact_approximation(approximation)
-        plant.mutable_gravity_field().set_gravity_vector(np.array([0.0, -G, 0.0]))
+        super().__init__((0.0, -G, 0.0), time_step, approximation)
+        plant = self.plant
         # Of two frictions f and g it takes 2 f g/(f + g); stiffnesses act in series.
         ground = properties_of(scene.friction, stiffness, dissipation)
         below = RigidTransform(np.array([0.0, -5.0, 0.0]))
         plant.RegisterCollisionGeometry(plant.world_body(), below, Box(GROUND, 10.0, GROUND), "ground", ground)
         material = properties_of(slab.friction if slab else scene.friction, stiffness, dissipation)
         inertia = np.full(3, 0.4 * scene.mass * scene.radius**2)
-        self.bodies = []
-        for k in range(len(scene.centres)):
-            body = plant.AddRigidBody(f"sphere{k}", _inertia(scene.mass, inertia))
-            plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(scene.radius), f"sphere{k}", material)
-            self.bodies.append(body)
+        self.bodies = [
+            add_body(plant, f"sphere{k}", scene.mass, inertia, Sphere(scene.radius), material)
+            for k in range(len(scene.centres))
+        ]
         if slab is not None:
-            body = plant.AddRigidBody("slab", _inertia(slab.mass, slab.inertia))
-            plant.RegisterCollisionGeometry(body, RigidTransform(), Box(*(2.0 * slab.half)), "slab", material)
-            feet = []
+            body = add_body(plant, "slab", slab.mass, slab.inertia, Box(*(2.0 * slab.half)), material)
             for k, (sx, sz) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)]):
                 corner = np.array([sx * (slab.half[0] - FOOT), FOOT - slab.half[1], sz * (slab.half[2] - FOOT)])
-                feet.append(
-                    plant.RegisterCollisionGeometry(body, RigidTransform(corner), Sphere(FOOT), f"foot{k}", ground)
-                )
+                plant.RegisterCollisionGeometry(body, RigidTransform(corner), Sphere(FOOT), f"foot{k}", ground)
             self.bodies.append(body)
         plant.Finalize()
         if slab is not None:
-            manager = graph.collision_filter_manager()
-            faces = [g for g in plant.GetCollisionGeometriesForBody(self.bodies[-1]) if g not in feet]
             world = GeometrySet(plant.GetCollisionGeometriesForBody(plant.world_body()))
-            manager.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(faces), world))
-        self.plant = plant
-        self.simulator = Simulator(builder.Build())
-        self.context = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+            box = GeometrySet(plant.GetCollisionGeometriesForBody(self.bodies[-1])[:1])  # not its feet
+            apart = CollisionFilterDeclaration().ExcludeBetween(box, world)
+            self.graph.collision_filter_manager().Apply(apart)
+        self.finish()
         places = [*scene.centres, *([slab.centre] if slab else [])]
         for body, place in zip(self.bodies, places, strict=True):
             plant.SetFreeBodyPose(self.context, body, RigidTransform(place))
         self.slab = slab
         if not is_discrete:
-            config = SimulatorConfig(
-                integration_scheme="runge_kutta3", max_step_size=time_step, use_error_control=False
-            )
-            ApplySimulatorConfig(config, self.simulator)
+            fixed = {"max_step_size": time_step, "use_error_control": False}
+            ApplySimulatorConfig(SimulatorConfig(integration_scheme="runge_kutta3", **fixed), self.simulator)
         self.simulator.Initialize()
-        self.h, self.time = time_step, 0.0
 
     def push(self) -> None:
         if self.slab is not None:
@@ -119,10 +84,6 @@ class DrakeSpheres:
             force.F_Bq_W = SpatialForce(np.zeros(3), self.slab.push)
             port = self.plant.get_applied_spatial_force_input_port()
             port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]]([force]))
-
-    def advance(self, steps: int) -> None:
-        self.time += steps * self.h
-        self.simulator.AdvanceTo(self.time)
 
     def state(self) -> tuple[Array, Array]:
         at = self.context

@@ -4,6 +4,7 @@ from functools import partial
 
 import mujoco
 
+from comparison.mujoco_rover import text_of
 from comparison.peers.base import LeftOut
 from comparison.spheres.scene import Array, FreeScene, G
 
@@ -20,10 +21,10 @@ class MuJoCoSpheres:
         cone = 'cone="elliptic" impratio="100"' if is_stiff else ""
         on_slab = f'friction="{slab.friction!r}" priority="1"' if slab else ""
         sphere = f'<freejoint/><geom type="sphere" size="{scene.radius!r}" mass="{scene.mass!r}" {on_slab}/>'
-        bodies = "".join(f'<body pos="{_text(x)}">{sphere}</body>' for x in scene.centres)
+        bodies = "".join(f'<body pos="{text_of(x)}">{sphere}</body>' for x in scene.centres)
         if slab is not None:
-            box = f'<freejoint/><geom type="box" size="{_text(slab.half)}" mass="{slab.mass!r}"/>'
-            bodies += f'<body pos="{_text(slab.centre)}">{box}</body>'
+            box = f'<freejoint/><geom type="box" size="{text_of(slab.half)}" mass="{slab.mass!r}"/>'
+            bodies += f'<body pos="{text_of(slab.centre)}">{box}</body>'
         self.model = mujoco.MjModel.from_xml_string(
             f'<mujoco><option timestep="{time_step!r}" gravity="0 {-G} 0" {cone}/><size memory="200M"/>'
             f'<default><geom condim="{condim}" friction="{scene.friction!r}" {solref}/></default><worldbody>'
@@ -41,10 +42,6 @@ class MuJoCoSpheres:
 
     def state(self) -> tuple[Array, Array]:
         return self.data.qpos.reshape(-1, 7)[:, :3].copy(), self.data.qvel.reshape(-1, 6)[:, :3].copy()
-
-
-def _text(x: Array) -> str:
-    return " ".join(repr(float(value)) for value in x)
 
 
 VARIANTS = {

@@ -1,12 +1,9 @@
 """The tables of `docs/tables/comparison.md` that are made from `spheres.json`."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from comparison.output import between
-
-BEGIN, END = "<!-- spheres: made by `make chart`, not by hand -->", "<!-- end of spheres -->"
+from reports import measured, table
 
 
 @dataclass(frozen=True)
@@ -50,36 +47,36 @@ PUBLISHED: dict[str, dict[str, tuple[float, float | None]]] = {
 
 def tables(data: dict[str, Any]) -> str:
     """Markdown of errors and costs."""
-    lines = []
+    parts = []
     for scene, error in ERRORS.items():
         own = [p for p in data["points"] if p["scene"] == scene]
         steps = sorted({p["step"] for p in own}, reverse=True)
         if not own:
             continue
-        lines += [
-            f"**{scene}**: {error.label}, and CPU time of a step",
-            "",
-            "| engine | " + " | ".join(f"{1e3 * h:g} ms" for h in steps) + " |",
-            "|---" * (len(steps) + 1) + "|",
-        ]
-        for engine, variant in dict.fromkeys((p["engine"], p["variant"]) for p in own):
+        lines = []
+        for engine, variant in dict.fromkeys((p["engine"], p["variant"]) for p in own if error.key in p):
             row = {p["step"]: p for p in own if (p["engine"], p["variant"]) == (engine, variant)}
-            if not any(error.key in p for p in row.values()):
-                continue
-            cells = [
-                f"{p[error.key]:.1e}, {p['us_per_step']:.0f} us" if error.key in p else "-"
-                for p in (row.get(h, {}) for h in steps)
-            ]
-            lines.append(f"| {engine}, {variant} | " + " | ".join(cells) + " |")
+            found = [row.get(step, {}) for step in steps]
+            cells = [f"{p[error.key]:.1e}, {p['us_per_step']:.0f} us" if error.key in p else "-" for p in found]
+            lines.append([f"{engine}, {variant}", *cells])
         for engine, (value, cost) in PUBLISHED.get(scene, {}).items():
             cell = f"{value:.1e}" + (f", {cost:.0f} us" if cost else "")
-            lines.append(f"| {engine}, *published* | " + "- | " * (len(steps) - 1) + f"{cell} |")
-        lines.append("")
-    packages = ", ".join(f"{name} {version}" for name, version in data["meta"]["packages"].items())
-    lines.append(f"Measured with `make chart` on {data['meta']['processor']}, shared with other work; {packages}.")
-    return "\n".join(lines)
+            lines.append([f"{engine}, *published*", *["-"] * (len(steps) - 1), cell])
+        parts.append(f"**{scene}**: {error.label}, and CPU time of a step")
+        parts.append(table(["engine", *(f"{1e3 * h:g} ms" for h in steps)], lines))
+    return "\n\n".join([*parts, f"{measured(data['meta'])}."])
 
 
-def fill(output: Path, data: dict[str, Any]) -> None:
-    """Puts the tables between their marks."""
-    between(output, BEGIN, END, tables(data))
+#: Scenes of the manual's table: of rolling one direction stands for three.
+SHORT = ("666", "elastic 666", "bouncing", "rolling, diagonal")
+
+
+def short_table(data: dict[str, Any], step: float = 1e-3) -> str:
+    """Markdown: the errors at one step, a line an engine and variant and a column a scene."""
+    points = [p for p in data["points"] if p["step"] == step]
+    lines = []
+    for key in dict.fromkeys((p["engine"], p["variant"]) for p in points):
+        rows = {p["scene"]: p for p in points if (p["engine"], p["variant"]) == key}
+        found = [rows.get(scene, {}).get(ERRORS[scene].key) for scene in SHORT]
+        lines.append([", ".join(key), *("-" if error is None else f"{error:.1e}" for error in found)])
+    return table(["engine", *(f"{scene}: {ERRORS[scene].label}" for scene in SHORT)], lines)

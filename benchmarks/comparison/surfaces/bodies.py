@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from comparison.ensembles import distance
 from comparison.peers import LeftOut
-from comparison.scene import Array, steps_in
+from comparison.scene import Array, distance, steps_in
 from comparison.surfaces.rolling import over_curve, over_facets, rolled
 from comparison.surfaces.scene import BodyRunner, BodyScene, largest_false_impulse
 from rover_gym import HeightField

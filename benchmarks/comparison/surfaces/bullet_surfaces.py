@@ -7,11 +7,9 @@ small steps is a short distance at which contacts of the last step are dropped.
 from functools import partial
 
 import numpy as np
-import pybullet
-from pybullet_utils.bullet_client import BulletClient
 
 from comparison.peers.base import Variant
-from comparison.peers.bullet import CONTACT_THRESHOLD, BulletRunner, add_map
+from comparison.peers.bullet import CONTACT_THRESHOLD, BulletRunner, add_map, new_client, set_contact
 from comparison.scene import Array
 from comparison.surfaces.scene import BodyScene, G
 
@@ -22,16 +20,7 @@ class BulletBody:
     """`stepSimulation` with 50 iterations, damping off."""
 
     def __init__(self, scene: BodyScene, time_step: float, *, as_mesh: bool, contact_threshold: float) -> None:
-        self.client = c = BulletClient(pybullet.DIRECT)
-        c.setGravity(0.0, -G, 0.0)
-        c.setPhysicsEngineParameter(
-            fixedTimeStep=time_step,
-            numSolverIterations=50,
-            numSubSteps=0,
-            solverResidualThreshold=0.0,
-            restitutionVelocityThreshold=0.0,
-            contactBreakingThreshold=contact_threshold,
-        )
+        self.client = c = new_client((0.0, -G, 0.0), time_step, contactBreakingThreshold=contact_threshold)
         if scene.field is None:
             ground = c.createMultiBody(0, c.createCollisionShape(c.GEOM_PLANE, planeNormal=[0, 1, 0]))
         else:
@@ -40,18 +29,10 @@ class BulletBody:
             shape = c.createCollisionShape(c.GEOM_SPHERE, radius=scene.radius)
         else:
             shape = c.createCollisionShape(c.GEOM_BOX, halfExtents=scene.half.tolist())
-        turn = c.getQuaternionFromEuler([0.0, scene.heading, 0.0])
-        self.body = c.createMultiBody(
-            scene.mass,
-            shape,
-            basePosition=scene.centre.tolist(),
-            baseOrientation=turn,
-            useMaximalCoordinates=True,
-        )
-        for body, friction in ((ground, 1.0), (self.body, scene.friction)):  # Bullet multiplies the two
-            c.changeDynamics(body, -1, restitution=0.0)
-            c.changeDynamics(body, -1, lateralFriction=friction)
-            c.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
+        place = scene.centre.tolist(), c.getQuaternionFromEuler([0.0, scene.heading, 0.0])
+        self.body = c.createMultiBody(scene.mass, shape, -1, *place, useMaximalCoordinates=True)
+        set_contact(c, ground, 1.0)
+        set_contact(c, self.body, scene.friction)
         self.velocity, self.spin = scene.velocity.tolist(), scene.spin.tolist()
 
     def launch(self, centre: Array) -> None:
@@ -77,6 +58,6 @@ BODIES = {
     ("Bullet", "mesh, inner edges, 1 mm"): partial(BulletBody, **MESH),
 }
 ROVERS = (
-    Variant("Bullet", "height field", partial(BulletRunner, iterations=50, **HEIGHT_FIELD), "", ""),
-    Variant("Bullet", "mesh, inner edges, 1 mm", partial(BulletRunner, iterations=50, **MESH), "", ""),
+    Variant("Bullet", "height field", partial(BulletRunner, iterations=50, **HEIGHT_FIELD)),
+    Variant("Bullet", "mesh, inner edges, 1 mm", partial(BulletRunner, iterations=50, **MESH)),
 )

@@ -3,14 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter, NullLocator
 
-COLOURS = {"rover-gym": "#d1361f", "Drake": "#2f6db3", "MuJoCo": "#3f8f4f", "Bullet": "#8a5fb0"}
+from comparison.curves import finish, label, plot, plt, save
+
 #: The first variant of an engine is drawn with the first.
 STYLES = ("-", "--")
 #: What is smaller is drawn here: it is rounding.
@@ -29,31 +26,18 @@ def _curves(axes: Axes, points: list[dict[str, Any]], x: str, y: str, least: flo
     for engine, names in variants.items():
         for name, style in zip(names, STYLES, strict=False):
             rows = [p for p in points if (p["engine"], p["variant"]) == (engine, name) and y in p]
-            axes.plot(
-                [p[x] for p in rows],
-                [max(p[y], least) for p in rows],
-                color=COLOURS[engine],
-                linestyle=style,
-                linewidth=2.4 if engine == "rover-gym" else 1.5,
-                marker="o",
-                markersize=4.5,
-                label=f"{engine}, {name}",
-            )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+            curve = [(p[x], max(p[y], least)) for p in rows]
+            plot(axes, curve, engine, linestyle=style, label=f"{engine}, {name}")
     axes.yaxis.set_minor_formatter(NullFormatter())
     if x == "spacing":
         sizes = sorted({p[x] for p in points})
         axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
         axes.xaxis.set_minor_locator(NullLocator())
     if any(p.get(y, least) < least for p in points):
-        axes.annotate(
-            "bottom: 0 to rounding", (0.98, 0.02), xycoords="axes fraction", ha="right", color="#777777", fontsize=9
-        )
+        corner = {"xycoords": "axes fraction", "ha": "right", "color": "#777777", "fontsize": 9}
+        axes.annotate("bottom: 0 to rounding", (0.98, 0.02), **corner)
     axes.margins(0.12)
-    axes.grid(which="major", color="#dddddd", linewidth=0.7)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    finish(axes)
 
 
 def draw(data: dict[str, Any], path: Path) -> None:
@@ -66,28 +50,21 @@ def draw(data: dict[str, Any], path: Path) -> None:
         own = [p for p in data["points"] if p["scene"] == name and p.get("spacing", 1.0)]
         return [p for p in own if all(p[key] == value for key, value in fixed.items())]
 
-    def panel(axes: Axes, title: str, x: str, y: str) -> None:
-        axes.set_title(title, fontsize=11, loc="left")
-        axes.set_xlabel(x)
-        axes.set_ylabel(y)
-
     cells = "size of the cells, m"
     _curves(panels[0, 0], scene("edges", step=finest), "spacing", "impulse", LEAST_IMPULSE)
-    panel(panels[0, 0], f"ball over a flat map, {at_finest}", cells, "largest false impulse / (m g h)")
+    label(panels[0, 0], f"ball over a flat map, {at_finest}", cells, "largest false impulse / (m g h)")
     _curves(panels[0, 1], scene("edges", spacing=SPACING), "cpu_ms_per_s", "error", LEAST_ERROR)
-    panel(panels[0, 1], f"ball over a flat map, cells of {SPACING:g} m", cost, "RMS error of the path, m")
+    label(panels[0, 1], f"ball over a flat map, cells of {SPACING:g} m", cost, "RMS error of the path, m")
     _curves(panels[0, 2], scene("rest", step=finest), "spacing", "error", LEAST_ERROR)
-    panel(panels[0, 2], f"box at rest on a flat map, {at_finest}", cells, "largest way of its centre, m")
+    label(panels[0, 2], f"box at rest on a flat map, {at_finest}", cells, "largest way of its centre, m")
     _curves(panels[1, 0], scene("sine", step=finest), "spacing", "from_sine", LEAST_ERROR)
-    panel(panels[1, 0], f"ball on a sine as a map, {at_finest}", cells, "RMS distance from the path on the sine, m")
+    label(panels[1, 0], f"ball on a sine as a map, {at_finest}", cells, "RMS distance from the path on the sine, m")
     panels[1, 0].set_ylim(1e-2, 1.0)
     _curves(panels[1, 1], scene("level", spacing=SPACING), "cpu_ms_per_s", "error", LEAST_ERROR)
     title = f"rover over a flat map, cells of {SPACING:g} m"
-    panel(panels[1, 1], title, cost, "RMS distance from the own plane's path, m")
+    label(panels[1, 1], title, cost, "RMS distance from the own plane's path, m")
     _curves(panels[1, 2], scene("hills"), "cpu_ms_per_s", "error", LEAST_ERROR)
-    panel(panels[1, 2], "rover over hills, cells of 0.25 m", cost, "median of the paths' RMS errors, m")
+    label(panels[1, 2], "rover over hills, cells of 0.25 m", cost, "median of the paths' RMS errors, m")
 
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="lower center", ncols=4, frameon=False, fontsize=10)
-    figure.tight_layout(rect=(0, 0.06, 1, 1))
-    figure.savefig(path)
-    plt.close(figure)
+    save(figure, path, rect=(0, 0.06, 1, 1))

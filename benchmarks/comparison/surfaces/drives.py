@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from comparison.ensembles import distance
 from comparison.peers import LeftOut, Variant
 from comparison.run import run
-from comparison.scene import Array, Phase, RoverScene, Trace, steps_in
+from comparison.scene import Array, Phase, RoverScene, Trace, distance, steps_in
 from comparison.scenes.flat_drive import machine
 from comparison.surfaces.our_surfaces import ROVERS_ON_BALLS, RoverOnBalls
 from rover_gym import HeightField

@@ -5,6 +5,7 @@ from functools import partial
 import mujoco
 import numpy as np
 
+from comparison.mujoco_rover import text_of
 from comparison.peers.base import Variant
 from comparison.peers.mujoco_engine import MuJoCoRunner, model_on
 from comparison.scene import Array
@@ -22,9 +23,9 @@ class MuJoCoBody:
         plane = "" if scene.field is not None else '<geom type="plane" size="0 0 1" zaxis="0 1 0"/>'
         shape = f'type="sphere" size="{scene.radius!r}"'
         if scene.half is not None:
-            shape = f'type="box" size="{_text(scene.half)}"'
+            shape = f'type="box" size="{text_of(scene.half)}"'
         body = f'<freejoint/><geom {shape} mass="{scene.mass!r}"/>'
-        place = f'pos="{_text(scene.centre)}" euler="0 {scene.heading!r} 0"'
+        place = f'pos="{text_of(scene.centre)}" euler="0 {scene.heading!r} 0"'
         text = (
             '<mujoco><compiler angle="radian"/><size memory="100M"/>'
             f'<option timestep="{time_step!r}" gravity="0 {-G} 0" {BEST if is_stiff else "/>"}'
@@ -49,21 +50,12 @@ class MuJoCoBody:
         return int(self.data.ncon)
 
 
-def _text(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
 BODIES = {
     ("MuJoCo", "defaults"): partial(MuJoCoBody, is_stiff=False),
     ("MuJoCo", "stiff, solref 2 h"): partial(MuJoCoBody, is_stiff=True),
 }
+ELLIPTIC = {"integrator": "discrete", "cone": "elliptic", "impratio": 100.0}
 ROVERS = (
-    Variant("MuJoCo", "defaults", partial(MuJoCoRunner, integrator="implicitfast"), "", ""),
-    Variant(
-        "MuJoCo",
-        "stiff, solref 2 h",
-        partial(MuJoCoRunner, integrator="discrete", cone="elliptic", impratio=100.0, solref_steps=STIFF),
-        "",
-        "",
-    ),
+    Variant("MuJoCo", "defaults", partial(MuJoCoRunner, integrator="implicitfast")),
+    Variant("MuJoCo", "stiff, solref 2 h", partial(MuJoCoRunner, solref_steps=STIFF, **ELLIPTIC)),
 )

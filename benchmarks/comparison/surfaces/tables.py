@@ -1,14 +1,13 @@
 """The tables of `docs/tables/comparison.md` that are made from `surfaces.json`."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from comparison.output import between
+from reports import left_out, measured, table
+
 from comparison.surfaces.bodies import inner_edges
 from comparison.tables import number
 
-BEGIN, END = "<!-- surfaces: made by `make chart`, not by hand -->", "<!-- end of surfaces -->"
 Row = dict[str, Any]
 
 
@@ -46,16 +45,17 @@ def _hills(row: Row) -> str:
 
 def _table(points: list[Row], column: str, heads: dict[Any, str], cell: Callable[[Row], str]) -> list[str]:
     """A line an engine and a column a value of `column`; then what is left out, and why."""
-    lines = ["| engine | " + " | ".join(heads.values()) + " |", "|---" * (len(heads) + 1) + "|"]
+    lines = []
     reasons: dict[str, str] = {}
     for key in dict.fromkeys((p["engine"], p["variant"]) for p in points):
         rows = {p[column]: p for p in points if (p["engine"], p["variant"]) == key}
         cells = ["-" if "failure" in rows[value] else cell(rows[value]) for value in heads]
-        lines.append(f"| {', '.join(key)} | " + " | ".join(cells) + " |")
+        lines.append([", ".join(key), *cells])
         reasons |= {f"{', '.join(key)}, {heads[v]}": r["failure"] for v, r in rows.items() if "failure" in r}
+    parts = [table(["engine", *heads.values()], lines), ""]
     if reasons:
-        lines += ["", "Left out: " + "; ".join(f"{what}: {why}" for what, why in reasons.items()) + "."]
-    return [*lines, ""]
+        parts += ["Left out: " + "; ".join(f"{what}: {why}" for what, why in reasons.items()) + ".", ""]
+    return parts
 
 
 def tables(data: dict[str, Any]) -> str:
@@ -103,12 +103,23 @@ def tables(data: dict[str, Any]) -> str:
     meta = data["meta"]
     changes = ", ".join(millimetres(change) for change in meta["changes_of_references_m"])
     lines += [f"The references of the hills change by {changes} mm when their step is halved.", ""]
-    lines += [f"Left out, not installed: {name}." for name in meta["missing"]]
-    packages = ", ".join(f"{name} {version}" for name, version in meta["packages"].items())
-    lines.append(f"Measured with `make chart` on {meta['processor']}, shared with other work; {packages}.")
-    return "\n".join(lines)
+    return "\n".join([*lines, *left_out(meta["missing"]), f"{measured(meta)}."])
 
 
-def fill(output: Path, data: dict[str, Any]) -> None:
-    """Puts the tables between their marks."""
-    between(output, BEGIN, END, tables(data))
+def short_table(data: dict[str, Any], spacing: float = 0.05, step: float = 1e-3) -> str:
+    """Markdown: what the manual shows of one spacing of the cells and one step, a line an engine and variant."""
+    cells: dict[str, Callable[[Row], str]] = {
+        "edges": lambda row: f"{millimetres(row['error'])}, {false_impulse(row['impulse'])}",
+        "rest": lambda row: f"{millimetres(row['error'])}, {false_impulse(row['impulse'])}",
+        "sine": lambda row: millimetres(row["error"]),
+        "hills": lambda row: f"{millimetres(row['error'])}, {number(row['cpu_ms_per_s'])} ms/s",
+    }
+    points = [p for p in data["points"] if p["step"] == step and p.get("spacing", spacing) == spacing]
+    lines = []
+    for key in dict.fromkeys((p["engine"], p["variant"]) for p in points):
+        rows = {p["scene"]: p for p in points if (p["engine"], p["variant"]) == key}
+        own = [cell(rows[scene]) if "failure" not in rows[scene] else "-" for scene, cell in cells.items()]
+        lines.append([", ".join(key), *own])
+    what = ("ball over edges: error, false impulse", "box at rest: way, false impulse")
+    heads = ["errors in mm", *what, "ball on a sine: error", "rover over hills: error, CPU time"]
+    return table(heads, lines)
