@@ -24,6 +24,7 @@ def draw(data: dict[str, Any], path: Path) -> None:
     """Two rows of two panels."""
     figure, panels = plt.subplots(2, 2, figsize=(11.0, 9.0), dpi=90)
     for axes, scene in zip(panels.flat, PANELS, strict=True):
+        axes.loglog()
         error = ERRORS[scene]
         points = [p for p in data["points"] if p["scene"] == scene and error.key in p]
         for engine, variant in dict.fromkeys((p["engine"], p["variant"]) for p in points):

@@ -18,6 +18,7 @@ SPACING = 0.05  # m
 
 def _curves(axes: Axes, points: list[dict[str, Any]], x: str, y: str, least: float) -> None:
     """One curve an engine and variant, in logarithms."""
+    axes.loglog()
     variants: dict[str, list[str]] = {}
     for p in points:
         own = variants.setdefault(p["engine"], [])
