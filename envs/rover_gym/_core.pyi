@@ -715,7 +715,7 @@ class SoftGround(Terrain):
     @property
     def rut_cell(self) -> float:
         """Size of a cell of the map of ruts, m."""
-    def __reduce__(self) -> Any: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class WheelBed:
@@ -1130,13 +1130,13 @@ class StepReport:
     def undetermined_loads(self) -> int:
         """Number of contacts whose impulses the motion of the last step does not determine.
 
-        0 means that the motion determines the impulses of all contacts. Otherwise other impulses
-        cause the same motion, and the step returns those of least norm within the cones of
-        friction: four corners of a box share its weight like four equal springs. Friction counts:
-        six rigid wheels that drive straight could push sideways against each other, so the number
-        is 6. Contacts that yield, such as wheels with a `stiffness`, have determined impulses.
-        Always 0 for grains. In a group of more than 32 rigid contacts the solver chooses among the
-        impulses.
+        0 means that the motion determines the impulses of all contacts. Otherwise other
+        impulses cause the same motion, and the step returns those of least norm within the
+        cones of friction: four corners of a box share its weight like four equal springs.
+        Friction counts: six rigid wheels that drive straight could push sideways against
+        each other, so the number is 6. Contacts that yield, such as wheels with a
+        `stiffness`, have determined impulses. Always 0 for grains. In a group of more than
+        32 rigid contacts the solver chooses among the impulses.
         """
     def followed_by(self, later: StepReport) -> StepReport:
         """Combines this report with that of the following steps.
@@ -1485,6 +1485,9 @@ class Simulation(AnySimulation):
         terrain: A terrain, the file of a map or a mesh, or a list of several; flat ground at height
             0 by default.
         gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
+        accuracy: Chooses `time_step`, `variant` and `tolerance` by `accuracy_options`: "fast",
+            "balanced", "reference", or the allowed error on a path of 20 m on flat ground, m. These
+            three options cannot be given beside it.
         friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
         restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
             [0, 1].
@@ -1501,14 +1504,11 @@ class Simulation(AnySimulation):
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
-            `solve_friction_contact` (operations, not time). By default it grows with the number of
-            contacts.
+            `solve_friction_contact` (operations, not time). By default it grows with the
+            number of contacts.
         stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
             leaves them.
         warm_start: Whether the contact solver starts from the last step's impulses.
-        accuracy: Chooses `time_step`, `variant` and `tolerance` by `accuracy_options`: "fast",
-            "balanced", "reference", or the allowed error on a path of 20 m on flat ground, m. These
-            three options cannot be given beside it.
 
     Raises:
         ModelError: `model` is none of these, or its file does not contain a model.
@@ -1522,6 +1522,7 @@ class Simulation(AnySimulation):
         terrain: Terrain | _Terrains | None = None,
         *,
         gravity: npt.ArrayLike | None = None,
+        accuracy: Literal["fast", "balanced", "reference"] | float | None = None,
         friction: float = 0.7,
         restitution: float = 0.0,
         materials: _Materials | None = None,
@@ -1535,7 +1536,6 @@ class Simulation(AnySimulation):
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
-        accuracy: Literal["fast", "balanced", "reference"] | float | None = None,
     ) -> Simulation: ...
     @property
     def model(self) -> RoverModel:
@@ -2175,6 +2175,9 @@ class BallSimulation(PlanarSimulation):
         radius: Radius, m.
         inertia: Inertia about the centre, kg m²; the inertia of a homogeneous disc by default.
         gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        contact: "nearest", the contact is the point of the ground nearest to the disc's
+            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
+            stops at the ground.
         friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
         restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
             [0, 1].
@@ -2191,14 +2194,11 @@ class BallSimulation(PlanarSimulation):
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
-            `solve_friction_contact` (operations, not time). By default it grows with the number of
-            contacts.
+            `solve_friction_contact` (operations, not time). By default it grows with the
+            number of contacts.
         stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
             leaves them.
         warm_start: Whether the contact solver starts from the last step's impulses.
-        contact: "nearest", the contact is the point of the ground nearest to the disc's
-            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
-            stops at the ground.
 
     Raises:
         ModelError: `mass`, `radius` or `inertia` is not finite and positive.
@@ -2214,6 +2214,7 @@ class BallSimulation(PlanarSimulation):
         radius: float = 1.5,
         inertia: float | None = None,
         gravity: npt.ArrayLike | None = None,
+        contact: Literal["nearest", "centre_height"] = "nearest",
         friction: float = 0.7,
         restitution: float = 0.0,
         materials: _Materials | None = None,
@@ -2227,7 +2228,6 @@ class BallSimulation(PlanarSimulation):
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
-        contact: Literal["nearest", "centre_height"] = "nearest",
     ) -> BallSimulation: ...
 
 @final
@@ -2252,6 +2252,9 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
             default.
         gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        contact: "nearest", the contact is the point of the ground nearest to the disc's
+            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
+            stops at the ground.
         friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
         restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
             [0, 1].
@@ -2268,14 +2271,11 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
-            `solve_friction_contact` (operations, not time). By default it grows with the number of
-            contacts.
+            `solve_friction_contact` (operations, not time). By default it grows with the
+            number of contacts.
         stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
             leaves them.
         warm_start: Whether the contact solver starts from the last step's impulses.
-        contact: "nearest", the contact is the point of the ground nearest to the disc's
-            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
-            stops at the ground.
 
     Raises:
         ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
@@ -2295,6 +2295,7 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         axle_a: npt.ArrayLike | None = None,
         axle_b: npt.ArrayLike | None = None,
         gravity: npt.ArrayLike | None = None,
+        contact: Literal["nearest", "centre_height"] = "nearest",
         friction: float = 0.7,
         restitution: float = 0.0,
         materials: _Materials | None = None,
@@ -2308,7 +2309,6 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
-        contact: Literal["nearest", "centre_height"] = "nearest",
     ) -> TwoWheelRoverSimulation: ...
 
 @final
@@ -2324,6 +2324,9 @@ class MirroredRoverSimulation(PlanarSimulation):
         model: The machine: an object, a name of the gallery or a file. It must be symmetric about
             the trunk's x-y plane; the built-in rover by default.
         gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        contact: "nearest", the contact is the point of the ground nearest to the disc's
+            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
+            stops at the ground.
         friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
         restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
             [0, 1].
@@ -2340,14 +2343,11 @@ class MirroredRoverSimulation(PlanarSimulation):
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
-            `solve_friction_contact` (operations, not time). By default it grows with the number of
-            contacts.
+            `solve_friction_contact` (operations, not time). By default it grows with the
+            number of contacts.
         stabilisation: Treatment of penetration: "projection" moves overlapping bodies apart, "none"
             leaves them.
         warm_start: Whether the contact solver starts from the last step's impulses.
-        contact: "nearest", the contact is the point of the ground nearest to the disc's
-            centre, or "centre_height", the rule of the 2010 report, by which the centre itself
-            stops at the ground.
 
     Raises:
         ModelError: The model is not symmetric.
@@ -2361,6 +2361,7 @@ class MirroredRoverSimulation(PlanarSimulation):
         *,
         model: RoverModel | str | os.PathLike[str] | None = None,
         gravity: npt.ArrayLike | None = None,
+        contact: Literal["nearest", "centre_height"] = "nearest",
         friction: float = 0.7,
         restitution: float = 0.0,
         materials: _Materials | None = None,
@@ -2374,7 +2375,6 @@ class MirroredRoverSimulation(PlanarSimulation):
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
-        contact: Literal["nearest", "centre_height"] = "nearest",
     ) -> MirroredRoverSimulation: ...
     @property
     def joints(self) -> list[list[str]]:
@@ -2734,7 +2734,8 @@ class EpisodeBatch:
         *,
         has_scan: bool = True,
         among: Sequence[RoverGrainSimulation | None] | None = None,
-    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
+        info: int | Literal["all"] | None = None,
+    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], dict[str, Any]]:
         """Applies the actions of all rovers for one control period.
 
         Other Python threads run in the meantime. Ctrl-C, or another exception of a signal handler,
@@ -2749,17 +2750,18 @@ class EpisodeBatch:
                 heights.
             among: A RoverGrainSimulation of each rover's `simulation`, if the rovers drive among
                 grains; they are then stepped one after the other.
+            info: Which infos to return: "all" as `infos`, an index as `info`; none by default.
 
         Returns:
             Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes are
-            terminated and which are truncated, (n_rovers,) each, and the indices of the rovers with
-            either. A rover that is not active keeps the values of its last period.
+            terminated and which are truncated, (n_rovers,) each, and infos; an empty dictionary if
+            none are asked for. A rover that is not active keeps the values of its last period.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside
                 [-1, 1]. No rover has moved.
-            OptionError: `active` or `among` is invalid, or an episode has not begun. No rover has
-                moved.
+            OptionError: `active`, `among` or `info` is invalid, or an episode has not begun. No
+                rover has moved.
         """
     @property
     def over(self) -> list[int]:
@@ -2995,27 +2997,31 @@ class DiskSimulation(BedSimulation):
             rate; none by default.
         machine: Coordinates of the rover (x, y, theta, theta_A, theta_B) or of the rig (x, y, -,
             theta, -), (5,), m and rad.
-        friction: Coulomb's coefficient between disks.
-        wall_friction: Coulomb's coefficient of disks on walls and ground.
-        wheel_friction: Coulomb's coefficient of wheels.
-        rolling_friction: Coefficient of rolling friction of disks: the largest resisting moment
-            divided by the normal force and the rolling radius r. Between two disks 1/r = 1/r_1 +
-            1/r_2; on a wall or the ground r is the disk's radius. It does not act on wheels, nor if
-            Coulomb's coefficient is 0.
-        restitution: Newton's coefficient of all contacts, in [0, 1].
         gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        friction: Coulomb's coefficient between grains.
+        wall_friction: Coulomb's coefficient of grains on walls and on the ground, vessel or terrain.
+        rolling_friction: Coefficient of rolling friction of grains: the largest resisting moment divided by
+            the normal force and the rolling radius r. Between two grains 1/r = 1/r_1 + 1/r_2; on
+            anything else r is the grain's radius. A grain stays at rest on a slope whose tangent is
+            at most this coefficient. It does not act on wheels, nor if Coulomb's coefficient is 0.
+        restitution: Newton's coefficient of all contacts, in [0, 1].
         time_step: Time step, s.
         tolerance: Largest relative residual of the contact problem. Errors of velocities are also
-            at most ten times this value in m/s, times the square root of gravity / 9.81 m/s².
+            limited: those of disks to ten times this value in m/s, times the square root of
+            gravity / 9.81 m/s²; those of balls to 25 times this value, times the square root of
+            gravity times the smallest radius. Without gravity 9.81 m/s² is used.
         max_iterations: Largest number of sweeps of the contact solver in a step.
-        stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart, which may
-            add energy by lifting those above; "none" leaves them. By default "projection" with
-            restitution and "none" without.
-        penetration_tolerance: Overlap that projection does not correct, m; 0.5% of the smallest
-            radius by default.
-        sleep: Whether to skip disks that are at rest and far from moving bodies.
-        sleep_speed: Speed below which a disk is at rest, m/s; 5e-4 by default.
-        sleep_distance: A disk sleeps if no body within this distance moves, m; 0.2 by default.
+        stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart, "push_out"
+            removes a fifth of the excessive overlap in each step, "none" leaves it. The first two
+            may add energy by lifting the bodies above. The default is "projection" with restitution
+            or in a vessel, whose curved walls cause an overlap in every step; otherwise "push_out"
+            for balls and "none" for disks.
+        penetration_tolerance: Overlap that stabilisation does not correct, m; 0.5% of the smallest radius by
+            default.
+        sleep: Whether to skip grains that are at rest and far from moving bodies.
+        sleep_speed: Speed below which a grain is at rest, m/s; 5e-4 by default.
+        sleep_distance: A grain sleeps if no body within this distance moves, m; 0.2 by default.
+        wheel_friction: Coulomb's coefficient of wheels.
 
     Raises:
         ModelError: A radius or mass is not finite and positive, or the machine's data are invalid.
@@ -3036,12 +3042,11 @@ class DiskSimulation(BedSimulation):
         rover: dict[str, Any] | None = None,
         rig: npt.ArrayLike | None = None,
         machine: npt.ArrayLike | None = None,
+        gravity: npt.ArrayLike | None = None,
         friction: float = 0.5,
         wall_friction: float = 0.5,
-        wheel_friction: float = 0.9,
         rolling_friction: float = 0.0,
         restitution: float = 0.0,
-        gravity: npt.ArrayLike | None = None,
         time_step: float = 0.001,
         tolerance: float = 0.0001,
         max_iterations: int = 2000,
@@ -3050,6 +3055,7 @@ class DiskSimulation(BedSimulation):
         sleep: bool = False,
         sleep_speed: float | None = None,
         sleep_distance: float | None = None,
+        wheel_friction: float = 0.9,
     ) -> DiskSimulation: ...
     @property
     def machine(self) -> npt.NDArray[np.float64]:
@@ -3230,36 +3236,37 @@ class GrainSimulation(BedSimulation):
         terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
             them, below the balls; none by default. Balls fall where the ground is unknown. A vessel
             and a terrain cannot be combined.
-        friction: Coulomb's coefficient between balls.
-        wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
-        rolling_friction: Coefficient of rolling friction of balls: the largest resisting moment
-            divided by the normal force and the rolling radius r. Between two balls 1/r = 1/r_1 +
-            1/r_2; on a wall, vessel or terrain r is the ball's radius. A ball stays at rest on a
-            slope whose tangent is at most this coefficient.
-        drilling_friction: The same for rotation about the contact normal. Neither acts on a rover,
-            nor if Coulomb's coefficient is 0.
-        cohesion: Attractive force between bodies in contact, N: the pull that separates them. The
-            contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the tangential
-            impulse is at most friction (p_N + h cohesion).
-        cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
-            default, at most 20%.
-        restitution: Newton's coefficient of all contacts, in [0, 1].
         gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
+        friction: Coulomb's coefficient between grains.
+        wall_friction: Coulomb's coefficient of grains on walls and on the ground, vessel or terrain.
+        rolling_friction: Coefficient of rolling friction of grains: the largest resisting moment divided by
+            the normal force and the rolling radius r. Between two grains 1/r = 1/r_1 + 1/r_2; on
+            anything else r is the grain's radius. A grain stays at rest on a slope whose tangent is
+            at most this coefficient. It does not act on wheels, nor if Coulomb's coefficient is 0.
+        restitution: Newton's coefficient of all contacts, in [0, 1].
         time_step: Time step, s.
         tolerance: Largest relative residual of the contact problem. Errors of velocities are also
-            at most 25 times this value, times the square root of gravity times the smallest radius;
-            without gravity 9.81 m/s² is used.
+            limited: those of disks to ten times this value in m/s, times the square root of
+            gravity / 9.81 m/s²; those of balls to 25 times this value, times the square root of
+            gravity times the smallest radius. Without gravity 9.81 m/s² is used.
         max_iterations: Largest number of sweeps of the contact solver in a step.
-        stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart,
-            "push_out" removes a fifth of the excessive overlap in each step, "none" leaves it. The
-            first two may add energy by lifting the bodies above. The default is "push_out", or
-            "projection" with restitution or in a vessel, whose curved walls cause an overlap in
-            every step.
-        penetration_tolerance: Overlap that stabilisation does not correct, m; 0.5% of the smallest
-            radius by default.
-        sleep: Whether to skip balls that are at rest and far from moving bodies.
-        sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
-        sleep_distance: A ball sleeps if no body within this distance moves, m; 0.2 by default.
+        stabilisation: Treatment of overlaps: "projection" moves overlapping bodies apart, "push_out"
+            removes a fifth of the excessive overlap in each step, "none" leaves it. The first two
+            may add energy by lifting the bodies above. The default is "projection" with restitution
+            or in a vessel, whose curved walls cause an overlap in every step; otherwise "push_out"
+            for balls and "none" for disks.
+        penetration_tolerance: Overlap that stabilisation does not correct, m; 0.5% of the smallest radius by
+            default.
+        sleep: Whether to skip grains that are at rest and far from moving bodies.
+        sleep_speed: Speed below which a grain is at rest, m/s; 5e-4 by default.
+        sleep_distance: A grain sleeps if no body within this distance moves, m; 0.2 by default.
+        drilling_friction: Coefficient of friction against rotation about the contact normal, as
+            `rolling_friction`.
+        cohesion: Attractive force between bodies in contact, N: the pull that separates them.
+            The contact law is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; the
+            tangential impulse is at most friction (p_N + h cohesion).
+        cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by default, at
+            most 20%.
         threads: Number of threads that solve the contact problem. The result does not depend on it.
             With fewer than some thousands of balls, a second thread gains little.
 
@@ -3282,14 +3289,11 @@ class GrainSimulation(BedSimulation):
         wall_velocity: npt.ArrayLike | None = None,
         vessel: Drum | Silo | None = None,
         terrain: Terrain | _Terrains | None = None,
+        gravity: npt.ArrayLike | None = None,
         friction: float = 0.5,
         wall_friction: float = 0.5,
         rolling_friction: float = 0.0,
-        drilling_friction: float = 0.0,
-        cohesion: float = 0.0,
-        cohesion_range: float | None = None,
         restitution: float = 0.0,
-        gravity: npt.ArrayLike | None = None,
         time_step: float = 0.002,
         tolerance: float = 0.001,
         max_iterations: int = 2000,
@@ -3298,6 +3302,9 @@ class GrainSimulation(BedSimulation):
         sleep: bool = False,
         sleep_speed: float | None = None,
         sleep_distance: float | None = None,
+        drilling_friction: float = 0.0,
+        cohesion: float = 0.0,
+        cohesion_range: float | None = None,
         threads: int = 1,
     ) -> GrainSimulation: ...
     @property

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rover_gym import OptionError
 from rover_gym.envs import RoverEnv
 from rover_gym.envs.batch import RoverBatch
 from rover_gym.envs.vector import RoverVectorEnv
@@ -45,3 +46,12 @@ def test_a_step_of_a_vector_is_one_call_while_no_episode_begins(mode: str) -> No
     *_, truncated, infos = envs.step(actions)
     assert truncated.all()
     assert (infos["termination"] == "").all()
+
+
+@pytest.mark.parametrize("info", [1, -1, "some", 0.0])
+def test_infos_of_no_rover_are_refused_before_the_rover_moves(info: Any) -> None:
+    env = RoverEnv()
+    env.reset(seed=1)
+    with pytest.raises(OptionError, match="index: must be"):
+        env.batch.episodes.step(np.zeros((1, 12)), info=info)
+    assert env.simulation.time == 0.0

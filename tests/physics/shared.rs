@@ -110,8 +110,8 @@ pub fn joints(rover: &RoverSimulation) -> Vec<String> {
 }
 
 /// Stops of a joint, rad or m.
-pub fn limits(lower: f64, upper: f64) -> Option<JointLimits> {
-    Some(JointLimits { lower, upper })
+pub fn limits(lower: f64, upper: f64) -> JointLimits {
+    JointLimits { lower, upper }
 }
 
 /// Coupling of a joint to another one.
@@ -124,8 +124,8 @@ pub fn follows(joint: &str, ratio: f64, offset: f64) -> CouplingDescription {
 }
 
 /// Spring of a joint, N m/rad or N/m, and its rest, rad or m.
-pub fn spring(stiffness: f64, rest: f64) -> Option<Spring> {
-    Some(Spring { stiffness, rest })
+pub fn spring(stiffness: f64, rest: f64) -> Spring {
+    Spring { stiffness, rest }
 }
 
 /// A loop of two solids or joints, closed at the zero of all joints.

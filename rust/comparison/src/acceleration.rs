@@ -151,13 +151,18 @@ pub(crate) fn accept<S: Whole>(
     h: f64,
     state: StateMut<'_, S::Configuration>,
 ) -> Result<(), StepError> {
+    let StateMut {
+        configuration,
+        v: velocity,
+        time,
+    } = state;
     if !system.is_finite(&q) || v.iter().any(|x| !x.is_finite()) {
-        return Err(StepError::NonFinite { time: *state.time });
+        return Err(StepError::NonFinite { time: *time });
     }
     system.normalise(&mut q);
-    *state.configuration = q;
-    state.v.copy_from_slice(v);
-    *state.time += h;
+    *configuration = q;
+    velocity.copy_from_slice(v);
+    *time += h;
     Ok(())
 }
 

@@ -51,7 +51,7 @@ fn a_pendulum_on_the_world_has_its_period() {
 fn a_slide_with_a_spring_and_a_damper_is_an_oscillator() {
     let mut block = solid("block", None, JointKind::Prismatic);
     block.axis = Some([0.0, 1.0, 0.0]);
-    block.spring = spring(200.0, 0.3);
+    block.spring = Some(spring(200.0, 0.3));
     block.damping = Some(2.0);
     block.armature = Some(1.0);
     let model = model(vec![block]);
@@ -79,11 +79,11 @@ fn no_spring_and_no_step_give_energy() {
         for variant in VARIANTS {
             let mut upper = solid("upper", None, JointKind::Revolute);
             upper.centre_of_mass = Some([0.0, -0.5, 0.0]);
-            upper.spring = spring(stiffness, 0.5);
+            upper.spring = Some(spring(stiffness, 0.5));
             let mut lower = solid("lower", Some("upper"), JointKind::Prismatic);
             lower.axis = Some([0.0, 1.0, 0.0]);
             lower.position = Some([0.0, -1.0, 0.0]);
-            lower.spring = spring(stiffness, 0.0);
+            lower.spring = Some(spring(stiffness, 0.0));
             let mut run = simulation(model(vec![upper, lower]), stepping(variant, 0.02));
             let mut most = energy(&run);
             let scale = most.abs().max(10.0);

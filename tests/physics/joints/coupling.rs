@@ -70,11 +70,11 @@ fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
 fn a_telescope_is_one_mass() {
     let mut first = solid("first", None, JointKind::Prismatic);
     first.axis = Some([0.0, 1.0, 0.0]);
-    first.spring = spring(50.0, 0.0);
+    first.spring = Some(spring(50.0, 0.0));
     let mut second = solid("second", Some("first"), JointKind::Prismatic);
     second.axis = Some([0.0, 1.0, 0.0]);
     second.coupled = Some(follows("first", 1.0, 0.1));
-    second.spring = spring(30.0, 0.2);
+    second.spring = Some(spring(30.0, 0.2));
     second.damping = Some(1.0);
     second.armature = Some(0.5);
     let h = 1e-6;

@@ -149,7 +149,7 @@ fn a_gear_train_holds_its_load() {
 fn a_joint_with_friction_rests_on_its_stop() {
     for variant in VARIANTS {
         let mut bob = pendulum(0.2 * WEIGHT);
-        bob.limits = limits(0.7, 1.5);
+        bob.limits = Some(limits(0.7, 1.5));
         let mut run = at(model(vec![bob]), 5e-3, variant, 1.0, 0.0);
         assert!(run.step(600).unwrap().is_converged());
         assert!((run.q().joints[0] - 0.7).abs() < 1e-9 && run.v()[0].abs() < 1e-9);

@@ -20,7 +20,7 @@ const INERTIA: f64 = LENGTH * LENGTH + 0.5 * 0.1 * 0.1;
 fn pendulum(lower: f64, upper: f64) -> SolidDescription {
     let mut bob = solid("bob", None, JointKind::Revolute);
     bob.centre_of_mass = Some([0.0, -LENGTH, 0.0]);
-    bob.limits = limits(lower, upper);
+    bob.limits = Some(limits(lower, upper));
     bob
 }
 
@@ -132,7 +132,7 @@ fn a_slide_rests_on_its_stop() {
         for (up, side) in [(1.0, Side::Lower), (-1.0, Side::Upper)] {
             let mut slide = solid("slide", None, JointKind::Prismatic);
             slide.axis = Some([0.0, up, 0.0]);
-            slide.limits = limits(-0.3, 0.3);
+            slide.limits = Some(limits(-0.3, 0.3));
             let mut load = solid("load", Some("slide"), JointKind::Revolute);
             load.centre_of_mass = Some([0.0, -0.4, 0.0]);
             load.mass = 3.0;
@@ -231,7 +231,7 @@ fn a_stop_carries_what_the_ground_presses() {
     }
     let mut arm = foot("arm", JointKind::Revolute);
     arm.centre_of_mass = Some([-0.5, -0.2, 0.0]);
-    arm.limits = limits(0.0, 1.0);
+    arm.limits = Some(limits(0.0, 1.0));
     solids.push(arm);
     let model = Arc::new(model(solids));
     for variant in VARIANTS {

@@ -347,7 +347,7 @@ fn a_stop_holds_the_whole_linkage() {
     let (mut solids, pin) = four_bar_parts();
     let rocker = four_bar_angles(0.25)[1];
     assert!(rocker < 0.0);
-    solids[2].limits = limits(rocker, 2.0);
+    solids[2].limits = Some(limits(rocker, 2.0));
     for variant in VARIANTS {
         let model = built(solids.clone(), vec![pin.clone()]);
         let mut run = simulation(model, stepping(variant, 5e-3));

@@ -34,10 +34,10 @@ pub fn equipped() -> ModelDescription {
     };
     for body in &mut rover.solids {
         if body.name == "front_axle" {
-            body.spring = spring(900.0, 0.02);
+            body.spring = Some(spring(900.0, 0.02));
             body.damping = Some(40.0);
             body.armature = Some(3.0);
-            body.limits = limits(-0.06, 0.06);
+            body.limits = Some(limits(-0.06, 0.06));
         } else if body.name.ends_with("bogie") {
             body.damping = Some(5.0);
         } else if body.name.starts_with("wheel") {
@@ -54,9 +54,9 @@ pub fn equipped() -> ModelDescription {
     rover.solids.extend([
         SolidDescription {
             axis: Some([0.1, 1.0, 0.0]),
-            spring: spring(6e3, 0.0),
+            spring: Some(spring(6e3, 0.0)),
             damping: Some(60.0),
-            limits: limits(-0.035, 0.02),
+            limits: Some(limits(-0.035, 0.02)),
             ..solid("mast", "trunk", JointKind::Prismatic, [0.3, 0.3, 0.0])
         },
         SolidDescription {
@@ -432,7 +432,7 @@ fn a_machine_may_have_any_number_of_stops() {
     description.solids.extend((0..40).map(|i| SolidDescription {
         name: format!("arm {i}"),
         mass: 0.1,
-        limits: limits(-1.0, 1.0),
+        limits: Some(limits(-1.0, 1.0)),
         ..template.clone()
     }));
     let model = Arc::new(Model::from_description(description).unwrap());

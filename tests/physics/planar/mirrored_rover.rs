@@ -222,7 +222,7 @@ fn a_rover_without_a_mirror_image_is_refused_by_name() {
     let mut stopped = ModelDescription::rover();
     for solid in &mut stopped.solids {
         if solid.name.ends_with("bogie") {
-            solid.limits = limits(-0.5, 0.5);
+            solid.limits = Some(limits(-0.5, 0.5));
         }
     }
     let stopped = Model::from_description(stopped).unwrap();
