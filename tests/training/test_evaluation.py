@@ -111,9 +111,9 @@ def test_a_held_command_drives_in_a_batch_as_alone() -> None:
     scans: list[bool] = []
     step = RoverBatch.step
 
-    def counted(batch: RoverBatch, *given: Any, has_scan: bool = True) -> Any:
+    def counted(batch: RoverBatch, *given: Any, has_scan: bool = True, **options: Any) -> Any:
         scans.append(has_scan)
-        return step(batch, *given, has_scan=has_scan)
+        return step(batch, *given, has_scan=has_scan, **options)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(RoverBatch, "step", counted)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 
@@ -18,6 +17,8 @@ from rover_gym.core.validation import array, checked, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    import h5py
 
     from rover_gym.core import FrictionContactSolution
 
@@ -58,6 +59,8 @@ def read_fclib(path: str | Path) -> ContactProblem:
         OSError: The file does not exist or cannot be read.
         MissingExtraError: SciPy is not installed.
     """
+    import h5py  # noqa: PLC0415 - slow to load
+
     path = Path(path)
     if not h5py.is_hdf5(path):
         path.open("rb").close()  # a file that is missing or protected
@@ -109,6 +112,8 @@ def write_fclib(
         OSError: The file cannot be written.
         MissingExtraError: SciPy is not installed.
     """
+    import h5py  # noqa: PLC0415 - slow to load
+
     sparse = require("scipy.sparse", "planning")
     if dimension not in (2, 3):
         refuse(ProblemError, "dimension", dimension, "must be 2 or 3")

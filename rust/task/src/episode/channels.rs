@@ -7,8 +7,7 @@ use rover_core::multibody::Model;
 use rover_core::simulation::seen_from;
 
 use super::progress::Progress;
-use super::rules::Settings;
-use super::setting::EpisodeSetting;
+use super::settings::Settings;
 
 /// What the sizes and scales of an observation follow from.
 #[derive(Clone, Copy, Debug)]
@@ -90,18 +89,17 @@ pub struct EpisodeMoment<'a> {
     pub settings: &'a Settings,
     /// Reading of the rover, without heights.
     pub reading: &'a [f64],
-    /// What was drawn for the episode.
-    pub setting: &'a EpisodeSetting,
+    /// The goal after the present one, (x, z), m; the present one if it is the last.
+    pub next_goal: [f64; 2],
     /// The episode's state outside the simulation.
     pub progress: &'a Progress,
 }
 
 impl EpisodeMoment<'_> {
     /// The goal after the present one, ahead and to the right of the trunk, m.
-    fn next_goal(&self) -> [f64; 2] {
+    fn next_goal_seen(&self) -> [f64; 2] {
         let [x, z, heading] = [self.reading[0], self.reading[2], self.reading[4]];
-        let goal = self.setting.goal_at(self.progress.reached + 1);
-        let [ahead, right, _] = seen_from([x, z], heading, goal);
+        let [ahead, right, _] = seen_from([x, z], heading, self.next_goal);
         [ahead, right]
     }
 }
@@ -207,7 +205,7 @@ pub const CHANNELS: &[Channel] = channels! {
         });
     "next_goal" ["m"] "the goal after the present one, ahead and to the right of the trunk, horizontal"
         / GOAL, in ANY, size |n| 2 * n.courses(),
-        Episode(|now, i| now.next_goal()[i]);
+        Episode(|now, i| now.next_goal_seen()[i]);
     "waypoints_remaining" [""] "goals still to reach"
         / Scale::Goals, in FLAG, size |n| n.courses(),
         Episode(|now, _| {

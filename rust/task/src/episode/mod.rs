@@ -8,7 +8,7 @@
 //! terms of the [`reward`] and whether and why the episode ends ([`ending`]); together they are the
 //! period's [`outcome`].
 //!
-//! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
+//! - [`settings`] and [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
 //!   is drawn ([`crate::draw`]); [`setting`]: what was drawn for it;
 //! - [`running`]: one episode and its control period;
 //! - [`batch`]: many rovers side by side, each with its episode.
@@ -54,6 +54,7 @@ pub mod reward;
 pub mod rules;
 pub mod running;
 pub mod setting;
+pub mod settings;
 
 pub use batch::{BatchOutcome, EpisodeBatch, SharedRover, StepAmong};
 pub use beginning::{Beginning, EpisodeDistribution};
@@ -64,6 +65,7 @@ pub use outcome::Outcome;
 pub use progress::Progress;
 pub use quantities::{N_QUANTITIES, Quantities};
 pub use reward::{N_TERMS, TERMS, Weights};
-pub use rules::{Rules, Settings};
+pub use rules::Rules;
 pub use running::{Episode, EpisodeState};
 pub use setting::EpisodeSetting;
+pub use settings::Settings;

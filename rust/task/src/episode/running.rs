@@ -86,7 +86,7 @@ impl Episode {
         let begun = EpisodeMoment {
             settings: rules.settings(),
             reading: &reading,
-            setting: &setting,
+            next_goal: setting.goal_at(progress.reached + 1),
             progress: &progress,
         };
         let is_finite = write_state(&rules, &begun, normals, &mut observation)
@@ -283,7 +283,7 @@ impl Episode {
         let ended = EpisodeMoment {
             settings: rules.settings(),
             reading,
-            setting: &self.setting,
+            next_goal: self.setting.goal_at(self.progress.reached + 1),
             progress: &self.progress,
         };
         let mut is_sound = write_state(rules, &ended, normals, observation);
