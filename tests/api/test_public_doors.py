@@ -35,8 +35,8 @@ FLOOR = [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 ROOMS = ("record", "ground.grains", "ground.grains.lab", "show.replay", "show.figures", "show.live", "exports")
 #: What only holds results, and is made by other functions.
 RESULTS = {
-    "BallBed", "BedEnergy", "BedEstimate", "DiskBed", "DiskDrive", "DiskRun", "GrainRun", "LiveState", "PitFill",
-    "PlanarRun", "PlatePoint", "PressureLaw", "Pull", "RoverRun", "ShearLaw", "ShearPoint", "Strength", "SurfaceMap",
+    "BallBed", "BedEnergy", "BedEstimate", "ContactProblem", "DiskBed", "DiskDrive", "DiskRun", "GrainRun", "LiveState",
+    "PitFill", "PlanarRun", "PlatePoint", "PressureLaw", "Pull", "RoverRun", "ShearLaw", "ShearPoint", "Strength", "SurfaceMap",
     "Traction", "Trajectory", "WheelPoint", "WindowSnapshot",
 }  # fmt: skip
 
@@ -143,6 +143,7 @@ def arguments(name: str, w: World) -> dict[str, Any]:
         "write_onnx": {"policy": "anywhere", "path": out / "a.onnx"},
         "write_dataset": {"name": "rover/test-v0", "environment": "Rover-v0", "make_policy": PDPolicy}
         | {"seeds": [0], "folder": out},
+        "write_fclib": {"path": out / "a.hdf5", "W": np.eye(3), "q": [-1.0, 0.0, 0.0], "mu": 0.5},
         "write_fmu": {"simulation": w.sim, "path": out / "a.fmu"},
         "write_mcap": {"run": w.run, "path": out / "a.mcap"},
     }
