@@ -100,7 +100,7 @@ def write_fclib(
 
     Args:
         path: HDF5 file to write.
-        W: Delassus operator, as `solve_friction_contact` takes it.
+        W: Delassus operator, (n_c d, n_c d), an array or a sparse one of SciPy's.
         q: Free velocity, (n_c d,).
         mu: Friction coefficients, (n_c,), or one for all contacts.
         dimension: Components d of a contact, 2 or 3.
@@ -121,16 +121,14 @@ def write_fclib(
     if not len(free) or len(free) % dimension:
         refuse(ProblemError, "q", len(free), f"needs {dimension} entries a contact")
     n_contacts = len(free) // dimension
-    if isinstance(W, tuple):  # block rows
-        indptr, indices, blocks = W
-        W = sparse.bsr_array((blocks, indices, indptr), shape=(len(free),) * 2)
-    rows = sparse.csr_array(W if sparse.issparse(W) else array("W", W, error=ProblemError))
+    matrix = W if sparse.issparse(W) else array("W", W, error=ProblemError)
     coefficients = array("mu", mu, error=ProblemError)
     if coefficients.size == 1:
         coefficients = np.full(n_contacts, coefficients.item())
-    for field, values, shape in (("W", rows, (len(free),) * 2), ("mu", coefficients, (n_contacts,))):
+    for field, values, shape in (("W", matrix, (len(free),) * 2), ("mu", coefficients, (n_contacts,))):
         if values.shape != shape:
             refuse(ProblemError, field, values.shape, f"must have the shape {shape}")
+    rows = sparse.csr_array(matrix)
     for field, entries in (("W", rows.data), ("q", free), ("mu", coefficients)):
         if not np.isfinite(entries).all():
             refuse(ProblemError, field, entries[~np.isfinite(entries)][0], "must be finite")

@@ -8,8 +8,8 @@
 //! terms of the [`reward`] and whether and why the episode ends ([`ending`]); together they are the
 //! period's [`outcome`].
 //!
-//! - [`settings`] and [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
-//!   is drawn ([`crate::draw`]); [`setting`]: what was drawn for it;
+//! - [`settings`] and [`rules`]: what all episodes of a task share; [`beginning`]: how one begins,
+//!   in a scene that is drawn ([`crate::draw`]); [`setting`]: what was drawn for it;
 //! - [`running`]: one episode and its control period;
 //! - [`batch`]: many rovers side by side, each with its episode.
 //!
