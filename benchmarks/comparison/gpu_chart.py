@@ -12,8 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from reports import read_json, write_json
-from reports import table as table_in_markdown
+from reports import read_json, table as table_in_markdown, write_json
 
 from comparison.machine import processor
 from comparison.output import CHART

@@ -28,8 +28,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from reports import ROOT, read_json
-from reports import table as table_of
+from reports import ROOT, read_json, table as table_of
 
 from comparison import gpu_chart, policies
 from comparison.output import CHART

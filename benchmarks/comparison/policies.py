@@ -14,8 +14,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from reports import ROOT, write_json
-from reports import table as table_of
+from reports import ROOT, table as table_of, write_json
 from rich.console import Console
 
 from comparison.machine import versions

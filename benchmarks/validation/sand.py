@@ -15,8 +15,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
-from reports import DOCS
-from reports import table as table_of
+from reports import DOCS, table as table_of
 
 from rover_gym.ground.sand import (
     FittedSoil,

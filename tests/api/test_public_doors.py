@@ -36,8 +36,8 @@ ROOMS = ("record", "ground.grains", "ground.grains.lab", "show.replay", "show.fi
 #: What only holds results, and is made by other functions.
 RESULTS = {
     "BallBed", "BedEnergy", "BedEstimate", "ContactProblem", "DiskBed", "DiskDrive", "DiskRun", "GrainRun", "LiveState",
-    "PitFill", "PlanarRun", "PlatePoint", "PressureLaw", "Pull", "RoverRun", "ShearLaw", "ShearPoint", "Strength", "SurfaceMap",
-    "Traction", "Trajectory", "WheelPoint", "WindowSnapshot",
+    "PitFill", "PlanarRun", "PlatePoint", "PressureLaw", "Pull", "RoverRun", "ShearLaw", "ShearPoint", "Strength",
+    "SurfaceMap", "Traction", "Trajectory", "WheelPoint", "WindowSnapshot",
 }  # fmt: skip
 
 

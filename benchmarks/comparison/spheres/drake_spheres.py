@@ -16,8 +16,7 @@ from pydrake.multibody.plant import DiscreteContactApproximation, ExternallyAppl
 from pydrake.systems.analysis import ApplySimulatorConfig, SimulatorConfig
 
 from comparison.peers.base import LeftOut
-from comparison.peers.drake import GROUND, DrakePlant, add_body
-from comparison.peers.drake import material as properties_of
+from comparison.peers.drake import GROUND, DrakePlant, add_body, material as properties_of
 from comparison.spheres.scene import Array, FreeScene, G
 
 FOOT = 0.05  # m, radius of a slab's feet
