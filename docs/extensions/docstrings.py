@@ -47,10 +47,11 @@ def describe_fields(_app: Sphinx, _what: str, _name: str, obj: Any, options: Any
         return  # only some members are printed, or none
     rest, fields = split_attributes(lines)
     own = {*vars(obj), *vars(obj).get("__annotations__", {})}
-    is_moved = set(fields) <= own
+    inherited = {name for base in obj.__mro__[1:] for name in vars(base).get("__annotations__", {})}
+    is_moved = set(fields) <= own | inherited
     _, arguments = split_attributes(lines, "Args:")  # those of a data class are its fields
-    told = {**{name: text for name, text in arguments.items() if name in own}, **(fields if is_moved else {})}
-    told = {name: text for name, text in told.items() if not speaks_for_itself(vars(obj).get(name))}
+    told = {**arguments, **(fields if is_moved else {})}
+    told = {name: text for name, text in told.items() if name in own and not speaks_for_itself(vars(obj).get(name))}
     if told:
         analyzer = ModuleAnalyzer.for_module(obj.__module__)
         analyzer.analyze()
