@@ -1020,17 +1020,21 @@ class StepReport:
     def status(self) -> Literal["converged", "not_converged"]:
         """Whether the steps "converged" or "not_converged".
 
-        "converged" means that the contact solver met its tolerance in every step.
+        "converged" means that the contact solver met its tolerance in every step, or
+        `acceptable` where it was slow.
         """
     @property
     def is_converged(self) -> bool:
-        """Whether the contact solver met its tolerance in every step."""
+        """Whether `status` is "converged"."""
     @property
     def budget_exhausted(self) -> bool:
         """Whether a contact problem stayed unsolved because the solver's `budget` was spent.
 
         With a larger `budget` it may be solved.
         """
+    @property
+    def acceptable(self) -> int:
+        """Number of contact problems whose answer met the option `acceptable` alone."""
     @property
     def steps(self) -> int:
         """Number of steps taken."""
@@ -1502,6 +1506,8 @@ class Simulation(AnySimulation):
             its normal velocity; in [0, 1].
         solver: Method for the contact problem, as in `solve_friction_contact`.
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        acceptable: Violation at a contact, m/s, that is accepted where the contact solver is slow;
+            `StepReport.acceptable` counts such solves. 0 accepts none.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
             `solve_friction_contact` (operations, not time). By default it grows with the
@@ -1532,6 +1538,7 @@ class Simulation(AnySimulation):
         forecast: float = 0.5,
         solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
         tolerance: float | None = None,
+        acceptable: float = 1e-08,
         max_iterations: int = 1000,
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
@@ -2192,6 +2199,8 @@ class BallSimulation(PlanarSimulation):
             its normal velocity; in [0, 1].
         solver: Method for the contact problem, as in `solve_friction_contact`.
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        acceptable: Violation at a contact, m/s, that is accepted where the contact solver is slow;
+            `StepReport.acceptable` counts such solves. 0 accepts none.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
             `solve_friction_contact` (operations, not time). By default it grows with the
@@ -2224,6 +2233,7 @@ class BallSimulation(PlanarSimulation):
         forecast: float = 0.5,
         solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
         tolerance: float | None = None,
+        acceptable: float = 1e-08,
         max_iterations: int = 1000,
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
@@ -2269,6 +2279,8 @@ class TwoWheelRoverSimulation(PlanarSimulation):
             its normal velocity; in [0, 1].
         solver: Method for the contact problem, as in `solve_friction_contact`.
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        acceptable: Violation at a contact, m/s, that is accepted where the contact solver is slow;
+            `StepReport.acceptable` counts such solves. 0 accepts none.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
             `solve_friction_contact` (operations, not time). By default it grows with the
@@ -2305,6 +2317,7 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         forecast: float = 0.5,
         solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
         tolerance: float | None = None,
+        acceptable: float = 1e-08,
         max_iterations: int = 1000,
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
@@ -2341,6 +2354,8 @@ class MirroredRoverSimulation(PlanarSimulation):
             its normal velocity; in [0, 1].
         solver: Method for the contact problem, as in `solve_friction_contact`.
         tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        acceptable: Violation at a contact, m/s, that is accepted where the contact solver is slow;
+            `StepReport.acceptable` counts such solves. 0 accepts none.
         max_iterations: Largest number of iterations of the contact solver in a step.
         budget: Largest amount of work of the contact solver in a step, in the unit of
             `solve_friction_contact` (operations, not time). By default it grows with the
@@ -2371,6 +2386,7 @@ class MirroredRoverSimulation(PlanarSimulation):
         forecast: float = 0.5,
         solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
         tolerance: float | None = None,
+        acceptable: float = 1e-08,
         max_iterations: int = 1000,
         budget: int | None = None,
         stabilisation: Literal["projection", "none"] = "projection",
@@ -3568,6 +3584,7 @@ class SolverReport:
         "pivoting",
         "guided_newton",
         "newton",
+        "pyramids",
         "proximal",
         "restarts",
         "interior_point",

@@ -241,6 +241,7 @@ class StepReport:
     status: Literal["converged", "not_converged"]
     is_converged: bool
     budget_exhausted: bool
+    acceptable: int
     steps: int
     iterations: int
     newton_iterations: int
@@ -610,6 +611,7 @@ class SolverReport:
         "pivoting",
         "guided_newton",
         "newton",
+        "pyramids",
         "proximal",
         "restarts",
         "interior_point",

@@ -99,7 +99,7 @@ proptest! {
         numbers in prop::collection::vec(-1.0..1.0f64, 97),
         modes in prop::collection::vec(0u8..3, 1..7),
         mu in 0.1..0.6f64,
-        // Rows of at most 18 entries stay dominated by their diagonals: otherwise sweeps may diverge.
+        // The diagonal of at most 18 entries dominates its row: otherwise sweeps may diverge.
         skew in prop_oneof![Just(0.0), -0.05..0.05f64],
         planar in prop::bool::ANY,
     ) {

@@ -107,6 +107,7 @@ struct Settings {
     forecast: f64,
     solver: String,
     tolerance: f64,
+    acceptable: f64,
     max_iterations: usize,
     /// None grows with the problem.
     #[serde(default)]
@@ -281,6 +282,7 @@ impl Settings {
             solver: SolverOptions {
                 method: method.ok_or_else(|| unknown("solver", &self.solver))?,
                 tolerance: self.tolerance,
+                acceptable: self.acceptable,
                 velocity_tolerance: self.tolerance.max(1e-9),
                 max_newton_steps: self.max_iterations,
                 max_sweeps: self.max_iterations,

@@ -112,6 +112,9 @@ macro_rules! step_options {
             solver => solver.method;
             /// Largest relative residual of the contact problem; 1e-12 by default.
             tolerance | None => solver.tolerance;
+            /// Violation at a contact, m/s, that is accepted where the contact solver is slow;
+            /// `StepReport.acceptable` counts such solves. 0 accepts none.
+            acceptable => solver.acceptable;
             /// Largest number of iterations of the contact solver in a step.
             max_iterations => solver.max_sweeps;
             /// Largest amount of work of the contact solver in a step, in the unit of

@@ -26,7 +26,8 @@ macro_rules! step_report {
 
             /// Whether the steps "converged" or "not_converged".
             ///
-            /// "converged" means that the contact solver met its tolerance in every step.
+            /// "converged" means that the contact solver met its tolerance in every step, or
+            /// `acceptable` where it was slow.
             #[getter]
             fn status(&self) -> &'static str {
                 if self.is_converged() {
@@ -36,7 +37,7 @@ macro_rules! step_report {
                 }
             }
 
-            /// Whether the contact solver met its tolerance in every step.
+            /// Whether `status` is "converged".
             #[getter]
             fn is_converged(&self) -> bool {
                 self.inner.is_converged()
@@ -83,6 +84,8 @@ step_report! {
     ///
     /// With a larger `budget` it may be solved.
     budget_exhausted: bool;
+    /// Number of contact problems whose answer met the option `acceptable` alone.
+    acceptable: usize;
     /// Number of steps taken.
     steps: usize;
     /// Iterations of the contact solver, summed over the steps.

@@ -59,7 +59,7 @@ pub struct StepOptions {
     /// Whether the solver starts from the last step's impulses. Default true.
     pub warm_start: bool,
     /// Options of the contact solver. Default tolerance 1e-12: it costs 5% more than 1e-10 on a
-    /// drive, and a parked rover stays at rest.
+    /// drive, and a parked rover stays at rest. Default acceptable violation 1e-8 m/s.
     pub solver: SolverOptions,
     /// Newton variant: stop when no velocity changes by more than this, relative to 1 m/s and to
     /// the largest velocity. Default 1e-12.
@@ -82,7 +82,10 @@ impl Default for StepOptions {
             stabilisation: Stabilisation::default(),
             penetration_tolerance: None,
             warm_start: true,
-            solver: SolverOptions::default(),
+            solver: SolverOptions {
+                acceptable: 1e-8,
+                ..SolverOptions::default()
+            },
             newton_tolerance: 1e-12,
             newton_max_iterations: 20,
         }
@@ -155,6 +158,13 @@ impl StepOptions {
             tolerance,
             tolerance > 0.0,
             "finite and positive",
+        )?;
+        let acceptable = self.solver.acceptable;
+        demand(
+            "acceptable",
+            acceptable,
+            acceptable >= 0.0,
+            "finite and not negative",
         )?;
         let iterations = self.solver.max_newton_steps.min(self.solver.max_sweeps) as f64;
         demand(

@@ -6,7 +6,7 @@ use crate::solver::{SolveReport, SolveStatus};
 /// Whether the equations of the step were solved to their tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StepStatus {
-    /// The equations were solved to their tolerance.
+    /// The equations were solved to their tolerance, or acceptably.
     #[default]
     Converged,
     /// The contact solver or Newton's iteration stopped above its tolerance, a loop stayed open, or
@@ -22,6 +22,8 @@ pub struct StepReport {
     /// Whether a solve that did not converge ended because its
     /// [budget](crate::solver::SolverOptions::budget) was spent: with a larger one it may converge.
     pub budget_exhausted: bool,
+    /// Solves that ended with an acceptable answer, all steps together.
+    pub acceptable: usize,
     /// Steps taken.
     pub steps: usize,
     /// Iterations of the contact solver, all steps together.
@@ -77,7 +79,7 @@ pub struct StepReport {
 }
 
 impl StepReport {
-    /// Whether every step was solved to tolerance.
+    /// Whether every step was solved to tolerance, or acceptably.
     #[must_use]
     pub fn is_converged(&self) -> bool {
         self.status == StepStatus::Converged
@@ -89,6 +91,7 @@ impl StepReport {
         self.factorisations += solved.factorisations();
         self.pivots += solved.pivots();
         self.residual = self.residual.max(solved.residual);
+        self.acceptable += usize::from(solved.status == SolveStatus::Acceptable);
         if !solved.is_converged() {
             self.status = StepStatus::NotConverged;
             self.budget_exhausted |= solved.status == SolveStatus::BudgetExhausted;
@@ -109,6 +112,7 @@ impl StepReport {
             self.status = StepStatus::NotConverged;
         }
         self.budget_exhausted |= later.budget_exhausted;
+        self.acceptable += later.acceptable;
         self.steps += later.steps;
         self.iterations += later.iterations;
         self.factorisations += later.factorisations;

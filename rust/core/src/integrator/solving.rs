@@ -259,6 +259,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         }
         let options = SolverOptions {
             tolerance: self.tolerance(d, leader),
+            acceptable: 0.0, // is a speed, not a displacement
             ..self.solver_options()
         };
         if self.list.groups.len() > 1 {

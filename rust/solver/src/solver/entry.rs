@@ -446,6 +446,7 @@ fn solve_scaled<const D: usize>(
     let q: Vec<f64> = problem.free_velocity().iter().map(|x| x / speed).collect();
     let scaled_options = SolverOptions {
         velocity_tolerance: options.velocity_tolerance / speed,
+        acceptable: options.acceptable / speed,
         rounding: options.rounding / speed,
         ..*options
     };

@@ -85,6 +85,11 @@ pub struct SolverOptions {
     pub tolerance: f64,
     /// Largest violation of a converged answer at any contact, m/s; default 1e-9.
     pub velocity_tolerance: f64,
+    /// Violation at any contact, m/s, of an answer that is accepted where progress is slow; default
+    /// 0, which accepts none. [`Method::Auto`] with few contacts asks for it once its quick stages
+    /// have missed the tolerances: contacts that are wedged against each other may have no answer
+    /// in floating point that is better by much.
+    pub acceptable: f64,
     /// Rounding of the free velocity q, m/s; default 0. Bodies that move together have a q that is
     /// the difference of larger velocities, known to the rounding of these.
     ///
@@ -155,6 +160,11 @@ impl SolverOptions {
         residual.velocity <= self.rounding
     }
 
+    /// Whether the answer may be accepted where progress is slow.
+    pub(super) fn is_acceptable(&self, residual: Residual) -> bool {
+        residual.velocity <= self.acceptable
+    }
+
     /// Factor by which a residual exceeds the tolerances.
     pub(super) fn excess(&self, residual: Residual) -> f64 {
         (residual.relative / self.tolerance).max(residual.velocity / self.velocity_tolerance)
@@ -167,6 +177,7 @@ impl Default for SolverOptions {
             method: Method::Auto,
             tolerance: 1e-12,
             velocity_tolerance: 1e-9,
+            acceptable: 0.0,
             rounding: 0.0,
             max_newton_steps: 500,
             max_sweeps: 10_000,

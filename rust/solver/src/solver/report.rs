@@ -9,6 +9,9 @@ use crate::problem::Residual;
 pub enum SolveStatus {
     /// Both tolerances hold, or the violation is within the rounding of the data.
     Converged,
+    /// The tolerances do not hold, but the violation is at most the
+    /// [acceptable](super::SolverOptions::acceptable) one, and progress was slow.
+    Acceptable,
     /// The tolerances hold for the convex relaxation, which is not Coulomb's law; the report's
     /// residuals are those of Coulomb's law.
     SolvedRelaxed,
@@ -29,6 +32,7 @@ impl SolveStatus {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
+            Self::Acceptable => "acceptable",
             Self::SolvedRelaxed => "relaxed",
             Self::MaxIterations => "max_iterations",
             Self::Stalled => "stalled",
@@ -58,6 +62,8 @@ pub enum Stage {
     GuidedNewton,
     /// Full Newton steps on predicted modes, from zero or from the result of the sweeps.
     Newton,
+    /// Few contacts: Lemke's pivoting on friction pyramids, then pivoting.
+    Pyramids,
     /// Proximal point around a damped Newton.
     ProximalPoint,
     /// Few contacts: pivoting from the nearest answer so far and from other starts.
@@ -82,6 +88,7 @@ impl Stage {
             Self::Pivoting => "pivoting",
             Self::GuidedNewton => "guided_newton",
             Self::Newton => "newton",
+            Self::Pyramids => "pyramids",
             Self::ProximalPoint => "proximal",
             Self::Restarts => "restarts",
             Self::InteriorPoint => "interior_point",
@@ -95,9 +102,12 @@ impl Stage {
     pub const fn method(self) -> Method {
         match self {
             Self::Sweeps | Self::BodySweeps | Self::Islands => Method::GaussSeidel,
-            Self::AtRest | Self::Pivoting | Self::GuidedNewton | Self::Newton | Self::Restarts => {
-                Method::Newton
-            }
+            Self::AtRest
+            | Self::Pivoting
+            | Self::GuidedNewton
+            | Self::Newton
+            | Self::Pyramids
+            | Self::Restarts => Method::Newton,
             Self::ProximalPoint | Self::InteriorPoint => Method::ProximalPoint,
             Self::Admm => Method::Admm,
             Self::Relaxed => Method::Relaxed,
@@ -221,9 +231,12 @@ impl SolveReport {
         pivoting.map(|rung| rung.iterations as usize).sum()
     }
 
-    /// Whether the answer meets the tolerances.
+    /// Whether the answer meets the tolerances, or is acceptable.
     #[must_use]
     pub fn is_converged(&self) -> bool {
-        self.status == SolveStatus::Converged
+        matches!(
+            self.status,
+            SolveStatus::Converged | SolveStatus::Acceptable
+        )
     }
 }

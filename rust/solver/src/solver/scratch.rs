@@ -2,6 +2,7 @@
 //! them allocates.
 
 use super::history::History;
+use super::linear::lemke::Tableau;
 use super::linear::reduced_system::ReducedSystem;
 use super::local::sweep;
 use super::options::SolverOptions;
@@ -18,6 +19,8 @@ pub(super) struct SolveScratch {
     pub system: ReducedSystem,
     /// Pivoting's impulses, velocities and modes.
     pub pivoting: Pivoting<f64, Many>,
+    /// Friction pyramids in the place of the cones.
+    pub pyramids: PyramidScratch,
     /// Inverse masses of the contacts, 1/kg: ADMM's penalty at `σ = 1`.
     pub weights: Vec<f64>,
     /// Impulse at the start of the solve, N s.
@@ -89,6 +92,18 @@ impl SolveScratch {
         });
         status
     }
+}
+
+/// Pyramids in the place of few contacts' cones.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PyramidScratch {
+    pub tableau: Tableau,
+    /// Direction of the first edge of each pyramid.
+    pub first: Vec<[f64; 2]>,
+    /// Normal and edges of each, in the frames of the contacts.
+    pub edges: Vec<[f64; 3]>,
+    /// The Delassus operator, n by n.
+    pub W: Vec<f64>,
 }
 
 /// Why a stage ended, and the residual of its answer.

@@ -59,6 +59,11 @@ pub(in crate::solver) fn dense(m: usize, is_symmetric: bool) -> u64 {
     m * m * m / (shares * DENSE) + m * m
 }
 
+/// Units of one pivot in a tableau of `n` pairs.
+pub(in crate::solver) fn tableau_pivot(n: usize) -> u64 {
+    (n * (n + 2)) as u64 / DENSE
+}
+
 /// Limits of the sweeps.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct SweepBudget {

@@ -3,4 +3,5 @@
 
 mod block_lu;
 mod dense;
+pub(super) mod lemke;
 pub(super) mod reduced_system;

@@ -19,4 +19,5 @@ pub(super) mod interior_point;
 pub(super) mod newton;
 pub(super) mod pivoting;
 pub(super) mod proximal;
+pub(super) mod pyramids;
 pub(super) mod restarts;

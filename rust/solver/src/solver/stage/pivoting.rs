@@ -169,6 +169,16 @@ pub(in crate::solver) fn pivots<const D: usize>(
     attempt: &mut Attempt<'_, D>,
     alpha: Option<f64>,
 ) -> StageEnd {
+    let most = MAX_PIVOTS.max(attempt.data.mu.len());
+    few_pivots(attempt, alpha, most)
+}
+
+/// Pivots as [`pivots`], with at most so many systems.
+pub(in crate::solver) fn few_pivots<const D: usize>(
+    attempt: &mut Attempt<'_, D>,
+    alpha: Option<f64>,
+    most: usize,
+) -> StageEnd {
     let (data, options) = (attempt.data, attempt.options);
     let scratch = &mut *attempt.scratch;
     let pivoting = &mut scratch.pivoting;
@@ -183,7 +193,7 @@ pub(in crate::solver) fn pivots<const D: usize>(
         is_fresh: false,
     };
     let tolerances = [options.tolerance, options.velocity_tolerance].map(|x| x * x);
-    let most = MAX_PIVOTS.max(data.mu.len()).min(options.max_newton_steps);
+    let most = most.min(options.max_newton_steps);
     pivoting.begin(&mut system, true);
     let mut steps = 0;
     let answer = loop {

@@ -7,7 +7,7 @@ use crate::solver::options::Method;
 use crate::solver::report::{SolveStatus, Stage, StageResult};
 use crate::solver::scratch::{Attempt, StageEnd};
 use crate::solver::stage::{
-    gauss_seidel, guided, interior_point, newton, pivoting, proximal, restarts,
+    gauss_seidel, guided, interior_point, newton, pivoting, proximal, pyramids, restarts,
 };
 use crate::solver::work::SweepBudget;
 
@@ -106,6 +106,17 @@ impl<'a, 'b, const D: usize> Ladder<'a, 'b, D> {
 
     fn is_exhausted(&self) -> bool {
         self.attempt.scratch.work.is_exhausted
+    }
+
+    /// Ends with the best answer, if it is acceptable.
+    fn accept(&mut self) -> Option<StageResult> {
+        let options = self.attempt.options;
+        options
+            .is_acceptable(self.nearest.residual)
+            .then(|| StageResult {
+                status: SolveStatus::Acceptable,
+                ..self.give_nearest()
+            })
     }
 
     /// Ends with the best answer and the reason of the last stage. `u` is `W p + q` on return.
@@ -221,6 +232,36 @@ impl<'a, 'b, const D: usize> Ladder<'a, 'b, D> {
         self.enter(Stage::ProximalPoint, found)
     }
 
+    /// Few contacts whose quick stages have failed: pyramids, pivoting from other starts, and a
+    /// short descent, each until the nearest answer is acceptable.
+    fn unwedge(&mut self) -> Option<StageResult> {
+        let found = pyramids::solve(self.attempt);
+        let outcome = self.enter(Stage::Pyramids, found);
+        if let Some(outcome) = outcome.or_else(|| self.accept()) {
+            return Some(outcome);
+        }
+        if !self.nearest.residual.is_finite() || self.is_exhausted() {
+            return None;
+        }
+        let found = restarts::solve(self.attempt);
+        let outcome = self.enter(Stage::Restarts, found);
+        if let Some(outcome) = outcome.or_else(|| self.accept()) {
+            return Some(outcome);
+        }
+        self.take_nearest();
+        let most_steps = ATTEMPT.min(self.attempt.options.max_newton_steps);
+        self.descend(most_steps).or_else(|| self.accept())
+    }
+
+    /// Many contacts: the interior point method, then the proximal point method.
+    fn follow_and_descend(&mut self) -> Option<StageResult> {
+        let Attempt { p, scratch, .. } = &mut *self.attempt;
+        p.copy_from_slice(&scratch.start);
+        let found = interior_point::solve(self.attempt);
+        let outcome = self.enter(Stage::InteriorPoint, found);
+        outcome.or_else(|| self.descend_many())
+    }
+
     /// Many contacts: pivoting from the last attempt's answer `p`, if it is near.
     ///
     /// Where bodies touch at many points, `W` has a large null space. An answer may then violate
@@ -301,33 +342,10 @@ pub(in crate::solver) fn escalate<const D: usize>(
     if let Some(outcome) = ladder.enter(Stage::Newton, found) {
         return outcome;
     }
-    let Attempt { p, scratch, .. } = &mut *ladder.attempt;
-    p.copy_from_slice(&scratch.start);
-    if !is_few {
-        let found = interior_point::solve(ladder.attempt);
-        if let Some(outcome) = ladder.enter(Stage::InteriorPoint, found) {
-            return outcome;
-        }
-    }
     let found = if is_few {
-        ladder.descend(most_steps)
+        ladder.unwedge()
     } else {
-        ladder.descend_many()
+        ladder.follow_and_descend()
     };
-    if let Some(outcome) = found {
-        return outcome;
-    }
-    if is_few && ladder.nearest.residual.is_finite() {
-        let found = restarts::solve(ladder.attempt);
-        if let Some(outcome) = ladder.enter(Stage::Restarts, found) {
-            return outcome;
-        }
-        if ladder.nearest.residual.relative < NEAR {
-            ladder.take_nearest();
-            if let Some(outcome) = ladder.descend(most_steps) {
-                return outcome;
-            }
-        }
-    }
-    ladder.give_nearest()
+    found.unwrap_or_else(|| ladder.give_nearest())
 }
