@@ -129,6 +129,7 @@ docs: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/debian-test ## build the documenta
 bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
 	$(COMPARE).rollout
 	$(COMPARE).exploring_bench
+	$(COMPARE).tails
 	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver disks)
 	cargo run --locked --quiet --profile bench -p rover-comparison --example sand_steps
 	-$(COMPARE).instructions
