@@ -907,6 +907,7 @@ fn random_mechanism(n_contacts: usize, nv: usize, mut next: impl FnMut() -> f64)
 
 /// Number of random problems that converge; deterministic, so that a less robust solver shows.
 #[test]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // sizes from 0 to 15
 fn most_random_mechanisms_are_solved() {
     let mut next = uniform(1);
     let (mut converged, mut iterations, total) = (0, 0, 2000);

@@ -168,7 +168,9 @@ mod tests {
         ];
         let mut tableau = posed(&M, &[-2.0, -5.0, -9.0]);
         assert!(tableau.solve().0);
-        assert_eq!([0, 1, 2].map(|i| tableau.value(i)), [2.0, 1.0, 3.0]);
+        let z = [0, 1, 2].map(|i| tableau.value(i));
+        let expected = [2.0, 1.0, 3.0];
+        assert!((0..3).all(|i| (z[i] - expected[i]).abs() < 1e-14), "{z:?}");
     }
 
     #[test]
@@ -181,7 +183,7 @@ mod tests {
     fn a_problem_without_demands_is_solved_by_zero() {
         let mut tableau = posed(&[vec![1.0]], &[0.5]);
         assert_eq!(tableau.solve(), (true, 0));
-        assert_eq!(tableau.value(0), 0.0);
+        assert!(tableau.value(0).abs() < 1e-300);
     }
 
     /// Positive semidefinite problems of any rank that have an answer.
