@@ -150,7 +150,7 @@ class Sampler:
 
     def scene(self) -> dict[str, Any]:
         """What is simulated, from the simulation at its start."""
-        raise NotImplementedError
+        raise NotImplementedError  # each kind of simulation describes its own
 
     @property
     def terrain(self) -> Terrain | None:

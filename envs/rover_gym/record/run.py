@@ -39,7 +39,7 @@ class Run:
     @classmethod
     def is_scene(cls, scene: Mapping[str, Any]) -> bool:
         """Whether a file with this scene is a run of this kind."""
-        raise NotImplementedError
+        raise NotImplementedError  # each kind knows its own scenes
 
     @classmethod
     def of(cls, trajectory: Trajectory, path: str | Path) -> Self:
@@ -56,7 +56,7 @@ class Run:
     @classmethod
     def _checked(cls, trajectory: Trajectory, path: str | Path) -> Self:
         """The run, once what only this kind holds has been checked."""
-        raise NotImplementedError
+        raise NotImplementedError  # each kind holds other things
 
     @property
     def title(self) -> str:

@@ -90,7 +90,7 @@ class ObservingPolicy:
             starts: `(n,)` the rovers whose episode begins.
             deterministic: Whether nothing is drawn.
         """
-        raise NotImplementedError
+        raise NotImplementedError  # each policy has its own
 
 
 def check_observed(given: npt.NDArray[Any], size: int) -> None:

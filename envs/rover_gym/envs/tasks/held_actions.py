@@ -82,7 +82,7 @@ class HeldVectorEnv(VectorWrapper):
 
     def observe(self) -> Any:
         """The present observations of all rovers."""
-        raise NotImplementedError
+        raise NotImplementedError  # each task observes other things
 
     def hold(self, actions: Any, moved: Mask) -> tuple[Array, Mask, Mask]:
         """Holds the actions of the rovers that move `(num_envs,)`.
@@ -90,7 +90,7 @@ class HeldVectorEnv(VectorWrapper):
         Returns:
             Sums of the rewards `(num_envs,)`, which episodes have ended, and which have reached their time limit.
         """
-        raise NotImplementedError
+        raise NotImplementedError  # each task holds an action for another time
 
     def begin(self, rovers: Mask) -> None:
         """Rovers `(num_envs,)` begin an episode."""
