@@ -52,6 +52,8 @@ pub(super) struct List<C: UnilateralContact> {
     pub leaves_open: bool,
     /// Work of the step's solves so far, in the solver's unit.
     pub work_spent: u64,
+    /// Whether a step that is not solved is taken in halves.
+    pub may_halve: bool,
 }
 
 /// A friction-contact problem with its answer, by contact.
@@ -98,6 +100,7 @@ impl<C: UnilateralContact> List<C> {
             redundancy: Redundancy::default(),
             leaves_open: false,
             work_spent: 0,
+            may_halve: false,
         }
     }
 

@@ -54,6 +54,11 @@ pub(super) fn advance<S: MechanicalSystem>(
         share: 1.0,
         depth: 0,
     };
+    let is_unsolved = std::mem::take(&mut scratch.is_unsolved);
+    if is_unsolved && !options.is_elastic() && system.solves_to_the_end() {
+        // Another law of restitution may solve it as a whole.
+        return whole.divide(2.0, system, scratch, &mut attempts, probe);
+    }
     whole.advance(system, scratch, &mut attempts, probe)
 }
 
@@ -137,6 +142,7 @@ impl Part<'_> {
             if !d.going {
                 return give_up(d.obstacles[0], d.is_last, d.time);
             }
+            s.list.may_halve = !d.is_last;
             s.solve(&d.v, (&d.y, &d.laws), problems);
             probe.end(Phase::Solve);
             if take_answers(s, d, problems, probe) {
@@ -251,6 +257,7 @@ pub(super) fn project_and_accept<S: MechanicalSystem>(
         return Err(StepError::NoGround { time: d.time, x, z });
     }
     d.is_last = true;
+    s.list.may_halve = false;
     let is_deep = s.options.stabilisation == Stabilisation::Projection && measure(s, d);
     if is_deep {
         set_gaps(s, d, gaps);

@@ -1,6 +1,6 @@
 //! The state that a step of one system advances, and its scratch.
 
-use super::data::Data;
+use super::data::{Data, Obstacle};
 use super::dynamics::Dynamics;
 use super::listed::{List, Posed};
 use super::local::Local;
@@ -33,6 +33,8 @@ pub struct StepScratch<Q, C: UnilateralContact> {
     pub(super) problems: Posed<C::Local>,
     pub(super) gaps: Posed<C::Local>,
     whole: Whole<C>,
+    /// Whether the next step was tried as a whole, and its contact problem not solved.
+    pub(super) is_unsolved: bool,
 }
 
 /// Scratch of a system's steps.
@@ -96,7 +98,13 @@ impl<Q: Clone, C: UnilateralContact + Clone> StepScratch<Q, C> {
             gaps: problems.clone(),
             problems,
             whole: Whole::new(),
+            is_unsolved: false,
         }
+    }
+
+    /// Notes why the next step was not taken with the usual effort.
+    pub(crate) fn note(&mut self, obstacle: Obstacle) {
+        self.is_unsolved = obstacle == Obstacle::Solver;
     }
 
     /// Takes over a state and its memory at the start of a step.

@@ -98,6 +98,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
         for &leader in groups {
             let options = SolverOptions {
                 rounding: rounding(free.0),
+                is_brief: self.list.may_halve,
                 ..self.options.solver
             };
             let solved = if are_several {
@@ -119,6 +120,7 @@ impl<S: MechanicalSystem> Listed<'_, S> {
     fn solve_all(&mut self, free: (&[f64], &[f64]), problems: &mut PosedOf<S>) -> SolveReport {
         let options = SolverOptions {
             rounding: rounding(free.0),
+            is_brief: self.list.may_halve,
             ..self.solver_options()
         };
         let list = &mut *self.list;

@@ -189,12 +189,21 @@ impl Differentiator {
         let command = self.sim.command.clone();
         let sim = &mut self.sim;
         let is_rigid = !sim.model().has_compliance();
-        if is_rigid && matches!(sim.usual_step(&mut NoProbe)?, UsualOutcome::Taken(_)) {
-            let mut found = sim.warm_start.clone();
-            found.persistent.clear();
-            self.set(state)?;
-            self.sim.command = command;
-            self.sim.warm_start = found;
+        let usual = if is_rigid {
+            sim.usual_step(&mut NoProbe)?
+        } else {
+            UsualOutcome::None
+        };
+        match usual {
+            UsualOutcome::None => {}
+            UsualOutcome::Refused(obstacle) => sim.scratch.note(obstacle),
+            UsualOutcome::Taken(_) => {
+                let mut found = sim.warm_start.clone();
+                found.persistent.clear();
+                self.set(state)?;
+                self.sim.command = command;
+                self.sim.warm_start = found;
+            }
         }
         self.report = (self.sim).step_with_all_effort(&Variant::Linearised, &mut NoProbe)?;
         Ok(self.state_of(&self.sim))

@@ -349,11 +349,11 @@ impl<T: Lane> Lanes<T> {
             let Some(slot) = slot.as_mut().filter(|slot| !slot.has_failed) else {
                 continue;
             };
-            if block.fallback(lane).is_none() {
+            let Some(obstacle) = block.fallback(lane) else {
                 slot.report.merge(block.report(lane));
                 slot.was_alone = false;
                 continue;
-            }
+            };
             let BatchRover { rover, error } = &mut rovers[slot.index];
             if slot.kept.steps == slot.report.steps {
                 rover.leave(block, lane);
@@ -361,12 +361,9 @@ impl<T: Lane> Lanes<T> {
                 rover.store(block, lane);
             }
             slot.kept = slot.report;
-            match rover.step_alone() {
+            match rover.step_alone(obstacle) {
                 Ok(report) => {
-                    slot.report.merge(&StepReport {
-                        fallbacks: 1,
-                        ..report
-                    });
+                    slot.report.merge(&report);
                     slot.was_alone = true;
                     slot.kept = slot.report;
                     rover.load(block, lane);

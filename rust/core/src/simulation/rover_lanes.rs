@@ -7,7 +7,7 @@ use super::own_block::solve;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::{UsualOutcome, UsualStep};
 use crate::contact::slots::machine::SharedMachine;
-use crate::integrator::{NoProbe, Phase, Probe, StepError, StepReport, Variant};
+use crate::integrator::{NoProbe, Obstacle, Phase, Probe, StepError, StepReport, Variant};
 use crate::scalar::{Instructions, Lane, Single};
 use crate::solver::batch::problem::ContactProblem;
 use crate::solver::batch::queue::Queue;
@@ -51,10 +51,10 @@ impl RoverScene {
             all.resize_with(block.n_problems(), ContactProblem::default);
         }
         block.prepare(problems, probe);
-        if !block.is_going(0) {
+        if let Some(obstacle) = block.fallback(0) {
             // Its problems may have more contacts than fit.
             block.return_ruts(0, &mut lane_rover);
-            return UsualOutcome::Refused;
+            return UsualOutcome::Refused(obstacle);
         }
         let solver = &step.options.solver;
         let mut next = Next::Retake;
@@ -74,9 +74,9 @@ impl RoverScene {
             }
         }
         block.finish(is_deep.then_some(&mut gap_problems[..]), probe);
-        if block.fallback(0).is_some() {
+        if let Some(obstacle) = block.fallback(0) {
             block.return_ruts(0, &mut lane_rover);
-            return UsualOutcome::Refused;
+            return UsualOutcome::Refused(obstacle);
         }
         block.store_rover(0, &mut lane_rover);
         let report = *block.report(0);
@@ -152,10 +152,10 @@ impl RoverSimulation {
         });
     }
 
-    /// A step with all effort.
-    pub(super) fn step_alone(&mut self) -> Result<StepReport, StepError> {
+    /// The step with all effort that follows one that a block has not taken.
+    pub(super) fn step_alone(&mut self, obstacle: Obstacle) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
-        self.step_with_all_effort(&variant, &mut NoProbe)
+        self.step_past(obstacle, &variant, &mut NoProbe)
     }
 
     fn lane_rover(&mut self) -> LaneRover<'_> {

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::active_contact::{ActiveContact, LocatedContact};
 use super::state::{Moved, State};
 use crate::integrator::{
-    Dynamics, MechanicalSystem, Probe, StepOptions, StepReport, StepScratch, UnilateralContact,
-    WarmStart,
+    Dynamics, MechanicalSystem, Obstacle, Probe, StepOptions, StepReport, StepScratch,
+    UnilateralContact, WarmStart,
 };
 use crate::multibody::Energy;
 
@@ -178,8 +178,8 @@ impl<S: Scene> Snapshot<S> {
 pub enum UsualOutcome {
     /// The scene has no such steps.
     None,
-    /// The step takes more effort; nothing has changed.
-    Refused,
+    /// The step takes more effort, for a reason; nothing has changed.
+    Refused(Obstacle),
     /// The step was taken.
     Taken(StepReport),
 }

@@ -9,8 +9,8 @@ use super::scene::{
 use super::state::{Moved, State};
 use crate::caught::caught;
 use crate::integrator::{
-    Integrator, Local, NoProbe, OptionsError, Probe, StateMut, StepError, StepOptions, StepReport,
-    StepScratch, UnilateralContact, WarmStart,
+    Integrator, Local, NoProbe, Obstacle, OptionsError, Probe, StateMut, StepError, StepOptions,
+    StepReport, StepScratch, UnilateralContact, WarmStart,
 };
 use crate::multibody::Energy;
 use crate::problem::{Dimension, FrictionContactProblem, undetermined_loads};
@@ -281,10 +281,8 @@ impl<S: Scene> Simulation<S> {
             };
             let report = match usual {
                 UsualOutcome::Taken(report) => report,
-                UsualOutcome::None | UsualOutcome::Refused => StepReport {
-                    fallbacks: usize::from(usual == UsualOutcome::Refused),
-                    ..self.step_with_all_effort(integrator, probe)?
-                },
+                UsualOutcome::None => self.step_with_all_effort(integrator, probe)?,
+                UsualOutcome::Refused(obstacle) => self.step_past(obstacle, integrator, probe)?,
             };
             total.merge(&report);
             if !go_on() {
@@ -344,6 +342,20 @@ impl<S: Scene> Simulation<S> {
                 warm_start: &mut own.warm_start,
             };
             own.scene.usual_step(&mut step, probe)
+        })
+    }
+
+    /// A step with all effort that has met an obstacle with the usual one.
+    pub(super) fn step_past<I: for<'a> Integrator<S::System<'a>>>(
+        &mut self,
+        obstacle: Obstacle,
+        integrator: &I,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        self.scratch.note(obstacle);
+        Ok(StepReport {
+            fallbacks: 1,
+            ..self.step_with_all_effort(integrator, probe)?
         })
     }
 

@@ -90,6 +90,12 @@ pub struct SolverOptions {
     /// have missed the tolerances: contacts that are wedged against each other may have no answer
     /// in floating point that is better by much.
     pub acceptable: f64,
+    /// Whether [`Method::Auto`] with few contacts leaves out pivoting from `p`, which has been tried
+    /// in a batch; default false.
+    pub is_pivoted: bool,
+    /// Whether [`Method::Auto`] with few contacts leaves out its last resorts, pivoting from random
+    /// starts and the proximal point method, because the caller has another way; default false.
+    pub is_brief: bool,
     /// Rounding of the free velocity q, m/s; default 0. Bodies that move together have a q that is
     /// the difference of larger velocities, known to the rounding of these.
     ///
@@ -178,6 +184,8 @@ impl Default for SolverOptions {
             tolerance: 1e-12,
             velocity_tolerance: 1e-9,
             acceptable: 0.0,
+            is_pivoted: false,
+            is_brief: false,
             rounding: 0.0,
             max_newton_steps: 500,
             max_sweeps: 10_000,

@@ -94,12 +94,21 @@ impl SolveScratch {
     }
 }
 
+/// Where the edges of a contact's pyramid are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fan {
+    /// Direction of the first one.
+    pub first: [f64; 2],
+    /// Angle between it and those beside it, rad; at most that of a regular pyramid.
+    pub angle: f64,
+}
+
 /// Pyramids in the place of few contacts' cones.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PyramidScratch {
     pub tableau: Tableau,
-    /// Direction of the first edge of each pyramid.
-    pub first: Vec<[f64; 2]>,
+    /// Where the edges of each are.
+    pub fans: Vec<Fan>,
     /// Normal and edges of each, in the frames of the contacts.
     pub edges: Vec<[f64; 3]>,
     /// The Delassus operator, n by n.

@@ -84,21 +84,19 @@ impl<T: Lane> LaneSystem<T> {
         write_start(&self.contacts, lanes, &self.swept, problems);
     }
 
-    /// Solves the problems without an answer by a method that no queue knows.
+    /// Solves the problems without an answer by a method that no queue knows, or those that a queue
+    /// has not solved.
     fn solve_by_method(
         &mut self,
         options: &SolverOptions,
         going: T::Mask,
         problems: &mut [ContactProblem],
     ) {
-        if options.method == Method::Auto {
-            return;
-        }
-        let own = self.by_method.get_or_insert_default();
         let problems = &mut problems[..self.contacts.n_problems()];
         for (index, problem) in problems.iter_mut().enumerate() {
             let is_going = going.get(index % T::LANES);
             if is_going && problem.n_contacts > 0 && !problem.is_solved {
+                let own = self.by_method.get_or_insert_default();
                 own.solve(problem, options);
             }
         }
@@ -270,7 +268,11 @@ impl<T: Lane> LaneSystem<T> {
         reports: &mut [StepReport],
         farthest: &mut [T],
     ) -> T::Mask {
-        self.solve_by_method(&options.solver, going, problems);
+        let solver = SolverOptions {
+            acceptable: 0.0, // is a speed, not a displacement
+            ..options.solver
+        };
+        self.solve_by_method(&solver, going, problems);
         let mut unsolved = 0;
         for (index, problem) in problems[..self.contacts.n_problems()].iter().enumerate() {
             let (leader, lane, n) = (index / T::LANES, index % T::LANES, problem.n_unknowns());
@@ -295,5 +297,7 @@ fn enter(report: &mut StepReport, problem: &ContactProblem) {
     report.iterations += problem.iterations;
     report.factorisations += problem.factorisations;
     report.pivots += problem.pivots;
+    report.acceptable += usize::from(problem.is_acceptable);
+    report.fallbacks |= usize::from(problem.is_escalated);
     report.residual = report.residual.max(problem.residual.relative);
 }

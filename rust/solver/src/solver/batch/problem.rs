@@ -78,7 +78,11 @@ pub struct ContactProblem {
     pub factorisations: usize,
     /// Iterations that pivoted, of a solver that counts them apart.
     pub pivots: usize,
-    /// Whether the answer is within the tolerances. If not, `p` and `u` are unspecified.
+    /// Whether the answer took more than a batch does.
+    pub is_escalated: bool,
+    /// Whether the answer is acceptable and no more.
+    pub is_acceptable: bool,
+    /// Whether the answer is within the tolerances, or acceptable. If not, `p` and `u` are unspecified.
     pub is_solved: bool,
 }
 
@@ -220,6 +224,7 @@ impl Clone for ContactProblem {
         self.residual = other.residual;
         self.iterations = other.iterations;
         (self.factorisations, self.pivots) = (other.factorisations, other.pivots);
+        (self.is_escalated, self.is_acceptable) = (other.is_escalated, other.is_acceptable);
         self.is_solved = other.is_solved;
     }
 }
@@ -243,6 +248,8 @@ impl Default for ContactProblem {
             iterations: 0,
             factorisations: 0,
             pivots: 0,
+            is_escalated: false,
+            is_acceptable: false,
             is_solved: false,
         }
     }

@@ -48,6 +48,7 @@ impl ContactProblem {
         let n = self.n_unknowns();
         let at_rest = self.q[..n].iter().all(|x| *x == 0.0);
         (self.iterations, self.factorisations, self.pivots) = (0, 0, 0);
+        (self.is_escalated, self.is_acceptable) = (false, false);
         self.is_solved = at_rest;
         self.residual = Residual::UNSOLVED;
         if at_rest {

@@ -6,6 +6,9 @@
 //!
 //! It adds `(1…1) z₀`, begins with a `z₀` that makes `w ≥ 0`, and drives it to zero: of each pair
 //! one variable is zero, and what left last decides which enters next.
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
+
+use crate::scalar::{Single, inlined};
 
 /// Pivots of Lemke's method for each unknown; more are a sign of rounding.
 const PIVOTS: usize = 4;
@@ -25,7 +28,7 @@ pub(in crate::solver) struct Tableau {
     /// Rows of `n + 2` entries: factors of the `n + 1` nonbasic variables, and the constant.
     rows: Vec<f64>,
     /// The row that leaves, as the new basic variable has it.
-    pivot: Vec<f64>,
+    leaving: Vec<f64>,
     /// Variables of rows and columns: `w_i` is i, `z_i` is n + i, and `z₀` is 2 n.
     basic: Vec<usize>,
     nonbasic: Vec<usize>,
@@ -37,7 +40,7 @@ impl Tableau {
         self.n = n;
         self.rows.clear();
         self.rows.resize(n * (n + 2), 0.0);
-        self.pivot.resize(n + 2, 0.0);
+        self.leaving.resize(n + 2, 0.0);
         self.basic.clear();
         self.basic.extend(0..n);
         self.nonbasic.clear();
@@ -53,6 +56,7 @@ impl Tableau {
     }
 
     /// Exchanges the basic variable of a row with the nonbasic one of a column.
+    #[inline(always)]
     fn exchange(&mut self, row: usize, column: usize) {
         let width = self.n + 2;
         let own = &mut self.rows[row * width..][..width];
@@ -61,14 +65,14 @@ impl Tableau {
             *x *= -inverse;
         }
         own[column] = inverse;
-        self.pivot.copy_from_slice(own);
+        self.leaving.copy_from_slice(own);
         for (i, other) in self.rows.chunks_exact_mut(width).enumerate() {
             let factor = other[column];
             if i == row || factor == 0.0 {
                 continue;
             }
             other[column] = 0.0;
-            for (x, pivot) in other.iter_mut().zip(&self.pivot) {
+            for (x, pivot) in other.iter_mut().zip(&self.leaving) {
                 *x += factor * pivot;
             }
         }
@@ -76,7 +80,8 @@ impl Tableau {
     }
 
     /// The row whose variable reaches zero first when that of a column grows; `z₀` before others.
-    fn leaving(&self, column: usize) -> Option<usize> {
+    #[inline(always)]
+    fn row_of(&self, column: usize) -> Option<usize> {
         let (n, width) = (self.n, self.n + 2);
         let rows = || self.rows.chunks_exact(width).zip(&self.basic).enumerate();
         let ratio = |row: &[f64]| row[n + 1] / -row[column];
@@ -101,6 +106,12 @@ impl Tableau {
 
     /// Whether the method has found an answer, and its pivots.
     pub fn solve(&mut self) -> (bool, usize) {
+        inlined!(Single::vectorize, Single::best(), self.pivot())
+    }
+
+    /// [`Self::solve`], for the instructions that it is compiled for.
+    #[inline(always)]
+    fn pivot(&mut self) -> (bool, usize) {
         let (n, width) = (self.n, self.n + 2);
         let constants = self.rows.iter().skip(n + 1).step_by(width);
         let Some((mut row, least)) = (constants.enumerate())
@@ -124,7 +135,7 @@ impl Tableau {
                 return (false, pivots);
             };
             column = next;
-            match self.leaving(column) {
+            match self.row_of(column) {
                 Some(next) => row = next,
                 None => return (false, pivots),
             }

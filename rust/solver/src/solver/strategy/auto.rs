@@ -206,7 +206,21 @@ impl<'a, 'b, const D: usize> Ladder<'a, 'b, D> {
         outcome
     }
 
-    /// Few contacts without a warm start. The next stage starts from zero.
+    /// Newton on predicted modes.
+    fn take_full_steps(&mut self) -> Option<StageResult> {
+        let most_steps = newton::FULL_STEPS.min(self.attempt.options.max_newton_steps);
+        let found = newton::full_steps(self.attempt, most_steps);
+        self.enter(Stage::Newton, found)
+    }
+
+    /// Few contacts from rest.
+    fn solve_from_rest(&mut self) -> Option<StageResult> {
+        let closes = self.attempt.data.q.chunks_exact(D).any(|q| q[0] < 0.0);
+        let found = if closes { self.guide_from_rest() } else { None };
+        found.or_else(|| self.take_full_steps())
+    }
+
+    /// Few contacts of which one closes, without a warm start. The next stage starts from zero.
     fn guide_from_rest(&mut self) -> Option<StageResult> {
         let data = self.attempt.data;
         if data.mu.len() > 1 && data.W.is_uncoupled::<D>(data.n) {
@@ -240,7 +254,8 @@ impl<'a, 'b, const D: usize> Ladder<'a, 'b, D> {
         if let Some(outcome) = outcome.or_else(|| self.accept()) {
             return Some(outcome);
         }
-        if !self.nearest.residual.is_finite() || self.is_exhausted() {
+        let ends = self.attempt.options.is_brief || self.is_exhausted();
+        if ends || !self.nearest.residual.is_finite() {
             return None;
         }
         let found = restarts::solve(self.attempt);
@@ -253,8 +268,12 @@ impl<'a, 'b, const D: usize> Ladder<'a, 'b, D> {
         self.descend(most_steps).or_else(|| self.accept())
     }
 
-    /// Many contacts: the interior point method, then the proximal point method.
+    /// Many contacts: Newton, the interior point method, and the proximal point method.
     fn follow_and_descend(&mut self) -> Option<StageResult> {
+        let outcome = self.take_full_steps();
+        if outcome.is_some() {
+            return outcome;
+        }
         let Attempt { p, scratch, .. } = &mut *self.attempt;
         p.copy_from_slice(&scratch.start);
         let found = interior_point::solve(self.attempt);
@@ -322,24 +341,20 @@ pub(in crate::solver) fn escalate<const D: usize>(
 ) -> StageResult {
     let (data, options) = (attempt.data, attempt.options);
     attempt.scratch.start.copy_from_slice(attempt.p);
-    let most_steps = options.max_newton_steps;
     let is_few = data.mu.len() <= options.direct_contacts;
     let is_warm = attempt.p.iter().any(|x| x.abs() > 0.0);
     let mut ladder = Ladder::new(attempt);
     let found = if !is_few {
         ladder.sweep_many(islands)
-    } else if is_warm {
-        ladder.pivot_from_start()
-    } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
-        ladder.guide_from_rest()
-    } else {
+    } else if options.is_pivoted {
         None
+    } else if is_warm {
+        let found = pivoting::pivots(ladder.attempt, None);
+        ladder.enter(Stage::Pivoting, found)
+    } else {
+        ladder.solve_from_rest()
     };
     if let Some(outcome) = found {
-        return outcome;
-    }
-    let found = newton::full_steps(ladder.attempt, newton::FULL_STEPS.min(most_steps));
-    if let Some(outcome) = ladder.enter(Stage::Newton, found) {
         return outcome;
     }
     let found = if is_few {
