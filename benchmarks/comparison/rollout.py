@@ -147,6 +147,12 @@ def rows(robots: list[Path]) -> Iterator[Row]:
             yield Row(f"{file.stem}, {ground}", read(file), make)
 
 
+def steering_limits(model: RoverModel) -> list[float]:
+    """Largest set-points of the wheels' steering, rad, 0 of those without."""
+    wheels = model.to_dict()["wheels"]
+    return [min(w.get("steering_limit") or 0.0, 0.7) if w.get("steering") else 0.0 for w in wheels]
+
+
 def rover_at_rest(row: Row, rng: np.random.Generator) -> Simulation:
     """A rover somewhere on its ground, at rest, its wheels braked until the first command."""
     terrain = row.ground(rng)
@@ -318,8 +324,7 @@ def measure(row: Row, rovers: int, threads: int, seed: int, rounds: int = ROUNDS
     masses = sum(solid["mass"] for solid in description["solids"])
     radius = statistics.mean(w.get("contact_radius") or w["radius"] for w in description["wheels"])
     torque = EFFORT * masses * 9.81 * radius / n
-    turns = [min(w.get("steering_limit") or 0.0, 0.7) if w.get("steering") else 0.0 for w in description["wheels"]]
-    limits = np.array([torque] * n + turns)
+    limits = np.array([torque] * n + steering_limits(row.model))
     reports: list[Any] = []
     alone = simulations[: min(ALONE, rovers)]
     beside = in_mujoco(simulations, threads, bodies=row.bodies)

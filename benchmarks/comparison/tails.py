@@ -18,7 +18,7 @@ import numpy as np
 from rich.console import Console
 
 from comparison.machine import processor
-from comparison.rollout import STEPS_A_COMMAND, Row, rover_at_rest, rows, wide
+from comparison.rollout import STEPS_A_COMMAND, Row, rover_at_rest, rows, steering_limits, wide
 from rover_gym import Plane, SphereField
 
 TORQUE = 60.0  # N m
@@ -69,7 +69,7 @@ def measured(row: Row, arguments: argparse.Namespace) -> str:
     for i in range(arguments.rovers):
         simulation = rover_at_rest(row, rng)
         n_wheels = len(simulation.wheel_torques)
-        scale = np.repeat([TORQUE, simulation.model.steering_limit], n_wheels)
+        scale = np.array([TORQUE] * n_wheels + steering_limits(simulation.model))
         for command in rng.uniform(-1.0, 1.0, (arguments.commands, 2 * n_wheels)) * scale:
             simulation.set_commands(command[:n_wheels], command[n_wheels:])
             for _ in range(STEPS_A_COMMAND):

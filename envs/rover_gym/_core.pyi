@@ -1078,8 +1078,8 @@ class StepReport:
     def fallbacks(self) -> int:
         """Number of steps that took more than the usual effort.
 
-        Such a step is taken alone, with every means of solving its contacts, and in halves where
-        that fails. Always 0 for planar machines, for grains and for the variant "newton", whose
+        Its contacts are solved with every means, and where that fails or something else is in the
+        way, the rover takes it alone, in halves if need be. Always 0 for planar machines, for grains and for the variant "newton", whose
         steps all are.
         """
     @property
@@ -1584,8 +1584,8 @@ class Simulation(AnySimulation):
     def lanes(self) -> Literal[1, 4, 8]:
         """Number of rovers that a batch steps together in one SIMD register of this computer.
 
-        Either 8, 4 or 1; always 1 for the variant "newton". A step that takes more than the usual
-        effort is taken alone: `StepReport.fallbacks` counts them.
+        Either 8, 4 or 1; always 1 for the variant "newton". `StepReport.fallbacks` counts steps that
+        take more than the usual effort.
         """
     @property
     def q(self) -> _Array:

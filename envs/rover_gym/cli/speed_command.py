@@ -85,7 +85,9 @@ def _fields(exploring: ExploringSpeed, environment: VectorSpeed) -> dict[str, An
 def _print_exploring(name: str, result: ExploringSpeed) -> None:
     typer.echo(
         f"\n{name}: torques of up to {result.torque:g} N m and set-points redrawn every 10 steps of 5 ms\n"
-        f"  {result.rover_steps:.0f} rover-steps/s, {result.simulated:.0f} simulated s/s"
+        f"  {result.rover_steps:.0f} rover-steps/s, {result.simulated:.0f} simulated s/s\n"
+        f"  a step of the batch: median {result.median * 1e6:.0f} us, 99.9% within {result.slow * 1e6:.0f} us, "
+        f"largest {result.slowest * 1e6:.0f} us"
     )
 
 

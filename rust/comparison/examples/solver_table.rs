@@ -1,5 +1,6 @@
 //! Prints one row per friction-contact problem, of the shelf and recorded ones, and method:
-//! iterations, residual, velocity error, time (best of many).
+//! iterations, residual, velocity error, time (best of many); then the times of each method over
+//! all problems, and how many it leaves unsolved.
 //!
 //! `cargo run --release -p rover-comparison --example solver_table -- [name filter] [method]
 //! [tolerance]`, where the method is `auto`, `nsgs`, `newton`, `proximal`, `admm`, `relaxed` or
@@ -38,6 +39,7 @@ fn main() {
         "{:42} {:>4} {:>14} {:>14} {:>6} {:>9} {:>9} {:>12}",
         "problem", "nc", "method", "status", "iter", "residual", "m/s", "time"
     );
+    let mut times = vec![(Vec::new(), 0); methods.len()];
     let shelf = npz::shelf(|name| name.contains(filter));
     let outside = npz::recorded(|name| name.contains(filter));
     for recorded in shelf.into_iter().chain(outside) {
@@ -45,7 +47,7 @@ fn main() {
             FrictionContactProblem::new(recorded.dimension, &recorded.W, &recorded.q, &recorded.mu)
                 .expect("a sound problem");
         let n = problem.n_unknowns();
-        for &method in &methods {
+        for (&method, (times, unsolved)) in methods.iter().zip(&mut times) {
             let options = SolverOptions {
                 method,
                 tolerance,
@@ -64,6 +66,8 @@ fn main() {
                 spent += time;
                 runs += 1;
             }
+            times.push(1e6 * best);
+            *unsolved += usize::from(!report.is_converged());
             println!(
                 "{:42} {:4} {:>14} {:>14} {:6} {:9.1e} {:9.1e} {:>10.1} us",
                 recorded.name,
@@ -76,5 +80,19 @@ fn main() {
                 1e6 * best,
             );
         }
+    }
+    for (method, (mut times, unsolved)) in methods.iter().zip(times) {
+        times.sort_by(f64::total_cmp);
+        let Some(last) = times.len().checked_sub(1) else {
+            continue;
+        };
+        let mean = times.iter().sum::<f64>() / times.len() as f64;
+        let [median, most_of, most] = [last / 2, last * 99 / 100, last].map(|k| times[k]);
+        println!(
+            "{:>14}: {} problems, mean {mean:.1}, median {median:.1}, 99% {most_of:.1}, largest {most:.1} us, \
+             {unsolved} unsolved",
+            method.name(),
+            times.len()
+        );
     }
 }

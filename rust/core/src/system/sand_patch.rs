@@ -42,8 +42,12 @@ const MOST_EVALUATIONS: usize = 30;
 /// Part of the gain of a linear problem that a step must bring.
 const LEAST_GAIN: f64 = 1e-2;
 
-/// Factor by which a step that does not bring it nearer is shortened.
+/// Factor by which a step that does not bring it nearer is shortened, and the least share of it that
+/// is tried: the derivative leaves out how memory fades and how the points of a wheel move, so that
+/// shorter ones gain nothing. Random actions in sand took 1.7 times the time with shares down to
+/// 1e-8.
 const SHORTER: f64 = 0.5;
+const LEAST_SHARE: f64 = 1.0 / 16.0;
 
 /// Cells around what of a wheel is in the sand in which ruts are looked for: it moves in a step.
 const MARGIN: f64 = 2.0;
@@ -349,10 +353,10 @@ impl<T: Lane> SandPatch<T> {
                     (best, rest) = (found, left);
                     break;
                 }
-                if evaluations >= MOST_EVALUATIONS {
+                share *= SHORTER;
+                if evaluations >= MOST_EVALUATIONS || share < LEAST_SHARE {
                     return best;
                 }
-                share *= SHORTER;
             }
         }
         best
