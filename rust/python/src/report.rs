@@ -116,8 +116,8 @@ step_report! {
     /// Number of steps that took more than the usual effort.
     ///
     /// Its contacts are solved with every means, and where that fails or something else is in the
-    /// way, the rover takes it alone, in halves if need be. Always 0 for planar machines, for grains and for the variant "newton", whose
-    /// steps all are.
+    /// way, the rover takes it alone, in halves if need be. Always 0 for planar machines, for
+    /// grains and for the variant "newton", whose steps all are.
     fallbacks: usize;
     /// Largest energy gain of a step beyond the work done on it, relative to the kinetic energy.
     energy_gain: f64;

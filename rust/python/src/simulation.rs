@@ -219,8 +219,8 @@ impl Simulation {
 
     /// Number of rovers that a batch steps together in one SIMD register of this computer.
     ///
-    /// Either 8, 4 or 1; always 1 for the variant "newton". `StepReport.fallbacks` counts steps that
-    /// take more than the usual effort.
+    /// Either 8, 4 or 1; always 1 for the variant "newton". `StepReport.fallbacks` counts steps
+    /// that take more than the usual effort.
     #[getter]
     fn lanes(&self) -> Result<usize> {
         Ok(self.open()?.lanes())

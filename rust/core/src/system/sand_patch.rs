@@ -42,10 +42,9 @@ const MOST_EVALUATIONS: usize = 30;
 /// Part of the gain of a linear problem that a step must bring.
 const LEAST_GAIN: f64 = 1e-2;
 
-/// Factor by which a step that does not bring it nearer is shortened, and the least share of it that
-/// is tried: the derivative leaves out how memory fades and how the points of a wheel move, so that
-/// shorter ones gain nothing. Random actions in sand took 1.7 times the time with shares down to
-/// 1e-8.
+/// Factor by which a step that does not bring it nearer is shortened, and the least share that is
+/// tried: the derivative leaves out how memory fades and how the points of a wheel move, so that
+/// shorter ones gain nothing. With 1e-8 random actions in sand take 1.7 times the time.
 const SHORTER: f64 = 0.5;
 const LEAST_SHARE: f64 = 1.0 / 16.0;
 

@@ -90,8 +90,8 @@ pub struct SolverOptions {
     /// have missed the tolerances: contacts that are wedged against each other may have no answer
     /// in floating point that is better by much.
     pub acceptable: f64,
-    /// Whether [`Method::Auto`] with few contacts leaves out pivoting from `p`, which has been tried
-    /// in a batch; default false.
+    /// Whether [`Method::Auto`] with few contacts leaves out pivoting from `p`, which has been
+    /// tried in a batch; default false.
     pub is_pivoted: bool,
     /// Whether [`Method::Auto`] with few contacts leaves out its last resorts, pivoting from random
     /// starts and the proximal point method, because the caller has another way; default false.

@@ -82,7 +82,8 @@ pub struct ContactProblem {
     pub is_escalated: bool,
     /// Whether the answer is acceptable and no more.
     pub is_acceptable: bool,
-    /// Whether the answer is within the tolerances, or acceptable. If not, `p` and `u` are unspecified.
+    /// Whether the answer is within the tolerances, or acceptable. If not, `p` and `u` are
+    /// unspecified.
     pub is_solved: bool,
 }
 
