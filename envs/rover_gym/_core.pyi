@@ -1079,8 +1079,8 @@ class StepReport:
         """Number of steps that took more than the usual effort.
 
         Its contacts are solved with every means, and where that fails or something else is in the
-        way, the rover takes it alone, in halves if need be. Always 0 for planar machines, for grains and for the variant "newton", whose
-        steps all are.
+        way, the rover takes it alone, in halves if need be. Always 0 for planar machines, for
+        grains and for the variant "newton", whose steps all are.
         """
     @property
     def energy_gain(self) -> float:
@@ -1584,8 +1584,8 @@ class Simulation(AnySimulation):
     def lanes(self) -> Literal[1, 4, 8]:
         """Number of rovers that a batch steps together in one SIMD register of this computer.
 
-        Either 8, 4 or 1; always 1 for the variant "newton". `StepReport.fallbacks` counts steps that
-        take more than the usual effort.
+        Either 8, 4 or 1; always 1 for the variant "newton". `StepReport.fallbacks` counts steps
+        that take more than the usual effort.
         """
     @property
     def q(self) -> _Array:
