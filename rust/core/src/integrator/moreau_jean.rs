@@ -55,8 +55,8 @@ pub(super) fn advance<S: MechanicalSystem>(
         depth: 0,
     };
     let is_unsolved = std::mem::take(&mut scratch.is_unsolved);
+    // An elastic step may be solved as a whole once its impacts are taken as inelastic.
     if is_unsolved && !options.is_elastic() && system.solves_to_the_end() {
-        // Another law of restitution may solve it as a whole.
         return whole.divide(2.0, system, scratch, &mut attempts, probe);
     }
     whole.advance(system, scratch, &mut attempts, probe)

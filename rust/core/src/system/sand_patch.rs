@@ -43,8 +43,8 @@ const MOST_EVALUATIONS: usize = 30;
 const LEAST_GAIN: f64 = 1e-2;
 
 /// Factor by which a step that does not bring it nearer is shortened, and the least share that is
-/// tried: the derivative leaves out how memory fades and how the points of a wheel move, so that
-/// shorter ones gain nothing. With 1e-8 random actions in sand take 1.7 times the time.
+/// tried: where the force changes otherwise than its derivative says, shorter ones gain nothing.
+/// With 1e-8 random actions in sand take 1.7 times the time.
 const SHORTER: f64 = 0.5;
 const LEAST_SHARE: f64 = 1.0 / 16.0;
 
