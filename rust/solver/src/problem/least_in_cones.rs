@@ -46,7 +46,10 @@ const MOST_IDLE: usize = 6;
 /// minimise  θ(w) = ½ |P_K(w)|² − y'·w   over  w = Π w,      y = P_K(w),   ∇θ = Π (P_K(w) − y')
 /// ```
 ///
-/// θ is convex with a semismooth gradient. A step solves `(Π P_K'(w) Π + Qᵀ Q + ε 1) δ = −∇θ`.
+/// θ is convex with a semismooth gradient. A step solves `Π (P_K'(w) + ε 1) Π δ = −∇θ` for a
+/// `δ = Π δ`: with `D = P_K' + ε 1`, which has a block for each contact, `Q D⁻¹ Qᵀ λ = −Q D⁻¹ ∇θ`
+/// and `δ = −D⁻¹ (∇θ + Qᵀ λ)`. As ε is proportional to the gradient, rounding leaves 1e-14 of the
+/// impulses.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cones {
     /// Square roots of the weights by unknown.
@@ -59,12 +62,12 @@ pub(super) struct Cones {
     gradient: Vec<f64>,
     next: Vec<f64>,
     step: Vec<f64>,
-    /// Blocks of `P_K'`, 3 × 3 of each contact.
-    slopes: Vec<[f64; 9]>,
+    /// Blocks of `D⁻¹`, 3 × 3 of each contact.
+    inverses: Vec<[f64; 9]>,
+    /// `D⁻¹ Qᵀ` by rows of Q, `Q D⁻¹ Qᵀ` and λ.
+    eased: Vec<f64>,
     matrix: Vec<f64>,
-    /// `P_K' Qᵀ` by rows of Q, and what the matrix takes from it.
-    sloped: Vec<f64>,
-    taken: Vec<f64>,
+    multipliers: Vec<f64>,
 }
 
 impl Cones {
@@ -78,7 +81,6 @@ impl Cones {
     ) -> bool {
         let scale = self.roots.iter().fold(0.0_f64, |most, x| most.max(*x)) * size;
         self.begin(n, y);
-        self.slopes.resize(touching.len(), [0.0; 9]);
         let mut value = self.evaluate(touching, d, n, false);
         std::mem::swap(&mut self.gradient, &mut self.next);
         let mut size_of_gradient = norm(&self.gradient);
@@ -89,14 +91,7 @@ impl Cones {
                 break;
             }
             let epsilon = (1e-2 * size_of_gradient / scale).clamp(1e-14, 1e-4);
-            self.set_matrix(touching, (d, n, open), epsilon);
-            cholesky(&mut self.matrix, n);
-            for (x, g) in self.step.iter_mut().zip(&self.gradient) {
-                *x = -g;
-            }
-            forward(&self.matrix, n, &mut self.step);
-            backward(&self.matrix, n, &mut self.step);
-            flatten(&self.Q, n, &mut self.step);
+            self.find_step(touching, (d, n, open), epsilon);
             let fall: f64 = (self.gradient.iter().zip(&self.step))
                 .map(|(a, b)| a * b)
                 .sum();
@@ -127,18 +122,12 @@ impl Cones {
             std::mem::swap(&mut self.gradient, &mut self.next);
         }
         // On the plane exactly.
-        project(
-            touching,
-            d,
-            (&self.w, &self.roots),
-            &mut self.projected,
-            None,
-        );
+        project(touching, d, (&self.w, &self.roots), &mut self.projected);
         for k in 0..n {
             self.step[k] = self.projected[k] - self.least[k];
         }
         for row in self.Q.chunks_exact(n) {
-            let along: f64 = row.iter().zip(&self.step).map(|(a, b)| a * b).sum();
+            let along = dot(row, &self.step);
             for (y, q) in self.least.iter_mut().zip(row) {
                 *y += along * q;
             }
@@ -172,7 +161,7 @@ impl Cones {
     /// θ at `w`, or at the trial; its gradient into `next`.
     fn evaluate(&mut self, touching: &[Touching], d: usize, n: usize, of_trial: bool) -> f64 {
         let w = if of_trial { &self.trial } else { &self.w };
-        project(touching, d, (w, &self.roots), &mut self.projected, None);
+        project(touching, d, (w, &self.roots), &mut self.projected);
         let mut value = 0.0;
         for k in 0..n {
             value += 0.5 * self.projected[k] * self.projected[k] - self.least[k] * w[k];
@@ -182,72 +171,90 @@ impl Cones {
         value
     }
 
-    /// `Π P_K'(w) Π + Qᵀ Q + ε 1`, its lower triangle.
-    fn set_matrix(
+    /// Newton's step from `w`.
+    fn find_step(
         &mut self,
         touching: &[Touching],
         (d, n, open): (usize, usize, usize),
         epsilon: f64,
     ) {
-        let slopes = Some(&mut self.slopes[..]);
-        project(
-            touching,
-            d,
-            (&self.w, &self.roots),
-            &mut self.projected,
-            slopes,
-        );
-        self.matrix.clear();
-        self.matrix.resize(n * n, 0.0);
-        self.sloped.clear();
-        self.sloped.resize(open * n, 0.0);
-        for (own, slope) in touching.iter().zip(&self.slopes) {
-            let count = if own.kind == AdmissibleImpulse::Rests {
-                d
-            } else {
-                1
-            };
-            for r in 0..count {
-                for c in 0..count {
-                    self.matrix[(own.first + r) * n + own.first + c] = slope[3 * r + c];
-                    for f in 0..open {
-                        let q = self.Q[f * n + own.first + c];
-                        self.sloped[f * n + own.first + r] += slope[3 * r + c] * q;
-                    }
-                }
+        self.inverses.clear();
+        let (w, roots) = (&self.w, &self.roots);
+        let inverses = touching.iter().map(|own| own.inverse(d, w, roots, epsilon));
+        self.inverses.extend(inverses);
+        self.eased.resize(open * n, 0.0);
+        for (q, eased) in (self.Q.chunks_exact(n)).zip(self.eased.chunks_exact_mut(n)) {
+            multiply(touching, d, &self.inverses, q, eased);
+        }
+        multiply(touching, d, &self.inverses, &self.gradient, &mut self.step);
+        self.matrix.resize(open * open, 0.0);
+        self.multipliers.clear();
+        for (f, q) in self.Q.chunks_exact(n).enumerate() {
+            for (g, eased) in self.eased.chunks_exact(n).enumerate().take(f + 1) {
+                self.matrix[f * open + g] = dot(q, eased);
+            }
+            self.multipliers.push(dot(q, &self.step));
+        }
+        cholesky(&mut self.matrix, open);
+        forward(&self.matrix, open, &mut self.multipliers);
+        backward(&self.matrix, open, &mut self.multipliers);
+        for (eased, x) in self.eased.chunks_exact(n).zip(&self.multipliers) {
+            for (step, eased) in self.step.iter_mut().zip(eased) {
+                *step -= x * eased;
             }
         }
-        // T = S − ½ (Q Sᵀ) Q − ½ Q for the rows S of P' Qᵀ: the matrix is P' + ε 1 − Qᵀ T − Tᵀ Q.
-        self.taken.clear();
-        self.taken.extend_from_slice(&self.sloped);
-        for f in 0..open {
-            for g in 0..open {
-                let (a, b) = (&self.sloped[f * n..][..n], &self.Q[g * n..][..n]);
-                let product: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-                let half = 0.5 * (product + f64::from(u8::from(f == g)));
-                for (t, q) in self.taken[f * n..][..n].iter_mut().zip(b) {
-                    *t -= half * q;
-                }
-            }
-        }
-        for (q, t) in self.Q.chunks_exact(n).zip(self.taken.chunks_exact(n)) {
-            for i in 0..n {
-                let row = &mut self.matrix[i * n..][..=i];
-                for ((x, q_j), t_j) in row.iter_mut().zip(q).zip(t) {
-                    *x -= q[i] * t_j + t[i] * q_j;
-                }
-            }
-        }
-        for k in 0..n {
-            self.matrix[k * (n + 1)] += epsilon;
+        self.step.iter_mut().for_each(|x| *x = -*x);
+        flatten(&self.Q, n, &mut self.step);
+    }
+}
+
+impl Touching {
+    /// Number of its unknowns.
+    fn count(&self, d: usize) -> usize {
+        if self.kind == AdmissibleImpulse::Rests {
+            d
+        } else {
+            1
         }
     }
+
+    /// Its block of D⁻¹.
+    fn inverse(&self, d: usize, w: &[f64], roots: &[f64], epsilon: f64) -> [f64; 9] {
+        let at = self.first;
+        let mut inverse = [0.0; 9];
+        let slope = match self.kind {
+            AdmissibleImpulse::Rests => {
+                return inverse_on_cone(self.mu, &w[at..][..d], epsilon);
+            }
+            AdmissibleImpulse::Slides(_) => f64::from(u8::from(w[at] > 0.0)),
+            AdmissibleImpulse::Rubs(most) => f64::from(u8::from(w[at].abs() < most * roots[at])),
+        };
+        inverse[0] = 1.0 / (slope + epsilon);
+        inverse
+    }
+}
+
+/// `out = D⁻¹ x`.
+fn multiply(touching: &[Touching], d: usize, inverses: &[[f64; 9]], x: &[f64], out: &mut [f64]) {
+    for (own, inverse) in touching.iter().zip(inverses) {
+        let count = own.count(d);
+        let unknowns = own.first..own.first + count;
+        let (x, out) = (&x[unknowns.clone()], &mut out[unknowns]);
+        for (out, row) in out.iter_mut().zip(inverse.chunks_exact(3)) {
+            *out = dot(row, x);
+        }
+    }
+}
+
+/// The sum of products of as many numbers as both have.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// `x ← Π x`.
 fn flatten(Q: &[f64], n: usize, x: &mut [f64]) {
     for row in Q.chunks_exact(n) {
-        let along: f64 = row.iter().zip(&*x).map(|(a, b)| a * b).sum();
+        let along = dot(row, x);
         for (x, q) in x.iter_mut().zip(row) {
             *x -= along * q;
         }
@@ -258,66 +265,84 @@ pub(super) fn norm(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The nearest impulses that the contacts may bear, and their slopes. A contact's unknowns have one
-/// weight, so its cone is the same in all units.
-fn project(
-    touching: &[Touching],
-    d: usize,
-    (w, roots): (&[f64], &[f64]),
-    out: &mut [f64],
-    mut slopes: Option<&mut [[f64; 9]]>,
-) {
-    for (i, own) in touching.iter().enumerate() {
-        let mut slope = [0.0; 9];
+/// The nearest impulses that the contacts may bear. A contact's unknowns have one weight, so its
+/// cone is the same in all units.
+fn project(touching: &[Touching], d: usize, (w, roots): (&[f64], &[f64]), out: &mut [f64]) {
+    for own in touching {
         let at = own.first;
         match own.kind {
             AdmissibleImpulse::Rests => {
-                slope = project_on_cone(own.mu, &w[at..][..d], &mut out[at..][..d]);
+                project_on_cone(own.mu, &w[at..][..d], &mut out[at..][..d]);
             }
-            AdmissibleImpulse::Slides(_) => {
-                out[at] = w[at].max(0.0);
-                slope[0] = f64::from(u8::from(w[at] > 0.0));
-            }
+            AdmissibleImpulse::Slides(_) => out[at] = w[at].max(0.0),
             AdmissibleImpulse::Rubs(most) => {
                 let most = most * roots[at];
                 out[at] = w[at].max(-most).min(most);
-                slope[0] = f64::from(u8::from(w[at].abs() < most));
             }
-        }
-        if let Some(slopes) = &mut slopes {
-            slopes[i] = slope;
         }
     }
 }
 
-/// The nearest point of the cone `|t| ≤ μ n`, and the slope of this projection.
-fn project_on_cone(mu: f64, w: &[f64], out: &mut [f64]) -> [f64; 9] {
-    let mut slope = [0.0; 9];
-    let norm = w[1..].iter().map(|x| x * x).sum::<f64>().sqrt();
-    if norm <= mu * w[0] {
-        out.copy_from_slice(w);
-        (slope[0], slope[4], slope[8]) = (1.0, 1.0, 1.0);
-        return slope;
+/// Where a point is relative to the cone `|t| ≤ μ n`.
+enum Place {
+    Inside,
+    /// Nearest to the apex.
+    Behind,
+    /// With its distance from the axis, and the normal component of the nearest point.
+    Beside(f64, f64),
+}
+
+fn place(mu: f64, w: &[f64]) -> Place {
+    let distance = norm(&w[1..]);
+    if distance <= mu * w[0] {
+        Place::Inside
+    } else if mu * distance <= -w[0] {
+        Place::Behind
+    } else {
+        Place::Beside(distance, (w[0] + mu * distance) / (1.0 + mu * mu))
     }
-    if mu * norm <= -w[0] {
-        out.fill(0.0);
-        return slope;
-    }
-    let share = 1.0 / (1.0 + mu * mu);
-    let normal = (w[0] + mu * norm) * share;
-    out[0] = normal;
-    slope[0] = share;
-    for k in 1..w.len() {
-        let e = w[k] / norm;
-        out[k] = mu * normal * e;
-        (slope[k], slope[3 * k]) = (mu * share * e, mu * share * e);
-        for m in 1..w.len() {
-            let both = e * (w[m] / norm);
-            let across = f64::from(u8::from(k == m)) - both;
-            slope[3 * k + m] = mu * mu * share * both + mu * normal / norm * across;
+}
+
+/// The nearest point of the cone `|t| ≤ μ n`.
+fn project_on_cone(mu: f64, w: &[f64], out: &mut [f64]) {
+    match place(mu, w) {
+        Place::Inside => out.copy_from_slice(w),
+        Place::Behind => out.fill(0.0),
+        Place::Beside(distance, normal) => {
+            out[0] = normal;
+            for (out, w) in out[1..].iter_mut().zip(&w[1..]) {
+                *out = mu * normal * (w / distance);
+            }
         }
     }
-    slope
+}
+
+/// `(P' + ε 1)⁻¹` of the projection P on the cone. Beside the cone P' has the eigenvalue 1 along
+/// its side, 0 across it, and `μ n/|t|` around it.
+fn inverse_on_cone(mu: f64, w: &[f64], epsilon: f64) -> [f64; 9] {
+    let mut inverse = [0.0; 9];
+    let (along, across) = (1.0 / (1.0 + epsilon), 1.0 / epsilon);
+    match place(mu, w) {
+        Place::Inside => (inverse[0], inverse[4], inverse[8]) = (along, along, along),
+        Place::Behind => (inverse[0], inverse[4], inverse[8]) = (across, across, across),
+        Place::Beside(distance, normal) => {
+            let around = 1.0 / (mu * normal / distance + epsilon);
+            let share = 1.0 / (1.0 + mu * mu);
+            inverse[0] = share * (along + mu * mu * across);
+            for k in 1..w.len() {
+                let e = w[k] / distance;
+                let both = share * mu * (along - across) * e;
+                (inverse[k], inverse[3 * k]) = (both, both);
+                for m in 1..w.len() {
+                    let radial = e * (w[m] / distance);
+                    let other = f64::from(u8::from(k == m)) - radial;
+                    inverse[3 * k + m] =
+                        share * (mu * mu * along + across) * radial + around * other;
+                }
+            }
+        }
+    }
+    inverse
 }
 
 /// Cholesky's factor in place of the lower triangle of a definite matrix.
