@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,18 +35,42 @@ class Scene(NamedTuple):
         after: Arguments behind the number of steps.
         short: Steps of the short run.
         long: Steps of the long run.
+        rovers: Rovers that take each step.
     """
 
     example: str
     after: tuple[str, ...]
     short: int
     long: int
+    rovers: int = 1
+
+
+#: Rovers of a batch.
+BATCH = 8
+#: Grounds and wheels of the table of speeds.
+GROUNDS = ("plane", "rocks", "hills, cells 0.25 m", "hills, cells 0.05 m")
+WHEELS = ("wheels 0.20 m", "cylinders", "rigid cylinders", "tori")
+
+
+def alone_and_in_batch(scenes: dict[str, tuple[str, tuple[str, ...]]], together: str) -> dict[str, Scene]:
+    """Scenes by name with their example and arguments; `together`: the argument that takes a batch."""
+    alone = {name: Scene(example, after, 10, 210) for name, (example, after) in scenes.items()}
+    batches = {
+        f"{name}, batch": Scene(one.example, (*(word for word in one.after if word != "alone"), together), 10, 110, BATCH)
+        for name, one in alone.items()
+    }
+    return alone | batches
 
 
 SCENES = {
     "rover in a curve": Scene("drive_steps", (), 1, 1001),
     "rover in a curve, Newton": Scene("drive_steps", ("newton",), 1, 301),
-    "rover on sand": Scene("sand_steps", ("explore",), 10, 110),
+    **alone_and_in_batch(
+        {f"{g}, {w}": ("explore_steps", (f"{g}, {w}", "alone")) for g in GROUNDS for w in WHEELS}
+        | {"six wheels and a differential": ("machine_steps", ("open-rover", "alone"))}
+        | {f"sand, {how}": ("sand_steps", (how,)) for how in ("rest", "drive", "explore")},
+        "batch",
+    ),
     "bed of disks": Scene("disk_steps", (), 1, 101),
     "derivatives in sand": Scene("sand_steps", ("derivatives",), 10, 50),
     "derivatives on firm ground": Scene("sand_steps", ("derivatives-on-firm-ground",), 10, 50),
@@ -57,13 +82,13 @@ MACHINES = (
     "rover", "flying", "turning", "mecanum", "tracks", "open-rover", "bar", "dry", "open-dry",
     "two", "three", "push", "tow",
 )  # fmt: skip
-EFFORTS = {"general": 1, "alone": 1, "batch": 8}
+EFFORTS = {"general": 1, "alone": 1, "batch": BATCH}
 
 
 def of_machine(name: str, how: str) -> str:
     """Thousands of instructions a step and a rover; a dash where valgrind lacks an instruction."""
     try:
-        count = collected_between(Scene("machine_steps", (name, how), 10, 210)) / EFFORTS[how]
+        count = collected_between(Scene("machine_steps", (name, how), 10, 210, EFFORTS[how]))
     except subprocess.CalledProcessError as error:
         if error.returncode != -signal.SIGILL:
             raise
@@ -86,8 +111,9 @@ def collected(scene: Scene, steps: int) -> int:
 
 
 def collected_between(scene: Scene) -> int:
-    """Instructions of a step."""
-    return round((collected(scene, scene.long) - collected(scene, scene.short)) / (scene.long - scene.short))
+    """Instructions of a step and a rover."""
+    steps = (scene.long - scene.short) * scene.rovers
+    return round((collected(scene, scene.long) - collected(scene, scene.short)) / steps)
 
 
 def build() -> None:
@@ -126,9 +152,10 @@ def main() -> None:
             console.print(f"| `{name}` | {' | '.join(of_machine(name, how) for how in EFFORTS)} |")
         return
     rustc = compiler()
-    now = {name: collected_between(scene) for name, scene in SCENES.items()}
+    with ThreadPoolExecutor() as pool:
+        now = dict(zip(SCENES, pool.map(collected_between, SCENES.values()), strict=True))
     before = json.loads(COUNTS.read_text(encoding="utf-8")) if COUNTS.exists() else {"rustc": rustc, "a step": {}}
-    table = Table("scene", "instructions a step", "committed", "change")
+    table = Table("scene", "instructions a step and rover", "committed", "change")
     for name, count in now.items():
         known = before["a step"].get(name)
         table.add_row(name, str(count), str(known or ""), f"{100 * (count / known - 1):+.2f}%" if known else "")

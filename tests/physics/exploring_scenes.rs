@@ -15,131 +15,134 @@ use rover_core::multibody::{Model, coordinates};
 use rover_core::simulation::RoverSimulation;
 use serde_json::Value;
 
-/// Where the rover explores.
+/// The ground under a rover.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ground {
     /// Flat ground.
     Plane,
-    /// Flat ground, wheels that touch at 0.20 m.
-    LargeWheels,
     /// Rocks of difficulty 0.5 on a slope, the rover halfway to its goal.
     Rocks,
-    /// Flat ground, wheels that touch at 0.20 m, cylinders 0.15 m wide.
-    Cylinders,
-    /// The same wheels with fully rounded edges.
-    Tori,
-    /// Rough hills with cells of 0.25 m, wheels that touch at 0.20 m.
+    /// Rough hills with cells of 0.25 m.
     Hills,
     /// The same hills with cells of 0.05 m, and the roughness that those can show.
     FineHills,
+}
+
+/// The wheels of the built-in rover.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wheels {
+    /// As they are.
+    BuiltIn,
+    /// Thin discs that touch at 0.20 m.
+    Discs,
+    /// Cylinders of that radius, 0.15 m wide.
+    Cylinders,
     /// Cylinders that do not yield.
     RigidCylinders,
-    /// Cylinders on the other grounds.
-    CylindersAmongRocks,
-    RigidCylindersAmongRocks,
-    CylindersOnHills,
-    CylindersOnFineHills,
+    /// Cylinders with fully rounded edges.
+    Tori,
+}
+
+/// Where a rover explores, and on which wheels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scene {
+    pub ground: Ground,
+    pub wheels: Wheels,
 }
 
 impl Ground {
-    /// The grounds of the tables and tests.
-    pub const ALL: [Self; 7] = [
-        Self::Plane,
-        Self::LargeWheels,
-        Self::Rocks,
-        Self::Cylinders,
-        Self::Tori,
-        Self::Hills,
-        Self::FineHills,
-    ];
+    const ALL: [Self; 4] = [Self::Plane, Self::Rocks, Self::Hills, Self::FineHills];
 
-    /// Those that are only counted.
-    const MORE: [Self; 5] = [
-        Self::RigidCylinders,
-        Self::CylindersAmongRocks,
-        Self::RigidCylindersAmongRocks,
-        Self::CylindersOnHills,
-        Self::CylindersOnFineHills,
-    ];
-
-    /// Name in tables and on command lines.
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Plane => "plane",
-            Self::LargeWheels => "plane, wheels 0.20 m",
             Self::Rocks => "rocks",
-            Self::Cylinders => "plane, cylinders",
-            Self::Tori => "plane, tori",
             Self::Hills => "hills, cells 0.25 m",
             Self::FineHills => "hills, cells 0.05 m",
-            Self::RigidCylinders => "plane, rigid cylinders",
-            Self::CylindersAmongRocks => "rocks, cylinders",
-            Self::RigidCylindersAmongRocks => "rocks, rigid cylinders",
-            Self::CylindersOnHills => "hills, cells 0.25 m, cylinders",
-            Self::CylindersOnFineHills => "hills, cells 0.05 m, cylinders",
         }
     }
+}
 
-    /// Whether it has rocks.
-    const fn has_rocks(self) -> bool {
-        matches!(
-            self,
-            Self::Rocks | Self::CylindersAmongRocks | Self::RigidCylindersAmongRocks
-        )
-    }
+impl Wheels {
+    const ALL: [Self; 5] = [
+        Self::BuiltIn,
+        Self::Discs,
+        Self::Cylinders,
+        Self::RigidCylinders,
+        Self::Tori,
+    ];
 
-    /// Distance of the heights of its map, m.
-    const fn spacing(self) -> Option<f64> {
+    /// What a scene's name has behind that of the ground.
+    const fn suffix(self) -> &'static str {
         match self {
-            Self::Hills | Self::CylindersOnHills => Some(0.25),
-            Self::FineHills | Self::CylindersOnFineHills => Some(0.05),
-            _ => None,
+            Self::BuiltIn => "",
+            Self::Discs => ", wheels 0.20 m",
+            Self::Cylinders => ", cylinders",
+            Self::RigidCylinders => ", rigid cylinders",
+            Self::Tori => ", tori",
         }
     }
 
-    /// Width and rounding of the wheels, m, if they have any.
-    const fn tread(self) -> Option<[f64; 2]> {
-        match self {
-            Self::Plane | Self::LargeWheels | Self::Rocks | Self::Hills | Self::FineHills => None,
-            Self::Tori => Some([0.15, 0.075]),
-            _ => Some([0.15, 0.0]),
-        }
-    }
-
-    /// Whether the wheels are rigid although they are cylinders.
-    const fn is_rigid(self) -> bool {
-        matches!(self, Self::RigidCylinders | Self::RigidCylindersAmongRocks)
-    }
-
-    /// The built-in rover on the wheels of the scene.
-    pub fn model(self) -> Model {
+    /// The built-in rover on them.
+    fn model(self) -> Model {
         let model = Model::rover();
-        if matches!(self, Self::Plane | Self::Rocks) {
+        if self == Self::BuiltIn {
             return model;
         }
         let model = model.with_contact_radius(LARGE).unwrap();
-        let Some([width, rounding]) = self.tread() else {
+        if self == Self::Discs {
             return model;
-        };
+        }
         let mut wide = model.description().clone();
+        let rounding = if self == Self::Tori { 0.5 * WIDTH } else { 0.0 };
         for wheel in &mut wide.wheels {
-            (wheel.width, wheel.rounding) = (Some(width), Some(rounding));
-            if self.is_rigid() {
+            (wheel.width, wheel.rounding) = (Some(WIDTH), Some(rounding));
+            if self == Self::RigidCylinders {
                 wheel.stiffness = Some(0.0);
             }
         }
         Model::from_description(wide).unwrap()
     }
+}
 
-    /// The ground of a name.
+impl Scene {
+    const fn new(ground: Ground, wheels: Wheels) -> Self {
+        Self { ground, wheels }
+    }
+
+    /// The built-in rover on flat ground, and among rocks.
+    pub const PLANE: Self = Self::new(Ground::Plane, Wheels::BuiltIn);
+    pub const ROCKS: Self = Self::new(Ground::Rocks, Wheels::BuiltIn);
+
+    /// Scenes of the tables and tests.
+    pub const ALL: [Self; 7] = [
+        Self::PLANE,
+        Self::new(Ground::Plane, Wheels::Discs),
+        Self::ROCKS,
+        Self::new(Ground::Plane, Wheels::Cylinders),
+        Self::new(Ground::Plane, Wheels::Tori),
+        Self::new(Ground::Hills, Wheels::Discs),
+        Self::new(Ground::FineHills, Wheels::Discs),
+    ];
+
+    /// Name in tables and on command lines.
+    pub fn name(self) -> String {
+        self.ground.name().to_owned() + self.wheels.suffix()
+    }
+
+    /// The scene of a name.
     pub fn of(name: &str) -> Option<Self> {
-        let mut all = Self::ALL.into_iter().chain(Self::MORE);
-        all.find(|ground| ground.name() == name)
+        let all = |ground| Wheels::ALL.map(|wheels| Self::new(ground, wheels));
+        let mut all = Ground::ALL.into_iter().flat_map(all);
+        all.find(|scene| scene.name() == name)
     }
 }
 
 /// Contact radius of large wheels, m.
 const LARGE: f64 = 0.20;
+
+/// Width of wide wheels, m.
+const WIDTH: f64 = 0.15;
 
 /// How much higher large wheels begin among rocks, m.
 const LIFT: f64 = 0.15;
@@ -211,16 +214,16 @@ impl Drive {
     }
 }
 
-/// All recorded drives on a ground, with torques of up to `torque`, N m.
-pub fn drives(ground: Ground, torque: f64, options: &StepOptions) -> Vec<Drive> {
+/// All recorded drives in a scene, with torques of up to `torque`, N m.
+pub fn drives(scene: Scene, torque: f64, options: &StepOptions) -> Vec<Drive> {
     let record = include_str!("../../benchmarks/comparison/exploring.json");
     let record: Value = serde_json::from_str(record).unwrap();
     let drives = record["drives"].as_array().unwrap().iter();
-    drives.map(|d| drive(d, ground, torque, options)).collect()
+    drives.map(|d| drive(d, scene, torque, options)).collect()
 }
 
-fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> Drive {
-    let model = ground.model();
+fn drive(record: &Value, scene: Scene, torque: f64, options: &StepOptions) -> Drive {
+    let model = scene.wheels.model();
     let [first, ..] = model.wheels() else {
         panic!("a rover has wheels")
     };
@@ -228,22 +231,28 @@ fn drive(record: &Value, ground: Ground, torque: f64, options: &StepOptions) -> 
     let mut q = vec![0.0; 21];
     q[1] = 0.25 + first.radius;
     let mut terrain: Arc<dyn Terrain> = Arc::new(Plane::ground());
-    if ground.has_rocks() {
-        q = numbers(&record["q"]);
-        if ground != Ground::Rocks {
-            q[1] += LIFT;
-        }
-        terrain = Arc::new(rocks(record));
-    }
-    if let Some(spacing) = ground.spacing() {
-        static HILLS: [OnceLock<HeightField>; 2] = [const { OnceLock::new() }; 2];
-        let made = &HILLS[usize::from(ground == Ground::FineHills)];
-        let hills = made.get_or_init(|| hills(spacing)).clone();
+    let hills = |own: &'static OnceLock<HeightField>, spacing: f64| {
+        let hills = own.get_or_init(|| hills(spacing)).clone();
         let around =
             (-4..=4).flat_map(|i| (-4..=4).map(move |j| [i, j].map(|k| 0.2 * f64::from(k))));
-        let highest = around
-            .filter_map(|[x, z]| hills.height(x, z))
-            .fold(0.0, f64::max);
+        let heights = around.filter_map(|[x, z]| hills.height(x, z));
+        (heights.fold(0.0, f64::max), hills)
+    };
+    static HILLS: [OnceLock<HeightField>; 2] = [const { OnceLock::new() }; 2];
+    let hills = match scene.ground {
+        Ground::Plane => None,
+        Ground::Rocks => {
+            q = numbers(&record["q"]);
+            if scene.wheels != Wheels::BuiltIn {
+                q[1] += LIFT;
+            }
+            terrain = Arc::new(rocks(record));
+            None
+        }
+        Ground::Hills => Some(hills(&HILLS[0], 0.25)),
+        Ground::FineHills => Some(hills(&HILLS[1], 0.05)),
+    };
+    if let Some((highest, hills)) = hills {
         q[1] += highest;
         terrain = Arc::new(hills);
     }

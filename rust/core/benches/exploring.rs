@@ -6,7 +6,7 @@
 //! plays all drives at both tolerances. A batch has 64 rovers, all drives eight times over with
 //! commands in another order; its time is a rover's. Steps that the general code took count as
 //! general.
-//! `-- --json GROUND TORQUE` measures one scene and prints JSON, for
+//! `-- --json SCENE TORQUE` measures one scene and prints JSON, for
 //! `make bench`, which sets other figures beside these.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
@@ -18,7 +18,7 @@ mod exploring_scenes;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use exploring_scenes::{Drive, Ground, STEPS_A_COMMAND, TORQUES, drives};
+use exploring_scenes::{Drive, STEPS_A_COMMAND, Scene, TORQUES, drives};
 use rover_core::integrator::{StepError, StepOptions};
 use rover_core::simulation::Batch;
 use rover_core::solver::SolverOptions;
@@ -102,8 +102,8 @@ fn median(mut times: Vec<f64>) -> f64 {
     times[times.len() / 2]
 }
 
-fn measure(ground: Ground, torque: f64) -> Result<Measured, StepError> {
-    let drives = TOLERANCES.map(|tolerance| drives(ground, torque, &options(tolerance)));
+fn measure(scene: Scene, torque: f64) -> Result<Measured, StepError> {
+    let drives = TOLERANCES.map(|tolerance| drives(scene, torque, &options(tolerance)));
     let mut times = [Vec::new(), Vec::new()];
     let mut in_batch = Vec::new();
     for round in 0..ROUNDS {
@@ -180,13 +180,13 @@ fn as_json(measured: &Measured) -> Value {
 fn main() -> Result<(), StepError> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let Some(at) = arguments.iter().position(|a| a == "--json") {
-        let ground = arguments.get(at + 1).and_then(|name| Ground::of(name));
+        let scene = arguments.get(at + 1).and_then(|name| Scene::of(name));
         let torque = arguments.get(at + 2).and_then(|t| t.parse().ok());
-        let (ground, torque) = (
-            ground.expect("the name of a ground"),
+        let (scene, torque) = (
+            scene.expect("the name of a scene"),
             torque.expect("a torque"),
         );
-        println!("{}", as_json(&measure(ground, torque)?));
+        println!("{}", as_json(&measure(scene, torque)?));
         return Ok(());
     }
     println!(
@@ -203,13 +203,13 @@ fn main() -> Result<(), StepError> {
         "pivots"
     );
     println!("{:<74} {}", "", "  mean med 99% most  ".repeat(3));
-    for ground in Ground::ALL {
+    for scene in Scene::ALL {
         for torque in TORQUES {
-            let measured = measure(ground, torque)?;
+            let measured = measure(scene, torque)?;
             let [fine, coarse] = measured.microseconds;
             println!(
                 "{:<22} {torque:>6} {fine:>9.2} {coarse:>9.2} {:>9.2} {:>7} {:>6}  {}   {}   {}",
-                ground.name(),
+                scene.name(),
                 measured.batch_microseconds,
                 measured.general,
                 measured.not_converged,

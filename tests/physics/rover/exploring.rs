@@ -3,8 +3,7 @@
 use rover_core::integrator::{Phase, Probe, StepOptions};
 use rover_core::multibody::Model;
 
-use crate::exploring_scenes::STEPS_A_COMMAND;
-use crate::exploring_scenes::{Drive, Ground, TORQUES, drives};
+use crate::exploring_scenes::{Drive, STEPS_A_COMMAND, Scene, TORQUES, drives};
 use crate::shared::moving;
 
 const PHASES: [Phase; 9] = [
@@ -27,16 +26,16 @@ impl Probe for Recorder {
     }
 }
 
-fn first_drive(ground: Ground, torque: f64) -> Drive {
-    drives(ground, torque, &StepOptions::default()).swap_remove(0)
+fn first_drive(scene: Scene, torque: f64) -> Drive {
+    drives(scene, torque, &StepOptions::default()).swap_remove(0)
 }
 
 #[test]
 fn an_exploring_rover_is_solved_to_the_tolerance_in_every_step() {
-    for ground in Ground::ALL {
+    for scene in Scene::ALL {
         for torque in TORQUES {
-            let report = first_drive(ground, torque).play().unwrap();
-            assert!(report.is_converged(), "{ground:?}, {torque} N m");
+            let report = first_drive(scene, torque).play().unwrap();
+            assert!(report.is_converged(), "{scene:?}, {torque} N m");
             assert_eq!(report.steps, 1000);
         }
     }
@@ -44,7 +43,7 @@ fn an_exploring_rover_is_solved_to_the_tolerance_in_every_step() {
 
 #[test]
 fn factorisations_and_pivots_of_a_drive_are_those_of_its_steps() {
-    let drive = first_drive(Ground::Plane, 60.0);
+    let drive = first_drive(Scene::PLANE, 60.0);
     let whole = drive.clone().play().unwrap();
     let (mut factorisations, mut pivots, mut iterations) = (0, 0, 0);
     let note = |report: &rover_core::integrator::StepReport| {
@@ -63,7 +62,7 @@ fn factorisations_and_pivots_of_a_drive_are_those_of_its_steps() {
 
 #[test]
 fn a_probe_sees_the_parts_of_a_step_in_their_order_and_changes_no_bit() {
-    let mut plain = first_drive(Ground::Rocks, 60.0);
+    let mut plain = first_drive(Scene::ROCKS, 60.0);
     let mut probed = plain.clone();
     plain.give(0);
     probed.give(0);
@@ -78,7 +77,7 @@ fn a_probe_sees_the_parts_of_a_step_in_their_order_and_changes_no_bit() {
 
 /// The first drive among rocks on cylinders 0.15 m wide that yield by 0.03 mm, critically damped.
 fn on_yielding_cylinders() -> Drive {
-    let mut drive = first_drive(Ground::Rocks, 60.0);
+    let mut drive = first_drive(Scene::ROCKS, 60.0);
     let old = &drive.simulation;
     let mut description = old.model().description().clone();
     for wheel in &mut description.wheels {

@@ -18,7 +18,7 @@ use super::rover::RoverSimulation;
 use crate::caught::{Fault, caught};
 use crate::integrator::StepError;
 use crate::pool::Pool;
-use crate::scalar::{Instructions, MAX_LANES};
+use crate::scalar::Instructions;
 
 /// Interval at which the calling thread asks whether to continue while others still step.
 const ASKING: Duration = Duration::from_millis(20);
@@ -60,16 +60,29 @@ pub type RoverTurn<'a, P> = (
 /// stay in the cache.
 const GROUP: usize = 32;
 
+/// Number of rovers that a thread takes next of those that are `left`, of `n` in all. All threads
+/// get work, in whole blocks where there are enough rovers. Where a thread takes several groups,
+/// the last ones are smaller, so that no thread waits long for another.
+fn group_size((n, left): (usize, usize), threads: usize, lanes: usize) -> usize {
+    let takes_one = n <= GROUP * threads;
+    let share = if takes_one { n } else { left }.div_ceil(threads);
+    share.next_multiple_of(lanes).clamp(1, GROUP)
+}
+
 /// What a thread needs for the turns of its rovers. Holds no state between calls.
 struct Worker {
-    batch: LaneBatch,
+    /// With the widest registers, and with those that few rovers fill.
+    wide: LaneBatch,
+    narrow: LaneBatch,
     reading: ReadingScratch,
 }
 
 impl Default for Worker {
     fn default() -> Self {
+        let instructions = Instructions::of_this_machine();
         Self {
-            batch: LaneBatch::new(Instructions::of_this_machine()),
+            wide: LaneBatch::new(instructions),
+            narrow: LaneBatch::new(instructions.for_rovers(1)),
             reading: ReadingScratch::default(),
         }
     }
@@ -150,23 +163,24 @@ fn take_turns<'a, P: Send + 'a>(
     pool: Option<&ThreadPool>,
     go_on: &mut dyn FnMut() -> bool,
 ) {
-    let n_rovers = slots.len();
-    // All threads get work, in whole blocks where there are enough rovers.
-    let group = n_rovers.div_ceil(workers.len().max(1));
-    let group = group.next_multiple_of(MAX_LANES).clamp(1, GROUP);
+    let (n_rovers, threads) = (slots.len(), workers.len().max(1));
+    let widest = Instructions::of_this_machine();
+    let instructions = widest.for_rovers(n_rovers.div_ceil(threads));
+    let (lanes, is_narrow) = (instructions.lanes(), instructions.lanes() < widest.lanes());
     let queue = Mutex::new(slots);
     let work = |worker: &mut Worker, go_on: &mut dyn FnMut() -> bool| {
-        let mut own = Vec::with_capacity(group);
+        let mut own = Vec::with_capacity(GROUP);
         loop {
             own.extend({
                 let mut queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
+                let group = group_size((n_rovers, queue.len()), threads, lanes);
                 (0..group).map_while(|_| queue.next()).collect::<Vec<_>>()
             });
             if own.is_empty() {
                 return;
             }
             let may_move = go_on();
-            let mut rovers = Vec::with_capacity(group);
+            let mut rovers = Vec::with_capacity(GROUP);
             for ((rover, error), place) in &mut own {
                 **error = None;
                 if may_move && turn.is_moving(place) {
@@ -176,7 +190,12 @@ fn take_turns<'a, P: Send + 'a>(
                     }
                 }
             }
-            worker.batch.advance(&mut rovers, n, go_on);
+            let batch = if is_narrow {
+                &mut worker.narrow
+            } else {
+                &mut worker.wide
+            };
+            batch.advance(&mut rovers, n, go_on);
             drop(rovers);
             for ((rover, error), place) in own.drain(..) {
                 let done = Done {
@@ -220,4 +239,37 @@ fn take_turns<'a, P: Send + 'a>(
             ask();
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sizes of the groups that threads take, one after the other.
+    fn groups(n: usize, threads: usize, lanes: usize) -> Vec<usize> {
+        let (mut left, mut sizes) = (n, Vec::new());
+        while left > 0 {
+            let size = group_size((n, left), threads, lanes).min(left);
+            sizes.push(size);
+            left -= size;
+        }
+        sizes
+    }
+
+    #[test]
+    fn every_thread_has_work() {
+        assert_eq!(groups(64, 16, 4), [4; 16]);
+        assert_eq!(groups(64, 2, 8), [32, 32]);
+        assert_eq!(groups(100, 2, 8), [32, 32, 24, 8, 4]);
+    }
+
+    /// Groups of 32 to the end would leave threads idle while the last ones are stepped.
+    #[test]
+    fn the_last_groups_are_small() {
+        let sizes = groups(1024, 16, 8);
+        assert!(sizes.len() > 2 * 16);
+        assert!(sizes.is_sorted_by(|a, b| a >= b));
+        assert_eq!(sizes[..16], [32; 16]);
+        assert_eq!(sizes[sizes.len() - 16..], [8; 16]);
+    }
 }

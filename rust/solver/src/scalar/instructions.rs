@@ -155,6 +155,16 @@ impl Instructions {
         }
     }
 
+    /// These, or narrower ones of which so many rovers fill a register.
+    #[must_use]
+    pub fn for_rovers(self, n: usize) -> Self {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) if n <= 4 => Level::new().as_avx2().map_or(self, Self::Avx2),
+            _ => self,
+        }
+    }
+
     /// Name of the instruction set.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -171,6 +181,16 @@ impl Instructions {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_register_is_no_wider_than_the_rovers_that_fill_it() {
+        for all in Instructions::all_of_this_machine() {
+            let few = all.for_rovers(4);
+            assert_eq!(few.lanes(), all.lanes().min(4));
+            assert_eq!(few.for_rovers(4).name(), few.name());
+            assert_eq!(all.for_rovers(5).name(), all.name());
+        }
+    }
 
     #[test]
     fn what_is_used_stays() {
