@@ -56,7 +56,9 @@ def alone_and_in_batch(scenes: dict[str, tuple[str, tuple[str, ...]]], together:
     """Scenes by name with their example and arguments; `together`: the argument that takes a batch."""
     alone = {name: Scene(example, after, 10, 210) for name, (example, after) in scenes.items()}
     batches = {
-        f"{name}, batch": Scene(one.example, (*(word for word in one.after if word != "alone"), together), 10, 110, BATCH)
+        f"{name}, batch": Scene(
+            one.example, (*(word for word in one.after if word != "alone"), together), 10, 110, BATCH
+        )
         for name, one in alone.items()
     }
     return alone | batches
@@ -87,13 +89,8 @@ EFFORTS = {"general": 1, "alone": 1, "batch": BATCH}
 
 def of_machine(name: str, how: str) -> str:
     """Thousands of instructions a step and a rover; a dash where valgrind lacks an instruction."""
-    try:
-        count = collected_between(Scene("machine_steps", (name, how), 10, 210, EFFORTS[how]))
-    except subprocess.CalledProcessError as error:
-        if error.returncode != -signal.SIGILL:
-            raise
-        return "-"
-    return f"{count / 1000:.0f}"
+    count = collected_between(Scene("machine_steps", (name, how), 10, 210, EFFORTS[how]))
+    return f"{count / 1000:.0f}" if count else "-"
 
 
 def collected(scene: Scene, steps: int) -> int:
@@ -110,10 +107,15 @@ def collected(scene: Scene, steps: int) -> int:
     return int(found)
 
 
-def collected_between(scene: Scene) -> int:
-    """Instructions of a step and a rover."""
+def collected_between(scene: Scene) -> int | None:
+    """Instructions of a step and a rover; None where valgrind lacks an instruction."""
     steps = (scene.long - scene.short) * scene.rovers
-    return round((collected(scene, scene.long) - collected(scene, scene.short)) / steps)
+    try:
+        return round((collected(scene, scene.long) - collected(scene, scene.short)) / steps)
+    except subprocess.CalledProcessError as error:
+        if error.returncode != -signal.SIGILL:
+            raise
+        return None
 
 
 def build() -> None:
@@ -129,10 +131,10 @@ def compiler() -> str:
     return told.split()[1]
 
 
-def changes(before: dict[str, int], now: dict[str, int]) -> list[str]:
+def changes(before: dict[str, int | None], now: dict[str, int | None]) -> list[str]:
     """Names of the scenes whose counts differ by more than the tolerance, or that only one side has."""
-    both = before.keys() & now.keys()
-    changed = {name for name in both if abs(now[name] - before[name]) > TOLERANCE * before[name]}
+    both = {name: (before[name], now[name]) for name in before.keys() & now.keys()}
+    changed = {name for name, (a, b) in both.items() if a and b and abs(b - a) > TOLERANCE * a}
     return sorted(changed | (before.keys() ^ now.keys()))
 
 
@@ -158,7 +160,8 @@ def main() -> None:
     table = Table("scene", "instructions a step and rover", "committed", "change")
     for name, count in now.items():
         known = before["a step"].get(name)
-        table.add_row(name, str(count), str(known or ""), f"{100 * (count / known - 1):+.2f}%" if known else "")
+        change = f"{100 * (count / known - 1):+.2f}%" if count and known else ""
+        table.add_row(name, str(count or "-"), str(known or ""), change)
     console.print(table)
     if arguments.save:
         COUNTS.write_text(json.dumps({"rustc": rustc, "a step": now}, indent=1) + "\n", encoding="utf-8")

@@ -112,7 +112,8 @@ def test_columns_that_hold_are_the_differences_of_real_steps(scene, modes, least
     assert linear.a.shape == (2 * NV, 2 * NV)
     assert linear.b.shape == (2 * NV, 12)
     assert linear.holds.sum() >= least
-    assert difference_error(sim, linear).max() < 2e-6  # the differences' own error
+    # The differences' own error: along the drive among rocks 5e-7 to 3e-6.
+    assert difference_error(sim, linear).max() < 4e-6
 
 
 @pytest.mark.parametrize("seed", [319, 382])

@@ -7,9 +7,9 @@
 //! - `explore_steps SCENE TORQUE DRIVES` plays the first DRIVES drives with torques of up to TORQUE
 //!   N m, for the parts of a step: with `--collect-atstart=no --toggle-collect='*counted_step*'
 //!   --dump-before='*part_ends*'` it counts every seventh step. Each part of a counted step ends
-//!   with a call of `part_ends`, at which callgrind writes what the part took. The number of counted
-//!   steps is printed, and the names of the parts in the same order, one a line. `make bench` adds
-//!   them up.
+//!   with a call of `part_ends`, at which callgrind writes what the part took. The number of
+//!   counted steps is printed, and the names of the parts in the same order, one a line. `make
+//!   bench` adds them up.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
 

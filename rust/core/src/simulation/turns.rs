@@ -88,6 +88,17 @@ impl Default for Worker {
     }
 }
 
+impl Worker {
+    /// The batch with so many lanes.
+    fn batch(&mut self, lanes: usize) -> &mut LaneBatch {
+        if lanes < Instructions::of_this_machine().lanes() {
+            &mut self.narrow
+        } else {
+            &mut self.wide
+        }
+    }
+}
+
 /// The threads that step rovers.
 pub struct Workers {
     /// Threads besides the caller's; None if the caller does all the work.
@@ -164,9 +175,8 @@ fn take_turns<'a, P: Send + 'a>(
     go_on: &mut dyn FnMut() -> bool,
 ) {
     let (n_rovers, threads) = (slots.len(), workers.len().max(1));
-    let widest = Instructions::of_this_machine();
-    let instructions = widest.for_rovers(n_rovers.div_ceil(threads));
-    let (lanes, is_narrow) = (instructions.lanes(), instructions.lanes() < widest.lanes());
+    let share = n_rovers.div_ceil(threads);
+    let lanes = Instructions::of_this_machine().for_rovers(share).lanes();
     let queue = Mutex::new(slots);
     let work = |worker: &mut Worker, go_on: &mut dyn FnMut() -> bool| {
         let mut own = Vec::with_capacity(GROUP);
@@ -190,12 +200,7 @@ fn take_turns<'a, P: Send + 'a>(
                     }
                 }
             }
-            let batch = if is_narrow {
-                &mut worker.narrow
-            } else {
-                &mut worker.wide
-            };
-            batch.advance(&mut rovers, n, go_on);
+            worker.batch(lanes).advance(&mut rovers, n, go_on);
             drop(rovers);
             for ((rover, error), place) in own.drain(..) {
                 let done = Done {

@@ -209,7 +209,7 @@ impl Cones {
 }
 
 impl Touching {
-    /// Number of its unknowns.
+    /// Number of the unknowns of a contact.
     fn count(&self, d: usize) -> usize {
         if self.kind == AdmissibleImpulse::Rests {
             d
@@ -218,7 +218,7 @@ impl Touching {
         }
     }
 
-    /// Its block of D⁻¹.
+    /// Block of D⁻¹ of a contact, see [`Cones`].
     fn inverse(&self, d: usize, w: &[f64], roots: &[f64], epsilon: f64) -> [f64; 9] {
         let at = self.first;
         let mut inverse = [0.0; 9];

@@ -28,12 +28,11 @@ const DEFINITE: f64 = 1e-3;
 /// one whose last entry is a thousandth is still found.
 const DETERMINED: [f64; 2] = [1e-3, 1e6];
 
-/// Steps of a lane after which a nearly solved problem ends, and the part of the acceptable
-/// violation that is nearly. The ends of rigid wheels may have no motion that keeps all of them on
-/// the ground, as they drift by rounding, and Newton's method none of their answers. A violation
-/// ten times as large saves a sixth of such steps' time, and lets wheels drift by 27 um in 50 s
-/// instead of 0.2.
-const SLOW: usize = 16;
+/// Part of the acceptable violation to which a problem is nearly solved; that ends it once an
+/// attempt has failed. The ends of rigid wheels may have no motion that keeps all of them on the
+/// ground, as they drift by rounding, and Newton's method none of their answers. A violation ten
+/// times as large saves a sixth of such steps' time, and lets wheels drift by 27 um in 50 s instead
+/// of 0.2.
 const NEARLY: f64 = 0.1;
 
 /// What is known about other impulses with the motion of an answer.
@@ -76,8 +75,8 @@ pub(super) type FactoredSolver<T> = LaneSolver<T, MAX_CONTACTS, VelocitySystem<T
 pub(super) struct LaneSolver<T: Lane, const C: usize, S: Loaded<T, C>> {
     system: S,
     pivoting: Pivoting<T, Few<C>>,
-    /// Lanes with a problem, those that have taken [`SLOW`] steps, those that have taken all steps
-    /// of an attempt, and those that begin another one.
+    /// Lanes with a problem, those that have taken all steps of an attempt, now or before, those
+    /// that have now, and those that begin another one.
     active: u32,
     slow: u32,
     late: u32,
@@ -333,12 +332,13 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         (self.slow, self.late) = (0, 0);
         for lane in 0..T::LANES {
             self.steps[lane] += 1;
-            self.slow |= u32::from(self.before[lane] + self.steps[lane] >= SLOW) << lane;
             self.late |= u32::from(self.steps[lane] >= S::MAX_STEPS) << lane;
+            self.slow |= u32::from(self.failed[lane] > 0) << lane;
         }
+        self.slow |= self.late;
     }
 
-    /// Lanes of which a nearly solved problem will do by now, and that have one. `acceptable`:
+    /// Lanes that are slow and have nearly solved a problem of which that will do. `acceptable`:
     /// violation, m/s.
     #[inline(always)]
     fn acceptable(&self, problems: &[ContactProblem], acceptable: f64) -> u32 {
