@@ -631,7 +631,7 @@ impl<T: Lane> ContactMatrices<T> {
                 problem.n_dry = contacts.n_dry(index);
                 problem.make_room();
                 problem.has_start = false;
-                (problem.asks_least, problem.accepts) = (true, true);
+                problem.asks_least = true;
                 if problem.n_contacts > 0 && contacts.is_factored(index) {
                     problem.factored.adopt(self.pattern_of(contacts, index));
                     problem.factored.slots = 0;

@@ -23,11 +23,6 @@ impl ByMethod {
         let options = &SolverOptions {
             is_pivoted: problem.is_escalated,
             is_brief: problem.is_escalated,
-            acceptable: if problem.accepts {
-                options.acceptable
-            } else {
-                0.0
-            },
             ..*options
         };
         let report = solve(&stated, options, p, u, &mut self.workspace);

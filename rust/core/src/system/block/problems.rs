@@ -228,8 +228,7 @@ impl<T: Lane> LaneSystem<T> {
                 problem.n_contacts = 0;
             }
             let n = problem.n_unknowns();
-            // What is acceptable is a speed, not a displacement.
-            (problem.asks_least, problem.accepts) = (false, false);
+            problem.asks_least = false;
             problem.is_solved = false;
             problem.q[..n].fill(0.0);
             problem.p[..n].fill(0.0);
@@ -269,7 +268,11 @@ impl<T: Lane> LaneSystem<T> {
         reports: &mut [StepReport],
         farthest: &mut [T],
     ) -> T::Mask {
-        self.solve_by_method(&options.solver, going, problems);
+        let solver = SolverOptions {
+            acceptable: 0.0, // is a speed, not a displacement
+            ..options.solver
+        };
+        self.solve_by_method(&solver, going, problems);
         let mut unsolved = 0;
         for (index, problem) in problems[..self.contacts.n_problems()].iter().enumerate() {
             let (leader, lane, n) = (index / T::LANES, index % T::LANES, problem.n_unknowns());

@@ -28,13 +28,6 @@ const DEFINITE: f64 = 1e-3;
 /// one whose last entry is a thousandth is still found.
 const DETERMINED: [f64; 2] = [1e-3, 1e6];
 
-/// Part of the acceptable violation to which a problem is nearly solved; that ends it once an
-/// attempt has failed. The ends of rigid wheels may have no motion that keeps all of them on the
-/// ground, as they drift by rounding, and Newton's method none of their answers. A violation ten
-/// times as large saves a sixth of such steps' time, and lets wheels drift by 27 um in 50 s instead
-/// of 0.2.
-const NEARLY: f64 = 0.1;
-
 /// What is known about other impulses with the motion of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Freedom {
@@ -75,10 +68,9 @@ pub(super) type FactoredSolver<T> = LaneSolver<T, MAX_CONTACTS, VelocitySystem<T
 pub(super) struct LaneSolver<T: Lane, const C: usize, S: Loaded<T, C>> {
     system: S,
     pivoting: Pivoting<T, Few<C>>,
-    /// Lanes with a problem, those that have taken all steps of an attempt, now or before, those
-    /// that have now, and those that begin another one.
+    /// Lanes with a problem, those that have taken all steps of an attempt, and those that begin
+    /// another one.
     active: u32,
-    slow: u32,
     late: u32,
     again: u32,
     /// Which problem each lane has, and how many steps its attempt has taken.
@@ -97,7 +89,6 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             system: S::new(token),
             pivoting: Pivoting::new(token),
             active: 0,
-            slow: 0,
             late: 0,
             again: 0,
             problem: [0; MAX_LANES],
@@ -329,34 +320,16 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
     fn step(&mut self, token: T::Token, tolerances: [T; 2]) {
         let active = T::mask(token, self.active);
         self.pivoting.advance(&mut self.system, active, tolerances);
-        (self.slow, self.late) = (0, 0);
+        self.late = 0;
         for lane in 0..T::LANES {
             self.steps[lane] += 1;
             self.late |= u32::from(self.steps[lane] >= S::MAX_STEPS) << lane;
-            self.slow |= u32::from(self.failed[lane] > 0) << lane;
         }
-        self.slow |= self.late;
-    }
-
-    /// Lanes that are slow and have nearly solved a problem of which that will do. `acceptable`:
-    /// violation, m/s.
-    #[inline(always)]
-    fn acceptable(&self, problems: &[ContactProblem], acceptable: f64) -> u32 {
-        let (mut left, mut found) = (self.active & self.slow, 0);
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let will_do = problems[self.problem[lane]].accepts;
-            let is_near =
-                will_do && self.pivoting.residual_of(lane).velocity <= NEARLY * acceptable;
-            found |= u32::from(is_near) << lane;
-        }
-        found
     }
 
     /// Forgets the problems of all lanes.
     pub(super) fn clear(&mut self) {
-        (self.active, self.slow, self.late, self.again) = (0, 0, 0, 0);
+        (self.active, self.late, self.again) = (0, 0, 0);
     }
 
     /// Lanes with a problem.
@@ -365,13 +338,12 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
     }
 
     /// Solves the problems of a line, until it has no more or lets the solver leave. Problems that
-    /// are not solved then stay with their lanes. `tolerances`: squares, and an acceptable
-    /// violation, m/s.
+    /// are not solved then stay with their lanes. `tolerances`: squares.
     pub(super) fn run(
         &mut self,
         token: T::Token,
         problems: &mut [ContactProblem],
-        tolerances: ([T; 2], f64),
+        tolerances: [T; 2],
         line: &mut impl ProblemSource,
     ) {
         inlined!(
@@ -387,7 +359,7 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
         &mut self,
         token: T::Token,
         problems: &mut [ContactProblem],
-        (tolerances, acceptable): ([T; 2], f64),
+        tolerances: [T; 2],
         line: &mut impl ProblemSource,
     ) {
         let mut has_gone_on = false;
@@ -404,7 +376,6 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
                 new |= 1 << lane;
             }
             self.active |= new;
-            self.slow &= !new;
             self.late &= !new;
             if new != 0 {
                 self.pivoting.begin(&mut self.system, T::mask(token, new));
@@ -417,8 +388,6 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
             let own = &mut self.pivoting;
             let solved = own.is_solved(tolerances);
             let ends = (solved | own.lost | !own.is_finite()).bits() | self.late;
-            let accepted = self.acceptable(problems, acceptable) & !solved.bits();
-            let ends = ends | accepted;
             let ended = self.active & ends;
             if ended == 0 {
                 self.step(token, tolerances);
@@ -434,12 +403,10 @@ impl<T: Lane, const C: usize, S: Loaded<T, C>> LaneSolver<T, C, S> {
                 let index = self.problem[lane];
                 let problem = &mut problems[index];
                 let is_solved = solved >> lane & 1 == 1;
-                problem.is_acceptable = accepted >> lane & 1 == 1;
-                let ends = is_solved || problem.is_acceptable;
-                if !ends && self.retry(lane, problem) {
+                if !is_solved && self.retry(lane, problem) {
                     self.again |= 1 << lane;
                 } else {
-                    self.store(lane, problem, ends);
+                    self.store(lane, problem, is_solved);
                     if is_solved && settled >> lane & 1 == 0 {
                         self.settle(lane, problem, tolerances);
                     }

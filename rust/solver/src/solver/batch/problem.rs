@@ -65,8 +65,6 @@ pub struct ContactProblem {
     pub has_start: bool,
     /// Whether of the answers with the same motion that of least norm is taken.
     pub asks_least: bool,
-    /// Whether an answer of a slow solver will do that is [acceptable](super::super::SolverOptions).
-    pub accepts: bool,
     /// Whether `p` was the least answer of the last step, of the same contacts. Where it still
     /// solves the problem without any step of the solver, it stays.
     pub begins_least: bool,
@@ -224,7 +222,6 @@ impl Clone for ContactProblem {
         (self.p, self.u) = (other.p, other.u);
         (self.start, self.has_start) = (other.start, other.has_start);
         (self.asks_least, self.begins_least) = (other.asks_least, other.begins_least);
-        self.accepts = other.accepts;
         self.residual = other.residual;
         self.iterations = other.iterations;
         (self.factorisations, self.pivots) = (other.factorisations, other.pivots);
@@ -246,7 +243,6 @@ impl Default for ContactProblem {
             start: [0.0; MAX_UNKNOWNS],
             has_start: false,
             asks_least: false,
-            accepts: false,
             begins_least: false,
             u: [0.0; MAX_UNKNOWNS],
             residual: Residual::UNSOLVED,

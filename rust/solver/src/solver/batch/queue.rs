@@ -256,7 +256,7 @@ impl<T: Lane> Queue<T> {
         problems: &mut [ContactProblem],
         options: &SolverOptions,
     ) -> Option<usize> {
-        let tolerances = (squares::<T>(self.token, options), options.acceptable);
+        let tolerances = squares::<T>(self.token, options);
         loop {
             let waiting = |kind: Kind| self.waiting[kind.index()].len();
             let factored = self.factored.iter().enumerate();
@@ -294,7 +294,7 @@ impl<T: Lane> Queue<T> {
     fn work(
         &mut self,
         problems: &mut [ContactProblem],
-        tolerances: ([T; 2], f64),
+        tolerances: [T; 2],
         kind: Kind,
         n_others: usize,
     ) {
