@@ -223,6 +223,7 @@ pub fn drives(scene: Scene, torque: f64, options: &StepOptions) -> Vec<Drive> {
 }
 
 fn drive(record: &Value, scene: Scene, torque: f64, options: &StepOptions) -> Drive {
+    static HILLS: [OnceLock<HeightField>; 2] = [const { OnceLock::new() }; 2];
     let model = scene.wheels.model();
     let [first, ..] = model.wheels() else {
         panic!("a rover has wheels")
@@ -238,7 +239,6 @@ fn drive(record: &Value, scene: Scene, torque: f64, options: &StepOptions) -> Dr
         let heights = around.filter_map(|[x, z]| hills.height(x, z));
         (heights.fold(0.0, f64::max), hills)
     };
-    static HILLS: [OnceLock<HeightField>; 2] = [const { OnceLock::new() }; 2];
     let hills = match scene.ground {
         Ground::Plane => None,
         Ground::Rocks => {
