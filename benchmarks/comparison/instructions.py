@@ -52,12 +52,12 @@ GROUNDS = ("plane", "rocks", "hills, cells 0.25 m", "hills, cells 0.05 m")
 WHEELS = ("wheels 0.20 m", "cylinders", "rigid cylinders", "tori")
 
 
-def alone_and_in_batch(scenes: dict[str, tuple[str, tuple[str, ...]]], together: str) -> dict[str, Scene]:
-    """Scenes by name with their example and arguments; `together`: the argument that takes a batch."""
+def alone_and_in_batch(scenes: dict[str, tuple[str, tuple[str, ...]]]) -> dict[str, Scene]:
+    """Scenes by name with their example and its arguments for one rover, and the same for a batch."""
     alone = {name: Scene(example, after, 10, 210) for name, (example, after) in scenes.items()}
     batches = {
         f"{name}, batch": Scene(
-            one.example, (*(word for word in one.after if word != "alone"), together), 10, 110, BATCH
+            one.example, (*(word for word in one.after if word != "alone"), "batch"), 10, 110, BATCH
         )
         for name, one in alone.items()
     }
@@ -70,8 +70,7 @@ SCENES = {
     **alone_and_in_batch(
         {f"{g}, {w}": ("explore_steps", (f"{g}, {w}", "alone")) for g in GROUNDS for w in WHEELS}
         | {"six wheels and a differential": ("machine_steps", ("open-rover", "alone"))}
-        | {f"sand, {how}": ("sand_steps", (how,)) for how in ("rest", "drive", "explore")},
-        "batch",
+        | {f"sand, {how}": ("sand_steps", (how,)) for how in ("rest", "drive", "explore")}
     ),
     "bed of disks": Scene("disk_steps", (), 1, 101),
     "derivatives in sand": Scene("sand_steps", ("derivatives",), 10, 50),
