@@ -215,9 +215,11 @@ impl<T: Lane> Compliance<T> {
         let moved = h * u_N;
         let deflection = (moved - gap).max(zero);
         let gap = gap - theta * moved;
-        // The damper bore a part of the force while the deflection grew.
+        // The damper bore a part of the force while the deflection grew, and keeps more of it than
+        // the force says while it shrinks: no more than twice, so that an impact leaves little.
         let force = T::select(unknown, weight, before[0]) / h;
-        let by_force = (force + damping * u_N).max(zero).min(force) / stiffness;
+        let most = force * h.like(2.0);
+        let by_force = (force + damping * u_N).max(zero).min(most) / stiffness;
         let elastic = (h.like(2.0) * deflection).min(by_force);
         let known = gap.max(-(elastic + slack));
         let pressed = weight / (h * stiffness);
