@@ -14,13 +14,14 @@ from rover_gym.core import CommandError, EpisodeRun, RoverGrainSimulation, Rover
 from rover_gym.core.validation import Range
 from rover_gym.envs.arguments import RoverArguments, takes_arguments, with_tables
 from rover_gym.envs.batch import RoverBatch
+from rover_gym.envs.domain import Domain
 from rover_gym.envs.env_snapshot import EnvSnapshot
 from rover_gym.envs.episode_scene import EpisodeScene
 from rover_gym.envs.observation import ObservationLayout
 from rover_gym.envs.play_keys import keys_to_action, pushed
 from rover_gym.envs.sand_ground import soil_of
 from rover_gym.envs.spec_json import RoverSpec, rover_spec
-from rover_gym.envs.start import Domain, Rocks, Start
+from rover_gym.envs.start import Rocks, Start
 from rover_gym.envs.task import Task, check_actions
 from rover_gym.ground.sand.soils import Soil
 from rover_gym.show.frames.render_options import RENDER_MODES
@@ -416,7 +417,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     @property
     def soil(self) -> Soil | None:
         """The soil of the episode's sand as it was drawn; None on firm ground."""
-        return soil_of(self.task.soils, self.simulation.terrain)
+        return soil_of(self.domain.soils_of(self.task.soils), self.simulation.terrain)
 
     @property
     def domain(self) -> Domain:
