@@ -203,7 +203,9 @@ def check_distributions(**bounds: float) -> Callable[[str, object], dict[str, Di
     """A check of a mapping of names to numbers or distributions within bounds."""
 
     def check(field: str, value: object) -> dict[str, Distribution]:
-        return {str(name): distribution(f"{field}.{name}", one, **bounds) for name, one in mapping(field, value).items()}
+        return {
+            str(name): distribution(f"{field}.{name}", one, **bounds) for name, one in mapping(field, value).items()
+        }
 
     return check
 

@@ -375,7 +375,7 @@ class RoverBatch:
     def _take(
         self, take: Callable[[object], Stepped], actions: object, moved: Mask
     ) -> tuple[Stepped, object, npt.NDArray[np.int64] | None]:
-        """Takes a control period; returns its outcome, the clipped actions, and how many entries of each were clipped."""
+        """Takes a control period; returns its outcome, the clipped actions, and the counts of clipped entries."""
         if self._faults is None:
             # The core refuses what is outside [-1, 1] before anything moves: actions within pay for no check here.
             try:
@@ -400,7 +400,7 @@ class RoverBatch:
         return stepped, clipped, beyond
 
     def _with_sent(self, observation: Observations, rovers: slice | int) -> Observations:
-        """Observations of some rovers with the actions that they were sent as the previous ones; changes them in place."""
+        """Sets the previous actions of observations to what the rovers were sent, not what the motors received."""
         if self._faults is not None:
             layout = self.task.layout
             place = layout["previous_action"]
@@ -526,7 +526,9 @@ class RoverBatch:
                 infos["reward_terms"] |= {name: term.copy(), f"_{name}": everyone}
             infos |= {"clipped_actions": self._clipped.copy(), "_clipped_actions": everyone}
         elif asked is not None:
-            infos["domain"] |= {name: own[asked].copy() if own.ndim > 1 else own[asked].item() for name, own in self._drawn.items()}
+            infos["domain"] |= {
+                name: own[asked].copy() if own.ndim > 1 else own[asked].item() for name, own in self._drawn.items()
+            }
             infos["reward_terms"] |= {name: float(term[asked]) for name, term in self._terms.items()}
             infos["clipped_actions"] = int(self._clipped[asked])
         return infos

@@ -15,8 +15,8 @@ class CommandFaults:
 
     An action arrives `delay` control periods later; until the first one does, the motors receive zeros. Of its torques,
     those smaller than the dead zone are not delivered. The steering's set-point follows the command with play: it stays
-    while the command is within half the backlash of it, and otherwise trails at that distance (the play operator of
-    hysteresis, Krasnosel'skii and Pokrovskii 1989).
+    while the command is within half the backlash of it, and otherwise trails at that distance: the play operator
+    (Krasnosel'skii and Pokrovskii 1989).
 
     Args:
         n: Number of rovers.

@@ -60,9 +60,8 @@ class Normal:
     cut: float = 3.0
 
     def __post_init__(self) -> None:
-        _keep(self, "mean")
-        _keep(self, "deviation", at_least=0.0)
-        _keep(self, "cut", at_least=1.0)
+        for name, least in (("mean", None), ("deviation", 0.0), ("cut", 1.0)):
+            object.__setattr__(self, name, number(f"Normal.{name}", getattr(self, name), at_least=least))
 
     @property
     def support(self) -> Range:
@@ -97,8 +96,8 @@ class LogUniform:
     high: float
 
     def __post_init__(self) -> None:
-        _keep(self, "low", above=0.0)
-        _keep(self, "high", at_least=self.low)
+        object.__setattr__(self, "low", number("LogUniform.low", self.low, above=0.0))
+        object.__setattr__(self, "high", number("LogUniform.high", self.high, at_least=self.low))
 
     @property
     def support(self) -> Range:
@@ -159,11 +158,6 @@ CLASSES: dict[str, type[Normal | LogUniform | Choice]] = {
 }
 
 
-def _keep(one: Normal | LogUniform, name: str, **bounds: float) -> None:
-    """Sets a field of a distribution to its checked number."""
-    object.__setattr__(one, name, number(f"{type(one).__name__}.{name}", getattr(one, name), **bounds))
-
-
 def distribution(
     field: str,
     value: object,
@@ -180,7 +174,7 @@ def distribution(
     found = named_object(value)
     if found is not None:
         value = _from_fields(field, *found)
-    if not isinstance(value, tuple(CLASSES.values())):
+    if not isinstance(value, (Normal, LogUniform, Choice)):
         return Uniform(*span(field, value, above=above, at_least=at_least, at_most=at_most))
     for i, end in enumerate(value.support):
         number(f"{field}.support[{i}]", end, above=above, at_least=at_least, at_most=at_most)

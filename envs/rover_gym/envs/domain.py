@@ -90,7 +90,7 @@ class Domain:
         return tuple(soil.having(**{name: by * soil.numbers[name] for name, by in factors.items()}) for soil in soils)
 
     def materials_of(self, model: RoverModel, restitution: float) -> dict[tuple[str, str], tuple[float, float]]:
-        """Friction and restitution of the rover's materials on those of the ground that have a friction of their own."""
+        """Friction and restitution by pair of materials, for those of the ground that have a friction of their own."""
         own = rover_materials(model)
         return {
             (one, ground): (friction, restitution)
@@ -123,6 +123,12 @@ class DomainDistribution:
         """Ranges of the properties that the core knows."""
         return {name: own.support for name, own in self.core.items()}
 
+    def described(self) -> dict[str, str]:
+        """Each distribution in words, by the names in `info["domain"]`."""
+        return {name: str(own) for name, own in self.core.items()} | {
+            name: str(own) for name, (own, _) in self.further.items()
+        }
+
     @property
     def is_of_core(self) -> bool:
         """Whether the core can draw everything."""
@@ -139,8 +145,8 @@ class DomainDistribution:
         ranges = self.ranges
         for name, own in self.core.items():
             if not isinstance(own, Uniform):
-                value = float(sampled(generator, own))
-                ranges[name] = (value, value)
+                fixed = float(sampled(generator, own))
+                ranges[name] = (fixed, fixed)
         return ranges, further
 
 
@@ -154,7 +160,9 @@ def domain_distribution(given: Mapping[str, Any], rover: RoverModel, soils: tupl
     sizes["mass_centre_offset"] = (3,)
     sizes |= dict.fromkeys(("wheel_radius_scale", *OF_MOTORS), (len(rover.wheel_names),))
     further: dict[str, tuple[Distribution, Size]] = {
-        name: (given[name], sizes[name]) for name, neutral in NEUTRAL.items() if given[name].support != (neutral, neutral)
+        name: (given[name], sizes[name])
+        for name, neutral in NEUTRAL.items()
+        if given[name].support != (neutral, neutral)
     }
     for group in ("soil_scale", "material_friction"):
         further |= {f"{group}.{name}": (own, ()) for name, own in (given[group] or {}).items()}

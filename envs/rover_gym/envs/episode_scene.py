@@ -86,11 +86,12 @@ def scene_of(
     slope, uphill, x, z, heading, *places = start.tolist()
     goal, *further = zip(places[::2], places[1::2], strict=True)
     difficulty, abundance, max_radius = rocks.tolist()
+    mass, friction, gain, gravity = domain.tolist()
     return EpisodeScene(
         start=Start(slope, uphill, (x, z), heading, goal, tuple(further)),
         terrain=terrain,
         rocks=Rocks(difficulty, abundance, max_radius, int(rock_seed)) if task.has_rocks else None,
-        domain=Domain(*domain.tolist(), properties),
+        domain=Domain(mass, friction, gain, gravity, properties),
     )
 
 
@@ -268,7 +269,7 @@ def draw_varied_episodes(
     options: ResetOptions | Sequence[ResetOptions],
     batch: EpisodeBatch,
 ) -> VariedEpisodes:
-    """Draws the next episode of each generator as `draw_episodes` does, after the properties that the core does not know.
+    """Draws episodes as `draw_episodes` does, each after the properties that the core does not know.
 
     Raises:
         ModelError: The drawn properties give a rover that cannot be.

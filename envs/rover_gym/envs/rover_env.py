@@ -242,8 +242,34 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Randomisation
 
-    `friction`, `mass_scale`, `actuator_gain` and `gravity_scale` are drawn uniformly at each reset where they are
-    ranges, and fixed where they are numbers. `observation_noise` is Gaussian, drawn anew each step for every
+    An argument that may be a distribution is a number, which fixes the property; a pair (low, high), drawn uniformly at
+    each reset; or a `Normal`, `LogUniform` or `Choice` of `rover_gym.envs`. All are drawn from `np_random`. By default
+    nothing is random.
+
+    | argument                | acts on                                                          | drawn for each |
+    |-------------------------|------------------------------------------------------------------|----------------|
+    | mass_scale              | masses and inertias of all solids                                | rover          |
+    | mass_centre_offset      | mass centre of the trunk; its inertia and shape stay             | axis           |
+    | wheel_radius_scale      | radius at which a wheel touches the ground: wear                 | wheel          |
+    | actuator_gain           | torques, up to the motor's limit                                 | rover          |
+    | stall_torque_scale      | the motor's line                                                 | wheel          |
+    | no_load_speed_scale     | the motor's line                                                 | wheel          |
+    | command_delay           | actions: they act that many control periods later, zeros until then | rover       |
+    | torque_dead_zone        | torques: smaller ones are not delivered                          | rover          |
+    | steering_backlash_deg   | set-points: they follow the command at up to half of it           | rover          |
+    | friction                | all contacts                                                     | scene          |
+    | material_friction       | contacts of the rover with parts of the ground, by their material | material      |
+    | soil_scale              | numbers of the sand, such as `cohesion`                          | number         |
+    | gravity_scale           | gravity                                                          | scene          |
+
+    `info["domain"]` has the values of the episode: those of the core always, the others where they are given, as
+    numbers or arrays, and `soil_scale.cohesion`, `material_friction.rock` and the like by number and material. With
+    `sensors`, the info of `reset` also has what was drawn for them. `distributions` has the distributions in words.
+
+    Of a delayed or distorted action, `previous_action` is what was sent; the reward's changes and work are those of
+    what the motors received.
+
+    `observation_noise` is Gaussian, drawn anew each step for every
     unbounded entry; flags, fractions, unit vectors, the distance and the action stay exact.
     `set_difficulty` changes the rocks' difficulty, or its range, from the next reset on.
 
@@ -423,6 +449,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     def domain(self) -> Domain:
         """The episode's properties of rover and world as they were drawn."""
         return self.scene.domain
+
+    @property
+    def distributions(self) -> dict[str, str]:
+        """What the properties are drawn from, in words; fixed ones are numbers."""
+        return self.task.domain.described()
 
     @property
     def difficulty(self) -> float | None:

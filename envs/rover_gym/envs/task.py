@@ -118,7 +118,7 @@ class Task:
     def _options(self, model: RoverModel, domain: Domain) -> dict[str, Any]:
         """Keyword arguments of `Simulation` with the frictions of materials."""
         materials = domain.materials_of(model, self.simulation_options["restitution"])
-        return self.simulation_options | ({"materials": materials} if materials else {})
+        return dict(self.simulation_options, **({"materials": materials} if materials else {}))
 
 
 def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> Task:
@@ -151,7 +151,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     points = None if given["height_scan"] is None else given["height_scan"].offsets
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
     rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
-    scenes = {
+    scenes: dict[str, Any] = {
         "start": start,
         "trunk_load_limit": TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
         "rocks": rocks,
