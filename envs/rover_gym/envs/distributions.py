@@ -115,7 +115,7 @@ class LogUniform:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some numbers, each as likely; one that is listed twice is twice as likely.
+    """A choice among numbers, each as likely; one that is listed twice is twice as likely.
 
     Args:
         values: The numbers.

@@ -39,13 +39,13 @@ NEUTRAL = {
     "steering_backlash_deg": 0.0,
 }
 
-#: Those of the motors, by the field of `Motor` that they scale.
+#: Properties of the motors, by the field of `Motor` that they scale.
 OF_MOTORS = {"stall_torque_scale": "stall_torque", "no_load_speed_scale": "no_load_speed"}
 
-#: Those of the rover's model.
+#: Properties of the rover's model.
 OF_MODEL = ("mass_centre_offset", "wheel_radius_scale", *OF_MOTORS)
 
-#: Those of the way from an action to the motors.
+#: Properties of the way from an action to the motors.
 OF_COMMANDS = ("command_delay", "torque_dead_zone", "steering_backlash_deg")
 
 
