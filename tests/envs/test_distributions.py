@@ -211,6 +211,14 @@ def test_a_patch_of_ground_has_a_friction_of_its_own() -> None:
         RoverEnv(terrain=Union([grip, ice]), material_friction={"mud": 0.3})
 
 
+def test_a_friction_by_material_holds_for_every_part_of_the_rover() -> None:
+    described = RoverModel().to_dict()
+    described["wheels"][0]["material"], described["solids"][0]["material"] = "tyre", "hull"
+    env = RoverEnv(model=RoverModel.from_dict(described), material_friction={"ground": 0.3}, mass_centre_offset=0.01)
+    env.reset(seed=0)
+    assert env.simulation.materials.keys() == {(own, "ground") for own in ("wheel", "body", "tyre", "hull")}
+
+
 def test_the_sand_of_an_episode_is_what_was_drawn() -> None:
     env = RoverEnv(terrain="sand", soil="grc-1", soil_scale={"internal_friction": (0.8, 0.9)})
     _, info = env.reset(seed=0)

@@ -1,10 +1,10 @@
 """The domain of an episode: properties of rover, commands and world, and what they are drawn from.
 
-The core draws masses, friction, torque gain and gravity, uniformly. All else is drawn here, from the same generator and
-before the scene: the rover of an episode is made first, and the scene is then drawn for it.
+The core draws masses, friction, torque gain and gravity if they are uniform. All else is drawn here, from the same
+generator and before the scene, because the rover must be known to place it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -223,11 +223,19 @@ def ground_materials(terrain: Terrain) -> tuple[str, ...]:
 
 
 def rover_materials(model: RoverModel) -> tuple[str, ...]:
-    """The materials of a rover's wheels and shapes, each once."""
-    described = model.to_dict()
-    names = [wheel.get("material", "wheel") for wheel in described["wheels"]]
-    names += [solid.get("material", "body") for solid in described["solids"]]
-    return tuple(dict.fromkeys(names))
+    """The materials of a rover's wheels and shapes, each once; the first two are those without a name of their own."""
+    return tuple(dict.fromkeys(["wheel", "body", *_materials(model.to_dict())]))
+
+
+def _materials(described: Any) -> Iterator[str]:
+    """What the parts of a description call their material."""
+    if isinstance(described, Mapping):
+        if isinstance(name := described.get("material"), str):
+            yield name
+        described = described.values()
+    if not isinstance(described, str) and isinstance(described, Iterable):
+        for part in described:
+            yield from _materials(part)
 
 
 def changed_model(model: RoverModel, values: Mapping[str, Any]) -> RoverModel:
@@ -243,12 +251,11 @@ def changed_model(model: RoverModel, values: Mapping[str, Any]) -> RoverModel:
     trunk, wheels = described["solids"][0], described["wheels"]
     if "mass_centre_offset" in values:
         _move_mass(trunk, np.asarray(values["mass_centre_offset"]))
-    for wheel, by in zip(wheels, values.get("wheel_radius_scale", [1.0] * len(wheels)), strict=True):
+    for wheel, by in zip(wheels, values.get("wheel_radius_scale", ())):  # noqa: B905 - none where it is not given
         wheel["contact_radius"] = by * (wheel.get("contact_radius") or wheel["radius"])
     for name, number in OF_MOTORS.items():
-        for wheel, by in zip(wheels, values.get(name, [1.0] * len(wheels)), strict=True):
-            if wheel.get("motor"):
-                wheel["motor"][number] *= by
+        for wheel, by in zip(wheels, values.get(name, ())):  # noqa: B905
+            wheel["motor"][number] *= by
     return RoverModel.from_dict(described)
 
 

@@ -242,36 +242,37 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Randomisation
 
-    An argument that may be a distribution is a number, which fixes the property; a pair (low, high), drawn uniformly at
-    each reset; or a `Normal`, `LogUniform` or `Choice` of `rover_gym.envs`. All are drawn from `np_random`. By default
-    nothing is random.
+    Nothing is random by default. Where an argument may be a distribution, a number fixes the property; a pair (low, high)
+    is drawn uniformly at each reset; `Normal`, `LogUniform` and `Choice` of `rover_gym.envs` are drawn as their names say.
+    All random numbers come from `np_random`.
 
-    | argument                | acts on                                                          | drawn for each |
-    |-------------------------|------------------------------------------------------------------|----------------|
-    | mass_scale              | masses and inertias of all solids                                | rover          |
-    | mass_centre_offset      | mass centre of the trunk; its inertia and shape stay             | axis           |
-    | wheel_radius_scale      | radius at which a wheel touches the ground: wear                 | wheel          |
-    | actuator_gain           | torques, up to the motor's limit                                 | rover          |
-    | stall_torque_scale      | the motor's line                                                 | wheel          |
-    | no_load_speed_scale     | the motor's line                                                 | wheel          |
-    | command_delay           | actions: they act that many control periods later, zeros until then | rover       |
-    | torque_dead_zone        | torques: smaller ones are not delivered                          | rover          |
-    | steering_backlash_deg   | set-points: they follow the command at up to half of it           | rover          |
-    | friction                | all contacts                                                     | scene          |
-    | material_friction       | contacts of the rover with parts of the ground, by their material | material      |
-    | soil_scale              | numbers of the sand, such as `cohesion`                          | number         |
-    | gravity_scale           | gravity                                                          | scene          |
+    | argument              | acts on                                                    | drawn for each |
+    |-----------------------|------------------------------------------------------------|----------------|
+    | mass_scale            | masses and inertias of all solids                          | episode        |
+    | mass_centre_offset    | mass centre of the trunk, whose shape and inertia stay     | axis           |
+    | wheel_radius_scale    | radius at which a wheel touches the ground, as wear does   | wheel          |
+    | actuator_gain         | torques, up to the motor's limit                           | episode        |
+    | stall_torque_scale    | the motor's line                                           | wheel          |
+    | no_load_speed_scale   | the motor's line                                           | wheel          |
+    | command_delay         | actions; until the first one arrives, the motors get zeros | episode        |
+    | torque_dead_zone      | torques; smaller ones are not delivered                    | episode        |
+    | steering_backlash_deg | set-points; they trail the command by half the backlash    | episode        |
+    | friction              | all contacts                                               | episode        |
+    | material_friction     | contacts of the rover with parts of the ground             | material       |
+    | soil_scale            | numbers of the sand, such as `cohesion`                    | number         |
+    | gravity_scale         | gravity                                                    | episode        |
 
-    `info["domain"]` has the values of the episode: those of the core always, the others where they are given, as
-    numbers or arrays, and `soil_scale.cohesion`, `material_friction.rock` and the like by number and material. With
-    `sensors`, the info of `reset` also has what was drawn for them. `distributions` has the distributions in words.
+    `info["domain"]` has the episode's `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, and the others that
+    are given: numbers, or arrays with an entry for each axis or wheel. Soil and materials have names such as
+    `soil_scale.cohesion` and `material_friction.rock`. With `sensors`, the info of `reset` also has their random
+    properties, such as `imu.bias`. `distributions` describes what the properties are drawn from.
 
-    Of a delayed or distorted action, `previous_action` is what was sent; the reward's changes and work are those of
+    If commands are delayed or distorted, `previous_action` is the action as it was given; the terms of the reward count
     what the motors received.
 
-    `observation_noise` is Gaussian, drawn anew each step for every
-    unbounded entry; flags, fractions, unit vectors, the distance and the action stay exact.
-    `set_difficulty` changes the rocks' difficulty, or its range, from the next reset on.
+    `observation_noise` is Gaussian, drawn anew each step for every unbounded entry; flags, fractions, unit vectors, the
+    distance and the action stay exact. `set_difficulty` changes the rocks' difficulty, or its range, from the next reset
+    on.
 
     ## Info
 
