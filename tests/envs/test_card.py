@@ -24,6 +24,7 @@ from refusals import refused
 from rover_gym import HeightField, OptionError, RoverEnv, RoverGymError
 from rover_gym.envs import ARGUMENTS
 from rover_gym.envs.arguments import shortest
+from rover_gym.envs.domain import NEUTRAL, OF_CORE
 from rover_gym.envs.episode_scene import RESET_OPTIONS
 from rover_gym.envs.registration import ENVIRONMENTS
 from rover_gym.envs.reward_terms import WEIGHTS
@@ -48,6 +49,13 @@ def test_action_table_has_a_row_an_entry(env: RoverEnv) -> None:
         assert ast.literal_eval(bounds) == [env.action_space.low[i], env.action_space.high[i]]
         assert env.model.wheel_names[i % 6] in meaning.replace(",", "").split()
         assert (stands_for, unit) == (("wheel torque limit", "N m") if i < 6 else ("max_steering_deg", "rad"))
+
+
+def test_randomisation_table_has_every_property_that_is_an_argument() -> None:
+    names = [name for name, *_ in table("Randomisation")]
+    assert sorted(names) == sorted([*OF_CORE, *NEUTRAL, "material_friction", "soil_scale"])
+    for name, neutral in NEUTRAL.items():
+        assert ARGUMENTS[name].default == neutral
 
 
 def test_motor_table_is_the_model(env: RoverEnv) -> None:

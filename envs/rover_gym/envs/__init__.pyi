@@ -1,4 +1,6 @@
 from .arguments import ARGUMENTS as ARGUMENTS, Argument as Argument, RoverArguments as RoverArguments
+from .distributions import Choice as Choice, LogUniform as LogUniform, Normal as Normal
+from .domain import Domain as Domain
 from .env_snapshot import EnvSnapshot as EnvSnapshot
 from .grains_env import BedDraw as BedDraw, GrainsEnvSnapshot as GrainsEnvSnapshot, RoverGrainsEnv as RoverGrainsEnv
 from .observation import ObservationField as ObservationField, ObservationLayout as ObservationLayout
@@ -6,7 +8,6 @@ from .pushes import PushOptions as PushOptions, RandomPushes as RandomPushes
 from .reward_terms import RewardTerm as RewardTerm
 from .rover_env import RoverEnv as RoverEnv
 from .start import (
-    Domain as Domain,
     HeightScan as HeightScan,
     Rocks as Rocks,
     Start as Start,

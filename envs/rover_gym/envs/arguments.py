@@ -17,6 +17,7 @@ from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
 from rover_gym.core import ModelError, OptionError, RoverModel, Simulation, Terrain, TerrainError, Union
 from rover_gym.core.validation import Range, flag, known_keys, mapping, number, refuse, span, vector, whole
+from rover_gym.envs.distributions import Choice, Distribution, LogUniform, Normal, Quantity, distribution, is_fixed
 from rover_gym.envs.observation import info_table, observation_table
 from rover_gym.envs.reward_terms import WEIGHTS, RewardTerm, RewardTerms, check_reward_terms
 from rover_gym.envs.spec_json import model_from_json, soil_from_json, terrain_from_json
@@ -59,6 +60,13 @@ MIN_STEERING_DEG = 0.01
 
 MIN_BATTERY, MAX_BATTERY = 1.0, 1e12  # J
 
+MAX_OFFSET = 100.0  # m
+
+MAX_BACKLASH_DEG = 90.0
+
+#: Longest delay of a command, control periods.
+MAX_DELAY = 100
+
 #: Most goals of a course.
 MAX_WAYPOINTS = 100
 
@@ -97,6 +105,18 @@ class NumberOrRange(Number):
 
     def __str__(self) -> str:
         return f"{super().__str__()}, or a range"
+
+
+@dataclass(frozen=True)
+class NumberOrDistribution(Number):
+    """Check of a finite number within bounds, or of a distribution to draw from."""
+
+    def __call__(self, field: str, value: object) -> Distribution:  # type: ignore[override] # a number is one, too
+        """Checks the value and returns the distribution; a single number gives both ends of a `Uniform`."""
+        return distribution(field, value, above=self.above, at_least=self.at_least, at_most=self.at_most)
+
+    def __str__(self) -> str:
+        return f"{super().__str__()}, or a distribution"
 
 
 @dataclass(frozen=True)
@@ -166,6 +186,30 @@ def check_waypoints(field: str, value: object) -> int:
     return whole(field, value, at_least=1, at_most=MAX_WAYPOINTS)
 
 
+def check_delay(field: str, value: object) -> Distribution:
+    """Checks a delay in control periods, or a distribution of delays; all of a range are as likely."""
+    checked = distribution(field, value, at_least=0.0, at_most=MAX_DELAY)
+    if isinstance(checked, (Normal, LogUniform)):
+        refuse(OptionError, field, value, "must be a whole number, a range of them or a Choice of them")
+    for one in checked.values if isinstance(checked, Choice) else checked.support:
+        if not one.is_integer():
+            refuse(OptionError, field, one, "must be a whole number")
+    if isinstance(checked, Choice) or is_fixed(checked):
+        return checked
+    return Choice(tuple(range(int(checked.low), int(checked.high) + 1)))
+
+
+def check_distributions(**bounds: float) -> Callable[[str, object], dict[str, Distribution]]:
+    """A check of a mapping of names to numbers or distributions within bounds."""
+
+    def check(field: str, value: object) -> dict[str, Distribution]:
+        return {
+            str(name): distribution(f"{field}.{name}", one, **bounds) for name, one in mapping(field, value).items()
+        }
+
+    return check
+
+
 def check_gravity(field: str, value: object) -> tuple[float, ...]:
     """Checks gravity `(3,)`, m/s2, whose magnitude must allow a rover to stand."""
     gravity = vector(field, value, 3)
@@ -203,6 +247,9 @@ def check_reward_weights(field: str, value: object) -> dict[str, float]:
         weights[name] = number(f"{field}.{name}", weight, at_least=-MAX_WEIGHT, at_most=MAX_WEIGHT)
     return weights
 
+
+#: Check of a factor on what the model or `gravity` states.
+SCALE = NumberOrDistribution(at_least=SCALES[0], at_most=SCALES[1])
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -350,7 +397,15 @@ class RoverArguments(TypedDict, total=False):
         float, Argument(2.0, Number(at_least=MIN_TIME_STEP), "until a high-centred rover ends the episode", "s")
     ]
     friction: Annotated[
-        float | Range, Argument(0.7, NumberOrRange(at_least=0.0, at_most=MAX_FRICTION), "friction coefficient")
+        Quantity, Argument(0.7, NumberOrDistribution(at_least=0.0, at_most=MAX_FRICTION), "friction coefficient")
+    ]
+    material_friction: Annotated[
+        Mapping[str, Quantity] | None,
+        Argument(
+            None,
+            Special("a mapping", check_distributions(at_least=0.0, at_most=MAX_FRICTION)),
+            "friction coefficient of materials of the ground, by name; None: `friction`",
+        ),
     ]
     restitution: Annotated[float, Argument(0.0, Number(at_least=0.0, at_most=1.0), "coefficient of restitution")]
     gravity: Annotated[
@@ -362,18 +417,62 @@ class RoverArguments(TypedDict, total=False):
             "m/s2",
         ),
     ]
-    mass_scale: Annotated[
-        float | Range,
-        Argument(1.0, NumberOrRange(at_least=SCALES[0], at_most=SCALES[1]), "masses and inertias over the model's"),
-    ]
-    actuator_gain: Annotated[
-        float | Range,
+    mass_scale: Annotated[Quantity, Argument(1.0, SCALE, "masses and inertias over the model's")]
+    mass_centre_offset: Annotated[
+        Quantity,
         Argument(
-            1.0, NumberOrRange(at_least=0.0, at_most=SCALES[1]), "torque given over torque asked, up to the limit"
+            0.0,
+            NumberOrDistribution(at_least=-MAX_OFFSET, at_most=MAX_OFFSET),
+            "of the trunk's mass centre from the model's, drawn for each axis",
+            "m",
         ),
     ]
-    gravity_scale: Annotated[
-        float | Range, Argument(1.0, NumberOrRange(at_least=SCALES[0], at_most=SCALES[1]), "gravity over `gravity`")
+    wheel_radius_scale: Annotated[
+        Quantity, Argument(1.0, SCALE, "radius at which a wheel touches the ground, over the model's; for each wheel")
+    ]
+    actuator_gain: Annotated[
+        Quantity,
+        Argument(
+            1.0,
+            NumberOrDistribution(at_least=0.0, at_most=SCALES[1]),
+            "torque given over torque asked, up to the limit",
+        ),
+    ]
+    stall_torque_scale: Annotated[Quantity, Argument(1.0, SCALE, "of the motor over the model's; for each wheel")]
+    no_load_speed_scale: Annotated[Quantity, Argument(1.0, SCALE, "of the motor over the model's; for each wheel")]
+    gravity_scale: Annotated[Quantity, Argument(1.0, SCALE, "gravity over `gravity`")]
+    soil_scale: Annotated[
+        Mapping[str, Quantity] | None,
+        Argument(
+            None,
+            Special("a mapping", check_distributions(at_least=SCALES[0], at_most=SCALES[1])),
+            "numbers of the soil over those of `soil`, by name",
+        ),
+    ]
+    command_delay: Annotated[
+        Quantity,
+        Argument(
+            0,
+            Special(f"0 to {MAX_DELAY} control periods, or a distribution of them", check_delay),
+            "from an action to the motors",
+        ),
+    ]
+    torque_dead_zone: Annotated[
+        Quantity,
+        Argument(
+            0.0,
+            NumberOrDistribution(at_least=0.0, at_most=1.0),
+            "torques below are not delivered, as fraction of the torque limit",
+        ),
+    ]
+    steering_backlash_deg: Annotated[
+        Quantity,
+        Argument(
+            0.0,
+            NumberOrDistribution(at_least=0.0, at_most=MAX_BACKLASH_DEG),
+            "play between the steering's command and its set-point",
+            "deg",
+        ),
     ]
     observation_noise: Annotated[
         float,

@@ -33,13 +33,17 @@ from rover_gym.core import (
 )
 from rover_gym.core.validation import Range, refuse, whole
 from rover_gym.envs.arguments import RoverArguments, check_arguments, takes_arguments
+from rover_gym.envs.command_faults import CommandFaults
+from rover_gym.envs.domain import OF_COMMANDS
 from rover_gym.envs.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
 from rover_gym.envs.episode_scene import (
     EpisodeScene,
     ResetOptions,
+    VariedEpisodes,
     check_difficulty,
     check_reset_options,
     draw_episodes,
+    draw_varied_episodes,
     origin_of,
     scene_of,
 )
@@ -160,6 +164,12 @@ class RoverBatch:
         self.episodes = self.make_episodes()
         #: What the functions of `reward_terms` gave in the last control period of each rover.
         self._terms: dict[str, Array] = {name: np.zeros(self.n) for name in self.task.reward_terms}
+        #: Properties of each rover's episode that the core does not know, `(n,)` or one for each axis or wheel.
+        self._drawn: dict[str, npt.NDArray[Any]] = {
+            name: np.zeros((self.n, *size), np.int64 if name == "command_delay" else np.float64)
+            for name, (_, size) in self.task.domain.further.items()
+        }
+        self._faults = self._make_faults()
         #: Entries of the last action of each rover that were clipped to [-1, 1].
         self._clipped = np.zeros(self.n, np.int64)
         #: Generators of the rovers before their first episodes; afterwards the core has them.
@@ -185,6 +195,14 @@ class RoverBatch:
             self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=self._threads
         )
 
+    def _make_faults(self) -> CommandFaults | None:
+        """The faults between actions and motors; None without any."""
+        further, task = self.task.domain.further, self.task
+        if not further.keys() & set(OF_COMMANDS):
+            return None
+        longest = int(further["command_delay"][0].support[1]) if "command_delay" in further else 0
+        return CommandFaults(self.n, task.n_actions, len(task.model.wheel_names), longest)
+
     def __getstate__(self) -> dict[str, Any]:
         """Everything but what the core holds, and the snapshots of the rovers whose episodes have begun."""
         begun = np.flatnonzero(self._begun).tolist()
@@ -202,7 +220,7 @@ class RoverBatch:
     @property
     def observation(self) -> Observations:
         """`(n, size) float32` copy of the last observations."""
-        return self.episodes.observations()
+        return self._with_sent(self.episodes.observations(), slice(None))
 
     def check_options(self, options: Mapping[str, Any] | None, field: str = "options") -> ResetOptions:
         """Checks reset options; `field` is their name in errors."""
@@ -272,11 +290,27 @@ class RoverBatch:
             difficulties: Range of each rover's rocks' difficulty; None for the task's own.
             fixed: The values that reset options fix, for all rovers or one per rover.
         """
-        return draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
+        draw = draw_episodes if self.task.domain.is_of_core else draw_varied_episodes
+        return draw(self.task, rows, difficulties, fixed, self.episodes)
 
     def begin_drawn(self, chosen: Sequence[int], drawn: Any) -> None:
         """Starts what `draw_rows` has drawn."""
-        self.episodes.begin(chosen, drawn)
+        if not isinstance(drawn, VariedEpisodes):
+            self.episodes.begin(chosen, drawn)
+            return
+        for i, one, further in zip(chosen, drawn.each, drawn.further, strict=True):
+            self.episodes.begin([i], one)
+            self.set_further(i, further)
+
+    def set_further(self, i: int, further: Mapping[str, Any]) -> None:
+        """Sets the properties of rover i's episode that the core does not know."""
+        for name, own in self._drawn.items():
+            own[i] = further[name]
+
+    def further(self, i: int) -> dict[str, Any]:
+        """The properties of rover i's episode that the core does not know: numbers, or tuples of them."""
+        values = {name: own[i].tolist() for name, own in self._drawn.items()}
+        return {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
 
     def begin(self, drawn: "Drawn") -> None:
         """Starts drawn episodes."""
@@ -285,6 +319,8 @@ class RoverBatch:
         self.begin_drawn(chosen, episodes)
         self._begun[chosen] = True
         self._clipped[chosen] = 0
+        if self._faults is not None:
+            self._faults.begin(chosen)
         for term in self._terms.values():
             term[chosen] = 0.0
         for i, seed in zip(chosen, drawn.seeds, strict=True):
@@ -318,23 +354,15 @@ class RoverBatch:
         asked: Asked = info
         before: Observations | None = None
         if self._terms:  # their functions take infos and the last observations
-            asked, before = 0 if self.alone else "all", self.episodes.observations()
+            asked, before = 0 if self.alone else "all", self.observation
+        moved = np.ones(self.n, np.bool_) if active is None else np.asarray(active)
         take = partial(self.episodes.step, active=active, has_scan=has_scan, among=self.movers, info=asked)
         self._over = None
         with self._following_handed_out(self._handed_out if self.task.is_noisy else ()):
-            # The core refuses what is outside [-1, 1] before anything moves: actions within pay for no check here.
-            beyond: npt.NDArray[np.int64] | None = None
-            try:
-                stepped = take(actions)
-            except CommandError:
-                given = check_actions(actions, (self.n, self.task.n_actions))
-                beyond, actions = (np.abs(given) > 1.0).sum(axis=1), np.clip(given, -1.0, 1.0)
-                if not beyond.any():
-                    raise
-                stepped = take(actions)
+            stepped, actions, beyond = self._take(take, actions, moved)
         observation, rewards, terminated, truncated, infos = stepped
+        observation = self._with_sent(observation, slice(None))
         self._over = np.flatnonzero(terminated | truncated).tolist()
-        moved = np.ones(self.n, np.bool_) if active is None else np.asarray(active)
         self._clipped[moved] = 0 if beyond is None else beyond[moved]
         if before is not None:
             fields = before, np.asarray(actions, np.float64), observation
@@ -343,6 +371,41 @@ class RoverBatch:
             watcher(moved)
         infos = self._completed(infos, asked) if info == asked else self._infos(info)
         return observation, rewards, terminated, truncated, infos
+
+    def _take(
+        self, take: Callable[[object], Stepped], actions: object, moved: Mask
+    ) -> tuple[Stepped, object, npt.NDArray[np.int64] | None]:
+        """Takes a control period; returns its outcome, the clipped actions, and the counts of clipped entries."""
+        if self._faults is None:
+            # The core refuses what is outside [-1, 1] before anything moves: actions within pay for no check here.
+            try:
+                return take(actions), actions, None
+            except CommandError:
+                given = check_actions(actions, (self.n, self.task.n_actions))
+                beyond, clipped = (np.abs(given) > 1.0).sum(axis=1), np.clip(given, -1.0, 1.0)
+                if not beyond.any():
+                    raise
+                return take(clipped), clipped, beyond
+        given = check_actions(actions, (self.n, self.task.n_actions))
+        beyond, clipped = (np.abs(given) > 1.0).sum(axis=1), np.clip(given, -1.0, 1.0)
+        none = np.zeros(self.n)
+        received = self._faults.received(
+            clipped,
+            self._drawn.get("command_delay", none.astype(np.int64)),
+            self._drawn.get("torque_dead_zone", none),
+            np.radians(self._drawn.get("steering_backlash_deg", none)) / (self.task.max_steering or 1.0),
+        )
+        stepped = take(received)
+        self._faults.keep(clipped, received, moved)
+        return stepped, clipped, beyond
+
+    def _with_sent(self, observation: Observations, rovers: slice | int) -> Observations:
+        """Sets the previous actions of observations to what the rovers were sent, not what the motors received."""
+        if self._faults is not None:
+            layout = self.task.layout
+            place = layout["previous_action"]
+            observation[..., place] = self._faults.last_sent[rovers] / layout.scale[place]
+        return observation
 
     @contextmanager
     def watched(self, watcher: Callable[[Mask], None]) -> Iterator[None]:
@@ -457,10 +520,15 @@ class RoverBatch:
         """Adds to infos of the core what it does not know."""
         if asked == "all":
             everyone = np.ones(self.n, np.bool_)
+            for name, own in self._drawn.items():
+                infos["domain"] |= {name: own.copy(), f"_{name}": everyone}
             for name, term in self._terms.items():
                 infos["reward_terms"] |= {name: term.copy(), f"_{name}": everyone}
             infos |= {"clipped_actions": self._clipped.copy(), "_clipped_actions": everyone}
         elif asked is not None:
+            infos["domain"] |= {
+                name: own[asked].copy() if own.ndim > 1 else own[asked].item() for name, own in self._drawn.items()
+            }
             infos["reward_terms"] |= {name: float(term[asked]) for name, term in self._terms.items()}
             infos["clipped_actions"] = int(self._clipped[asked])
         return infos
@@ -490,6 +558,7 @@ class RoverBatch:
             seed=self.seed_of(i),
             message=self.episodes.info(i)["solver"]["message"],
             terms={name: float(term[i]) for name, term in self._terms.items()},
+            commands=None if self._faults is None else self._faults.state_of(i),
         )
 
     def restore(self, snapshot: BatchSnapshot) -> None:
@@ -527,6 +596,8 @@ class RoverBatch:
         episode = check_snapshot(task, snapshot)
         generator = fresh_generator()
         generator.bit_generator.state = check_random_state(generator, snapshot.random_state)
+        if self._faults is not None:
+            self._faults.check_state(snapshot.commands)
         simulation = task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
         simulation.restore(snapshot.simulation)
         difficulty = None if snapshot.difficulty is None else check_difficulty(task, snapshot.difficulty)
@@ -549,6 +620,9 @@ class RoverBatch:
         self._difficulties[i], self._seeds[i], self._begun[i] = checked.difficulty, snapshot.seed, True
         for name, term in self._terms.items():
             term[i] = snapshot.terms[name]
+        self.set_further(i, snapshot.scene.domain.further)
+        if self._faults is not None and snapshot.commands is not None:
+            self._faults.adopt(i, snapshot.commands)
         self._hand_back(self._handed_out.keys() & {i})
 
     def set_difficulties(self, difficulties: Sequence[float | Range | None]) -> None:
@@ -610,7 +684,7 @@ class RoverBatch:
         self.check_begun(i)
         ground = self.task.ground  # one object for all, so that snapshots hold it once
         terrain = self.episodes.terrain(i) if ground is None else ground
-        return scene_of(self.task, *self.episodes.origin(i), terrain)
+        return scene_of(self.task, self.episodes.origin(i), terrain, self.further(i))
 
     def progress(self, i: int) -> EpisodeRun:
         """A copy of rover i's episode.
@@ -628,7 +702,7 @@ class RoverBatch:
             ResetNeeded: The rover has not been reset.
         """
         self.check_begun(i)
-        return self.episodes.complete(i)
+        return self._with_sent(self.episodes.complete(i), i)
 
     def check_begun(self, i: int) -> None:
         """Refuses a rover that has not been reset.

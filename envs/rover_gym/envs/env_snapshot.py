@@ -10,6 +10,7 @@ import numpy as np
 from rover_gym.core import EpisodeRun, RoverGymError, Snapshot, StateError
 from rover_gym.core.validation import Range, refuse
 from rover_gym.envs.episode_scene import EpisodeScene
+from rover_gym.envs.observation import Array
 from rover_gym.envs.task import Task
 
 
@@ -30,6 +31,7 @@ class EnvSnapshot:
         seed: Seed of the random generator.
         message: Of the physics step that failed in the last period, "" where none did.
         terms: What the user's reward terms gave in the last period.
+        commands: What is on its way to the motors, as `CommandFaults.state_of` returns it; None without faults.
     """
 
     simulation: Snapshot
@@ -41,6 +43,7 @@ class EnvSnapshot:
     seed: int
     message: str
     terms: Mapping[str, float]
+    commands: Mapping[str, Array] | None = None
 
 
 #: Parts of a snapshot by their types.
@@ -69,11 +72,23 @@ def check_snapshot(task: Task, snapshot: object) -> EpisodeRun:
     if snapshot.terms.keys() != task.reward_terms.keys():
         reason = f"must have the terms {', '.join(task.reward_terms) or 'of the environment alone'}"
         refuse(StateError, "snapshot.terms", snapshot.terms, reason)
+    _check_further(task, snapshot.scene.domain.further)
     try:
         return EpisodeRun.from_bytes(task.rules, snapshot.progress)
     except RoverGymError as error:
         reason = f"must be of an environment with these arguments ({error})"
         refuse(StateError, "snapshot.progress", snapshot.progress, reason)
+
+
+def _check_further(task: Task, given: Mapping[str, Any]) -> None:
+    """Refuses properties other than those that the task draws."""
+    field = "snapshot.scene.domain"
+    drawn = task.domain.further
+    if given.keys() != drawn.keys():
+        refuse(StateError, field, list(given), f"must have the properties {', '.join(drawn) or 'of the core alone'}")
+    for name, (_, size) in drawn.items():
+        if np.shape(given[name]) != size:
+            refuse(StateError, f"{field}.{name}", given[name], f"must have shape {size}")
 
 
 def check_random_state(generator: np.random.Generator, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,14 +16,16 @@ from rover_gym.core import (
     HeightField,
     OptionError,
     Plane,
+    Simulation,
     StateError,
     Terrain,
 )
 from rover_gym.core.validation import Range, known_keys, mapping, number, refuse, span, vector, whole
 from rover_gym.envs.arguments import MAX_SLOPE_DEG
-from rover_gym.envs.generators import Rows
+from rover_gym.envs.domain import Domain
+from rover_gym.envs.generators import Rows, generator_at, row_of
 from rover_gym.envs.observation import Array
-from rover_gym.envs.start import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Domain, Rocks, Start
+from rover_gym.envs.start import MAX_DIFFICULTY, MAX_GOAL_DISTANCE, Rocks, Start
 from rover_gym.envs.task import Task
 from rover_gym.ground.terrain_parts import plane_of
 
@@ -76,16 +78,20 @@ class ResetOptions:
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
 
-def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain) -> EpisodeScene:
-    """The scene of an episode from what `EpisodeBatch.origin` tells, and its terrain."""
+def scene_of(
+    task: Task, origin: tuple[Array, Array, int, Array], terrain: Terrain, properties: Mapping[str, Any]
+) -> EpisodeScene:
+    """The scene of an episode from what `EpisodeBatch.origin` tells, its terrain, and `Domain.further`."""
+    start, rocks, rock_seed, domain = origin
     slope, uphill, x, z, heading, *places = start.tolist()
     goal, *further = zip(places[::2], places[1::2], strict=True)
     difficulty, abundance, max_radius = rocks.tolist()
+    mass, friction, gain, gravity = domain.tolist()
     return EpisodeScene(
         start=Start(slope, uphill, (x, z), heading, goal, tuple(further)),
         terrain=terrain,
         rocks=Rocks(difficulty, abundance, max_radius, int(rock_seed)) if task.has_rocks else None,
-        domain=Domain(*domain.tolist()),
+        domain=Domain(mass, friction, gain, gravity, properties),
     )
 
 
@@ -94,7 +100,7 @@ def origin_of(scene: EpisodeScene) -> tuple[list[float], list[float], int, list[
     start, rocks = scene.start, scene.rocks
     places = [x for goal in start.goals for x in goal]
     row = [start.slope, start.uphill, *start.position, start.heading, *places]
-    domain = list(scene.domain.as_info().values())
+    domain = scene.domain.row
     if rocks is None:
         return row, [0.0, 0.0, 0.0], 0, domain
     return row, [rocks.difficulty, rocks.abundance, rocks.max_radius], rocks.seed, domain
@@ -235,3 +241,56 @@ def draw_episodes(
     fixed = options.fixed if isinstance(options, ResetOptions) else [one.fixed for one in options]
     given = list(difficulties) if any(difficulties) else None
     return batch.draw(task.episodes, generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)
+
+
+@dataclass(frozen=True)
+class VariedEpisodes:
+    """Episodes whose rovers differ, each drawn on its own.
+
+    Attributes:
+        each: The episodes.
+        further: The properties of each that the core does not know.
+        generators: `(m, 4)` states of the generators after the draws.
+    """
+
+    each: Sequence[DrawnEpisodes]
+    further: Sequence[Mapping[str, Any]]
+    generators: Rows
+
+    def simulation(self, k: int) -> Simulation:
+        """The rover of episode k at its start."""
+        return self.each[k].simulation(0)
+
+
+def draw_varied_episodes(
+    task: Task,
+    generators: Rows,
+    difficulties: Sequence[Range | None],
+    options: ResetOptions | Sequence[ResetOptions],
+    batch: EpisodeBatch,
+) -> VariedEpisodes:
+    """Draws episodes as `draw_episodes` does, each after the properties that the core does not know.
+
+    Raises:
+        ModelError: The drawn properties give a rover that cannot be.
+        TerrainError: As of `draw_episodes`.
+        StateError: As of `draw_episodes`.
+    """
+    fixed = [options] * len(generators) if isinstance(options, ResetOptions) else options
+    each, properties, rows = [], [], generators.copy()
+    for k, row in enumerate(generators):
+        generator = generator_at(row)
+        ranges, further = task.domain.draw(generator)
+        distribution = task.episodes_in(Domain(1.0, ranges["friction"][0], 1.0, 1.0, further), ranges)
+        given = None if difficulties[k] is None else [difficulties[k]]
+        drawn = batch.draw(
+            distribution,
+            row_of(generator)[None],
+            attempts=PLACING_ATTEMPTS,
+            difficulties=given,
+            fixed=fixed[k].fixed,
+        )
+        each.append(drawn)
+        properties.append(further)
+        rows[k] = drawn.generators[0]
+    return VariedEpisodes(each, properties, rows)

@@ -10,8 +10,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
 from rover_gym.core import OptionError
-from rover_gym.core.validation import Range, refuse, span, vector
+from rover_gym.core.validation import refuse, vector
 from rover_gym.envs.batch import NOT_BEGUN
+from rover_gym.envs.distributions import Distribution, Quantity, distribution
 from rover_gym.envs.generators import Rows, row_of
 from rover_gym.envs.observation import Array, Observations
 from rover_gym.envs.rover_env import RoverEnv
@@ -24,7 +25,7 @@ SALT = 0x70757368
 class PushOptions:
     """How strong pushes are, how long they last and how often they come.
 
-    Each range is a number or a pair (low, high), from which every push draws uniformly.
+    Each range is a number, a pair (low, high) or a distribution, from which every push draws.
 
     Attributes:
         force: Size of the horizontal force, N. Its direction is uniform.
@@ -34,15 +35,15 @@ class PushOptions:
         point: Where the force acts in the solid's frame, m.
     """
 
-    force: float | Range
-    interval: float | Range = (2.0, 5.0)
-    duration: float | Range = 0.3
+    force: Quantity
+    interval: Quantity = (2.0, 5.0)
+    duration: Quantity = 0.3
     solid: str = "trunk"
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for field, least in (("force", 0.0), ("interval", 0.0), ("duration", 0.0)):
-            object.__setattr__(self, field, span(field, getattr(self, field), at_least=least))
+            object.__setattr__(self, field, distribution(field, getattr(self, field), at_least=least))
         object.__setattr__(self, "point", vector("point", self.point, 3))
 
 
@@ -65,7 +66,8 @@ class PushSchedule:
         """Draws the push after the last one."""
 
         def draw(field: str) -> float:
-            return float(self._random.uniform(*getattr(self._options, field)))
+            own: Distribution = getattr(self._options, field)
+            return float(own.draw(self._random))
 
         self._start = self._end + math.ceil(draw("interval") / self._dt)
         self._end = self._start + max(1, round(draw("duration") / self._dt))
@@ -128,14 +130,14 @@ class RandomPushes(PushedRovers, gym.Wrapper, RecordConstructorArgs):
 
     Args:
         env: A `RoverEnv`, or wrappers around one that keep its steps.
-        force: Size of the force, N, or a range (low, high).
+        force: Size of the force, N, a range (low, high) or a distribution.
         **options: Other fields of `PushOptions`.
 
     Raises:
         OptionError: `env` is another environment, or an option is out of its range.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], force: float | Range, **options: Any) -> None:
+    def __init__(self, env: gym.Env[Any, Any], force: Quantity, **options: Any) -> None:
         given: object = env
         if not isinstance(given, gym.Env) or not isinstance(given.unwrapped, RoverEnv):
             refuse(OptionError, "env", given, "must be a RoverEnv")
@@ -160,7 +162,7 @@ class RandomPushes(PushedRovers, gym.Wrapper, RecordConstructorArgs):
         return observation, float(reward), terminated, truncated, info | {"push": force}
 
 
-def push_options(force: float | Range, options: dict[str, Any]) -> PushOptions:
+def push_options(force: Quantity, options: dict[str, Any]) -> PushOptions:
     """The options that a wrapper was given.
 
     Raises:

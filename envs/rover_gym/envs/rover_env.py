@@ -14,13 +14,14 @@ from rover_gym.core import CommandError, EpisodeRun, RoverGrainSimulation, Rover
 from rover_gym.core.validation import Range
 from rover_gym.envs.arguments import RoverArguments, takes_arguments, with_tables
 from rover_gym.envs.batch import RoverBatch
+from rover_gym.envs.domain import Domain
 from rover_gym.envs.env_snapshot import EnvSnapshot
 from rover_gym.envs.episode_scene import EpisodeScene
 from rover_gym.envs.observation import ObservationLayout
 from rover_gym.envs.play_keys import keys_to_action, pushed
 from rover_gym.envs.sand_ground import soil_of
 from rover_gym.envs.spec_json import RoverSpec, rover_spec
-from rover_gym.envs.start import Domain, Rocks, Start
+from rover_gym.envs.start import Rocks, Start
 from rover_gym.envs.task import Task, check_actions
 from rover_gym.ground.sand.soils import Soil
 from rover_gym.show.frames.render_options import RENDER_MODES
@@ -241,10 +242,37 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Randomisation
 
-    `friction`, `mass_scale`, `actuator_gain` and `gravity_scale` are drawn uniformly at each reset where they are
-    ranges, and fixed where they are numbers. `observation_noise` is Gaussian, drawn anew each step for every
-    unbounded entry; flags, fractions, unit vectors, the distance and the action stay exact.
-    `set_difficulty` changes the rocks' difficulty, or its range, from the next reset on.
+    Nothing is random by default. Where an argument may be a distribution, a number fixes the property; a pair (low, high)
+    is drawn uniformly at each reset; `Normal`, `LogUniform` and `Choice` of `rover_gym.envs` are drawn as their names say.
+    All random numbers come from `np_random`.
+
+    | argument              | acts on                                                    | drawn for each |
+    |-----------------------|------------------------------------------------------------|----------------|
+    | mass_scale            | masses and inertias of all solids                          | episode        |
+    | mass_centre_offset    | mass centre of the trunk, whose shape and inertia stay     | axis           |
+    | wheel_radius_scale    | radius at which a wheel touches the ground, as wear does   | wheel          |
+    | actuator_gain         | torques, up to the motor's limit                           | episode        |
+    | stall_torque_scale    | the motor's line                                           | wheel          |
+    | no_load_speed_scale   | the motor's line                                           | wheel          |
+    | command_delay         | actions; until the first one arrives, the motors get zeros | episode        |
+    | torque_dead_zone      | torques; smaller ones are not delivered                    | episode        |
+    | steering_backlash_deg | set-points; they trail the command by half the backlash    | episode        |
+    | friction              | all contacts                                               | episode        |
+    | material_friction     | contacts of the rover with parts of the ground             | material       |
+    | soil_scale            | numbers of the sand, such as `cohesion`                    | number         |
+    | gravity_scale         | gravity                                                    | episode        |
+
+    `info["domain"]` has the episode's `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, and the others that
+    are given: numbers, or arrays with an entry for each axis or wheel. Soil and materials have names such as
+    `soil_scale.cohesion` and `material_friction.rock`. With `sensors`, the info of `reset` also has their random
+    properties, such as `imu.bias`. `distributions` describes what the properties are drawn from.
+
+    If commands are delayed or distorted, `previous_action` is the action as it was given; the terms of the reward count
+    what the motors received.
+
+    `observation_noise` is Gaussian, drawn anew each step for every unbounded entry; flags, fractions, unit vectors, the
+    distance and the action stay exact. `set_difficulty` changes the rocks' difficulty, or its range, from the next reset
+    on.
 
     ## Info
 
@@ -416,12 +444,17 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     @property
     def soil(self) -> Soil | None:
         """The soil of the episode's sand as it was drawn; None on firm ground."""
-        return soil_of(self.task.soils, self.simulation.terrain)
+        return soil_of(self.domain.soils_of(self.task.soils), self.simulation.terrain)
 
     @property
     def domain(self) -> Domain:
         """The episode's properties of rover and world as they were drawn."""
         return self.scene.domain
+
+    @property
+    def distributions(self) -> dict[str, str]:
+        """What the properties are drawn from, in words; fixed ones are numbers."""
+        return self.task.domain.described()
 
     @property
     def difficulty(self) -> float | None:

@@ -1,9 +1,9 @@
-"""The start of an episode: the ground's slope, rocks, the rover's pose, the goal, and the properties drawn with them.
+"""The start of an episode: the ground's slope, rocks, the rover's pose and the goal.
 
 A direction on the map, like the heading, is an angle about +y from +x, positive to the left (towards -z): the direction
 `a` points along `(cos a, -sin a)` in (x, z).
 
-A number fixes a property; a pair (low, high) is a range to draw from uniformly at each reset. A fixed property takes no
+A number fixes a quantity; a pair (low, high) is a range to draw from uniformly at each reset. A fixed quantity takes no
 random number, so it does not shift the other draws.
 
 One number d in [0, 2], the difficulty, sets how hard an episode among rocks is:
@@ -16,7 +16,7 @@ Half of a rock is below the ground. An argument that is given overrides the diff
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -70,27 +70,6 @@ def slope_of(terrain: Terrain | None) -> tuple[float, float]:
         refuse(TerrainError, "terrain", terrain, "needs a ground plane with an upward normal")
     x, y, z = ground.normal
     return float(atan2(math.sqrt(x * x + z * z), y)), float(atan2(z, -x))
-
-
-@dataclass(frozen=True)
-class Domain:
-    """The randomised properties of one episode.
-
-    Attributes:
-        mass_scale: Factor on the model's masses and inertias.
-        friction: Coulomb friction coefficient.
-        actuator_gain: Ratio of delivered to commanded wheel torque, up to the motor's limit.
-        gravity_scale: Factor on the argument `gravity`.
-    """
-
-    mass_scale: float
-    friction: float
-    actuator_gain: float
-    gravity_scale: float
-
-    def as_info(self) -> dict[str, float]:
-        """The values by name."""
-        return asdict(self)
 
 
 #: The slip ratio is meaningless while both wheel and rim are slower than this, m/s; equals the core's `SLIP_SPEED`.

@@ -21,6 +21,7 @@ from rover_gym.core import (
     sin_cos,
 )
 from rover_gym.core.validation import Range, array, number, refuse, span
+from rover_gym.envs.domain import Domain, DomainDistribution, domain_distribution
 from rover_gym.envs.observation import ObservationLayout
 from rover_gym.envs.reward_terms import WEIGHTS, RewardTerms
 from rover_gym.envs.sand_ground import check_wheels_for_sand, sand_rover, soils_of
@@ -28,7 +29,6 @@ from rover_gym.envs.start import (
     DEFAULT_DIFFICULTY,
     FIELD_MARGINS,
     MAX_GOAL_DISTANCE,
-    Domain,
     Steering,
     slope_of,
 )
@@ -65,7 +65,9 @@ class Task:
         layout: Layout of the observation.
         reward_terms: Terms of the reward that the user gives, by name.
         rules: What the core needs to run an episode.
-        episodes: What the core draws episodes from.
+        domain: What the properties of an episode are drawn from.
+        scenes: Keyword arguments of `EpisodeDistribution`, but for the domain.
+        episodes: What the core draws episodes from, where it can draw the whole domain.
     """
 
     model: RoverModel
@@ -87,15 +89,36 @@ class Task:
     layout: ObservationLayout
     reward_terms: RewardTerms
     rules: EpisodeRules
+    domain: DomainDistribution
+    scenes: Mapping[str, Any]
     episodes: EpisodeDistribution
 
     def simulate(self, terrain: Terrain, domain: Domain) -> Simulation:
         """Creates a simulation of the rover on a terrain, at rest in the zero configuration."""
-        model = self.model if domain.mass_scale == 1.0 else self.model.replace(mass_scale=domain.mass_scale)
-        options = dict(self.simulation_options, friction=domain.friction)
+        model = domain.model_of(self.model)
+        if domain.mass_scale != 1.0:
+            model = model.replace(mass_scale=domain.mass_scale)
+        options = self._options(model, domain) | {"friction": domain.friction}
         if domain.gravity_scale != 1.0:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
+
+    def episodes_in(self, domain: Domain, ranges: Mapping[str, Range]) -> EpisodeDistribution:
+        """What the core draws episodes from, for the rover and the world of a domain.
+
+        Args:
+            domain: Its further properties count.
+            ranges: Those that the core draws.
+        """
+        model = domain.model_of(self.model)
+        simulation = Simulation(model, Plane(), **self._options(model, domain))
+        scenes = dict(self.scenes, sand=_sand(domain.soils_of(self.soils)))
+        return EpisodeDistribution(self.rules, simulation, domain=ranges, **scenes)
+
+    def _options(self, model: RoverModel, domain: Domain) -> dict[str, Any]:
+        """Keyword arguments of `Simulation` with the frictions of materials."""
+        materials = domain.materials_of(model, self.simulation_options["restitution"])
+        return dict(self.simulation_options, **({"materials": materials} if materials else {}))
 
 
 def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> Task:
@@ -111,15 +134,15 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     ground = None if isinstance(terrain, str) else terrain
     rocks, hills = _rocks(given), _hills(terrain, given["hill_slope_deg"])
     soils = soils_of(terrain, given["soil"])
-    sand = [SoftGround(Plane(), soil) for soil in soils] or None
+    sand = _sand(soils)
     start = _start(given, ground)
-    domain = {name: given[name] for name in ("mass_scale", "friction", "actuator_gain", "gravity_scale")}
     substeps = _substeps(given["control_frequency"], step)
     rover = _rover(given["model"], steered=given["steered"], on_sand=sand is not None)
+    domain = domain_distribution(given, rover, soils)
     steering = Steering.of(rover)
     options = {
         "gravity": gravity,
-        "friction": domain["friction"][0],
+        "friction": domain.ranges["friction"][0],
         "restitution": given["restitution"],
         "time_step": step,
         **(given["solver_options"] or {}),
@@ -128,18 +151,15 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     points = None if given["height_scan"] is None else given["height_scan"].offsets
     max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
     rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
-    episodes = EpisodeDistribution(
-        rules,
-        simulation,
-        start=start,
-        domain=domain,
-        trunk_load_limit=TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
-        rocks=rocks,
-        slope_by_difficulty=given["slope_deg"] is None and terrain in ("rocks", "sand"),
-        ground=ground,
-        hills=hills,
-        sand=sand,
-    )
+    scenes: dict[str, Any] = {
+        "start": start,
+        "trunk_load_limit": TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
+        "rocks": rocks,
+        "slope_by_difficulty": given["slope_deg"] is None and terrain in ("rocks", "sand"),
+        "ground": ground,
+        "hills": hills,
+        "sand": sand,
+    }
     return Task(
         model=rover,
         steering=steering,
@@ -160,8 +180,15 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         layout=ObservationLayout(rules),
         reward_terms=given["reward_terms"] or {},
         rules=rules,
-        episodes=episodes,
+        domain=domain,
+        scenes=scenes,
+        episodes=EpisodeDistribution(rules, simulation, domain=domain.ranges, **scenes),
     )
+
+
+def _sand(soils: tuple[Soil, ...]) -> list[SoftGround] | None:
+    """The sand that an episode's is drawn from; None on firm ground."""
+    return [SoftGround(Plane(), soil) for soil in soils] or None
 
 
 def _rocks(given: Mapping[str, Any]) -> dict[str, Any] | None:

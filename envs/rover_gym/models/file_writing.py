@@ -53,7 +53,7 @@ class WrittenSolid:
         axis = np.array(source.get("axis") or (1.0, 0.0, 0.0))
         self.axis: Array = Q @ axis / np.linalg.norm(axis)
         self.mass = float(source["mass"])
-        centre, inertia = _mass_properties(source)
+        centre, inertia = mass_properties(source)
         self.centre: Array = Q @ centre
         self.inertia: Array = Q @ inertia @ Q.T
         locked = source.get("locked")
@@ -147,7 +147,7 @@ def _principal(shape: dict[str, Any], mass: float) -> Array:
     return np.full(3, 0.4 * mass * r * r)
 
 
-def _mass_properties(solid: dict[str, Any]) -> tuple[Array, Array]:
+def mass_properties(solid: dict[str, Any]) -> tuple[Array, Array]:
     """Mass centre (3,), m, and inertia about it (3, 3), kg m², as stated or as they follow from the shapes."""
     centre = np.array(solid.get("centre_of_mass") or (0.0, 0.0, 0.0))
     if solid.get("inertia") is not None:

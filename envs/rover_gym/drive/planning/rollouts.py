@@ -91,7 +91,7 @@ class Rollouts:
         """A rover of the roll-outs on a terrain, at rest in the zero configuration."""
         domain = self._env.domain
         if self._has_own_model:
-            domain = replace(domain, mass_scale=1.0)
+            domain = replace(domain, mass_scale=1.0, further={})
         if self._friction is not None:
             domain = replace(domain, friction=self._friction)
         return self._task.simulate(terrain, domain)

@@ -7,9 +7,10 @@ from functools import lru_cache
 import numpy as np
 
 from rover_gym.core import RoverModel, SphereField, Terrain
-from rover_gym.core.validation import Range, number
+from rover_gym.core.validation import number
+from rover_gym.envs.distributions import Quantity, sampled
 from rover_gym.envs.sensors.camera import Camera, as_image, check_image
-from rover_gym.envs.sensors.sensor import Array, Moment, Values, gaussian, uniform
+from rover_gym.envs.sensors.sensor import Array, Moment, Values, gaussian
 from rover_gym.ground.terrain_parts import sand_of, spheres_of
 from rover_gym.show.frames import appearance as look
 
@@ -39,7 +40,7 @@ class ColourCamera(Camera):
     name: str = "colour"
     max_range: float = look.HAZE[1]
     noise: float = 0.0
-    gain: float | Range = 1.0
+    gain: Quantity = 1.0
     image: str = "uint8"
 
     def __post_init__(self) -> None:
@@ -56,7 +57,7 @@ class ColourCamera(Camera):
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model
         """Draws the gain."""
-        return {"gain": uniform(generator, self.gain)}
+        return {"gain": sampled(generator, self.gain)}
 
     def measure(
         self,

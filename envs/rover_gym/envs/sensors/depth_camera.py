@@ -7,9 +7,10 @@ from functools import lru_cache
 import numpy as np
 
 from rover_gym.core import OptionError, RoverModel
-from rover_gym.core.validation import Range, flag, number, refuse, vector, whole
+from rover_gym.core.validation import flag, number, refuse, vector, whole
+from rover_gym.envs.distributions import Quantity, sampled
 from rover_gym.envs.sensors.camera import Camera, as_image, check_image
-from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
+from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +42,8 @@ class DepthCamera(Camera):
     min_range: float = 0.1
     max_range: float = 10.0
     noise: float = 0.0
-    gain: float | Range = 1.0
-    dropout: float | Range = 0.0
+    gain: Quantity = 1.0
+    dropout: Quantity = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,7 +66,7 @@ class DepthCamera(Camera):
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model
         """Draws gain and dropout."""
-        return {"gain": uniform(generator, self.gain), "dropout": uniform(generator, self.dropout)}
+        return {"gain": sampled(generator, self.gain), "dropout": sampled(generator, self.dropout)}
 
     def measure(
         self,
@@ -130,8 +131,8 @@ class LaserScanner(Sensor):
     min_range: float = 0.1
     max_range: float = 20.0
     noise: float = 0.0
-    bias: float | Range = 0.0
-    dropout: float | Range = 0.0
+    bias: Quantity = 0.0
+    dropout: Quantity = 0.0
     sees_rover: bool = True
 
     def __post_init__(self) -> None:
@@ -164,7 +165,7 @@ class LaserScanner(Sensor):
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model
         """Draws bias and dropout."""
-        return {"bias": uniform(generator, self.bias), "dropout": uniform(generator, self.dropout)}
+        return {"bias": sampled(generator, self.bias), "dropout": sampled(generator, self.dropout)}
 
     @property
     def directions(self) -> Array:

@@ -7,8 +7,9 @@ import numpy as np
 
 from rover_gym.core import OptionError, RoverModel
 from rover_gym.core.rotations import rotation_matrix, rotation_vector
-from rover_gym.core.validation import Range, refuse
-from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian, uniform
+from rover_gym.core.validation import refuse
+from rover_gym.envs.distributions import Quantity, sampled
+from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor, Values, gaussian
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,13 +44,13 @@ class InertialUnit(Sensor):
     name: str = "imu"
     mount: Mount = field(default_factory=Mount)
     accelerometer_noise: float = 0.0
-    accelerometer_bias: float | Range = 0.0
+    accelerometer_bias: Quantity = 0.0
     accelerometer_walk: float = 0.0
-    accelerometer_gain: float | Range = 1.0
+    accelerometer_gain: Quantity = 1.0
     gyroscope_noise: float = 0.0
-    gyroscope_bias: float | Range = 0.0
+    gyroscope_bias: Quantity = 0.0
     gyroscope_walk: float = 0.0
-    gyroscope_gain: float | Range = 1.0
+    gyroscope_gain: Quantity = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,7 +77,7 @@ class InertialUnit(Sensor):
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model
         """Draws biases and gains."""
         ranges = (self.accelerometer_bias, self.gyroscope_bias), (self.accelerometer_gain, self.gyroscope_gain)
-        bias, gain = (np.concatenate([uniform(generator, one, 3) for one in pair]) for pair in ranges)
+        bias, gain = (np.concatenate([sampled(generator, one, 3) for one in pair]) for pair in ranges)
         return {"bias": bias, "gain": gain}
 
     def begin(self, moment: Moment) -> Values:

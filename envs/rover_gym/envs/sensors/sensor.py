@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from rover_gym.core import GrainSimulation, OptionError, RoverModel, Simulation, SphereField
 from rover_gym.core.rotations import rotation_matrix
-from rover_gym.core.validation import Range, number, refuse, span, vector
+from rover_gym.core.validation import number, refuse, vector
+from rover_gym.envs.distributions import Distribution, Quantity, distribution, is_fixed
 
 Array = npt.NDArray[np.float64]
 
@@ -199,8 +200,8 @@ MAX_LATENCY = 1e3
 class Sensor(ABC):
     """A sensor's configuration.
 
-    To randomise a property, pass a range (low, high): each reset draws a value uniformly. A number fixes the property
-    and draws no random number.
+    To randomise a property, pass a range (low, high), or a `Normal`, `LogUniform` or `Choice` of `rover_gym.envs`: each
+    reset draws a value, from a range uniformly. A number fixes the property and draws no random number.
 
     Args:
         name: Key of its readings in the observation.
@@ -208,6 +209,8 @@ class Sensor(ABC):
             period.
         latency: Age of the newest sample that is read, s, or a range. Readings change only at the end of a control
             period, so latencies are in effect rounded up to whole periods.
+        loss: Chance that a sample is lost, or a range. The reading then stays that of the sample before. An episode's
+            first sample is never lost.
 
     Raises:
         OptionError: A value is out of its range; `field` names it.
@@ -215,7 +218,8 @@ class Sensor(ABC):
 
     name: str
     rate: float | None = None
-    latency: float | Range = 0.0
+    latency: Quantity = 0.0
+    loss: Quantity = 0.0
 
     def __post_init__(self) -> None:
         name: object = self.name
@@ -223,7 +227,8 @@ class Sensor(ABC):
             refuse(OptionError, "name", name, "must be a name of letters, digits and underscores")
         if self.rate is not None:
             number("rate", self.rate, above=0.0)
-        self._keep("latency", span("latency", self.latency, at_least=0.0, at_most=MAX_LATENCY))
+        self._keep_ranges("latency", at_least=0.0, at_most=MAX_LATENCY)
+        self._keep_ranges("loss", at_least=0.0, at_most=1.0)
         for one in fields(self):
             if one.name == "mount" and not isinstance(getattr(self, one.name), Mount):
                 refuse(OptionError, "mount", getattr(self, one.name), "must be a Mount")
@@ -233,9 +238,15 @@ class Sensor(ABC):
         object.__setattr__(self, field, value)
 
     def _keep_ranges(self, *names: str, at_least: float | None = None, at_most: float | None = None) -> None:
-        """Checks fields that are numbers or ranges, and keeps them as ranges."""
+        """Checks fields that are numbers, ranges or distributions, and keeps them as distributions."""
         for name in names:
-            self._keep(name, span(name, getattr(self, name), at_least=at_least, at_most=at_most))
+            self._keep(name, distribution(name, getattr(self, name), at_least=at_least, at_most=at_most))
+
+    @property
+    def is_random(self) -> bool:
+        """Whether a property is drawn for each episode."""
+        values = (getattr(self, one.name) for one in fields(self))
+        return any(isinstance(value, Distribution) and not is_fixed(value) for value in values)
 
     def _check_numbers(self, *names: str, above: float | None = None, at_least: float | None = None) -> None:
         for name in names:
@@ -281,14 +292,6 @@ class Sensor(ABC):
         Returns:
             The reading and the new memory.
         """
-
-
-def uniform(generator: np.random.Generator, field: float | Range, size: int | tuple[int, ...] = ()) -> Array:
-    """Draws from a range, (low, high), uniformly; a range of one number draws no random number."""
-    low, high = field if isinstance(field, tuple) else (field, field)
-    if low == high:
-        return np.full(size, low)
-    return np.asarray(generator.uniform(low, high, size))
 
 
 def gaussian(generator: np.random.Generator, deviation: float, size: int | tuple[int, ...]) -> Array:

@@ -15,11 +15,12 @@ from gymnasium.utils import RecordConstructorArgs
 from rover_gym.core import OptionError, RoverModel, StateError
 from rover_gym.core.validation import refuse
 from rover_gym.envs.batch import BatchSnapshot
+from rover_gym.envs.distributions import sampled
 from rover_gym.envs.env_snapshot import EnvSnapshot
 from rover_gym.envs.observation import Mask
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.sensors.named_sensor import sensor_of
-from rover_gym.envs.sensors.sensor import Array, Moment, Sensor, Values, uniform
+from rover_gym.envs.sensors.sensor import Array, Moment, Sensor, Values
 from rover_gym.show.frames.render_options import RENDER_MODES, check_display
 
 #: Key of the environment's own observation, unless that is a dictionary.
@@ -44,6 +45,7 @@ class SensorState:
     Attributes:
         drawn: Its properties, drawn at the start.
         latency: Age of the reading, s.
+        loss: Chance that a sample is lost.
         memory: Memory between samples.
         sampled: Time of the last sample, s.
         waiting: Samples that are not yet due, with the times at which they are.
@@ -52,6 +54,7 @@ class SensorState:
 
     drawn: Values
     latency: float
+    loss: float
     memory: Values
     sampled: float
     waiting: list[tuple[float, Array]]
@@ -117,10 +120,10 @@ class SensorSuite:
         generator = np.random.default_rng([STREAM, *row.tolist()])
         state = SuiteState(generator)
         for name, sensor in self.sensors.items():
-            latency = float(uniform(generator, sensor.latency))
+            latency, loss = (float(sampled(generator, one)) for one in (sensor.latency, sensor.loss))
             drawn = sensor.draw(self.model, generator)
             reading, memory = sensor.measure(moment, sensor.begin(moment), 0.0, drawn, generator)
-            state.sensors[name] = SensorState(drawn, latency, memory, moment.time, [], reading)
+            state.sensors[name] = SensorState(drawn, latency, loss, memory, moment.time, [], reading)
         return state
 
     def advance(self, state: SuiteState, moment: Moment) -> None:
@@ -132,13 +135,26 @@ class SensorSuite:
             if interval > period - 0.5 * self.dt:
                 reading, own.memory = sensor.measure(moment, own.memory, interval, own.drawn, state.generator)
                 own.sampled = moment.time
-                own.waiting.append((moment.time + own.latency - SAME_TIME, reading))
+                if not (own.loss > 0.0 and state.generator.random() < own.loss):
+                    own.waiting.append((moment.time + own.latency - SAME_TIME, reading))
             while own.waiting and own.waiting[0][0] <= moment.time:
                 own.reading = own.waiting.pop(0)[1]
 
     def readings(self, state: SuiteState) -> Readings:
         """The present readings, by name."""
         return {name: own.reading.astype(self.sensors[name].reading_type) for name, own in state.sensors.items()}
+
+    def domain(self, state: SuiteState) -> dict[str, Any]:
+        """What was drawn for the sensors that have random properties, as `SENSOR.PROPERTY`; arrays, or numbers."""
+        found: dict[str, Any] = {}
+        for name, sensor in self.sensors.items():
+            if sensor.is_random:
+                own = state.sensors[name]
+                found |= {f"{name}.latency": own.latency, f"{name}.loss": own.loss}
+                found |= {
+                    f"{name}.{key}": value.copy() if value.ndim else float(value) for key, value in own.drawn.items()
+                }
+        return found
 
     def space(self, inner: gym.Space[Any]) -> gym.spaces.Dict:
         """The space of an environment's observation with the readings.
@@ -327,6 +343,7 @@ class SensorObservation(SensedRovers, gym.Wrapper, RecordConstructorArgs):
         """Starts an episode of the environment and draws the sensors' properties."""
         observation, info = self.env.reset(seed=seed, options=options)
         self.begin_sensors([0])
+        info["domain"] |= self.suite.domain(self.sensor_state)
         return with_readings(observation, self.readings()), info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_gym.core import RoverModel
-from rover_gym.core.validation import Range, whole
-from rover_gym.envs.sensors.sensor import Array, Moment, Sensor, Values, gaussian, uniform
+from rover_gym.core.validation import whole
+from rover_gym.envs.distributions import Quantity, sampled
+from rover_gym.envs.sensors.sensor import Array, Moment, Sensor, Values, gaussian
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +25,7 @@ class WheelEncoders(Sensor):
 
     name: str = "encoders"
     ticks: int | None = None
-    gain: float | Range = 1.0
+    gain: Quantity = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -38,14 +39,14 @@ class WheelEncoders(Sensor):
         return -most, most
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:
-        """Draws the gains, which turn the joints' angles into ones that are positive forward."""
-        forward = np.sign(np.diagonal(model.actuation_matrix()[model.wheel_joint_indices]))
-        return {"gain": forward * uniform(generator, self.gain, len(model.wheel_names))}
+        """Draws the gains."""
+        return {"gain": sampled(generator, self.gain, len(model.wheel_names))}
 
     def begin(self, moment: Moment) -> Values:
-        """The angles at the start, which count as 0."""
-        start = moment.q[moment.model.wheel_joint_indices]
-        return {"start": start, "angle": np.zeros_like(start)}
+        """The angles at the start, which count as 0, and the signs that turn them positive forward."""
+        joints = moment.model.wheel_joint_indices
+        start, forward = moment.q[joints], np.sign(np.diagonal(moment.model.actuation_matrix()[joints]))
+        return {"start": start, "forward": forward, "angle": np.zeros_like(start)}
 
     def measure(
         self,
@@ -56,10 +57,10 @@ class WheelEncoders(Sensor):
         generator: np.random.Generator,  # noqa: ARG002 - angles have no noise
     ) -> tuple[Array, Values]:
         """Counts the ticks."""
-        joints = moment.model.wheel_joint_indices
-        angle = self._counted((moment.q[joints] - memory["start"]) * drawn["gain"])
-        rate = (angle - memory["angle"]) / interval if interval > 0.0 else moment.v[joints] * drawn["gain"]
-        return np.stack([angle, rate]), {"start": memory["start"], "angle": angle}
+        joints, gain = moment.model.wheel_joint_indices, memory["forward"] * drawn["gain"]
+        angle = self._counted((moment.q[joints] - memory["start"]) * gain)
+        rate = (angle - memory["angle"]) / interval if interval > 0.0 else moment.v[joints] * gain
+        return np.stack([angle, rate]), {**memory, "angle": angle}
 
     def _counted(self, angle: Array) -> Array:
         if self.ticks is None:
@@ -87,8 +88,8 @@ class MotorSensors(Sensor):
     name: str = "motors"
     torque_constant: float = 10.0
     current_noise: float = 0.0
-    current_bias: float | Range = 0.0
-    gain: float | Range = 1.0
+    current_bias: Quantity = 0.0
+    gain: Quantity = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -104,7 +105,7 @@ class MotorSensors(Sensor):
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:
         """Draws biases and gains."""
         n = len(model.wheel_names)
-        return {"bias": uniform(generator, self.current_bias, n), "gain": uniform(generator, self.gain, n)}
+        return {"bias": sampled(generator, self.current_bias, n), "gain": sampled(generator, self.gain, n)}
 
     def measure(
         self,
@@ -135,7 +136,7 @@ class HeadingSensor(Sensor):
 
     name: str = "heading"
     noise_deg: float = 0.0
-    bias_deg: float | Range = 0.0
+    bias_deg: Quantity = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -148,7 +149,7 @@ class HeadingSensor(Sensor):
 
     def draw(self, model: RoverModel, generator: np.random.Generator) -> Values:  # noqa: ARG002 - of every model
         """Draws the bias."""
-        return {"bias_deg": uniform(generator, self.bias_deg)}
+        return {"bias_deg": sampled(generator, self.bias_deg)}
 
     def measure(
         self,

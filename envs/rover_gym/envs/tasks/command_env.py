@@ -141,7 +141,7 @@ class DriveByCommand(gym.Wrapper[Observations, Observations, Observations, Obser
             StateError: As `RoverEnv.restore`; nothing has changed.
         """
         self._rover.restore(snapshot)
-        self._seen = self._rover.progress.observation[None]
+        self._seen = self._rover.batch.observation[[self._rover.i]]
 
     def _step(self, actions: Observations, _: Mask, has_scan: bool) -> tuple[Observations, Array, Mask, Mask]:
         stepped, self._info = step_one(self.env, self._rover, actions, has_scan=has_scan)

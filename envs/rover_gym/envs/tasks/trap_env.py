@@ -42,12 +42,21 @@ DRIVES = 100
 
 @dataclass(frozen=True)
 class Trapped:
-    """An episode that begins in a trap: the rover, its episode, what it was drawn as, and the generator afterwards."""
+    """An episode that begins in a trap.
+
+    Attributes:
+        simulation: The rover.
+        episode: Its episode.
+        origin: What it was drawn as.
+        row: The generator afterwards.
+        further: The properties that the core does not know.
+    """
 
     simulation: Simulation
     episode: EpisodeRun
     origin: tuple[list[float], list[float], int, list[float]]
     row: Rows
+    further: Mapping[str, Any]
 
 
 class TrapBatch(RoverBatch):
@@ -93,6 +102,7 @@ class TrapBatch(RoverBatch):
         """Starts the episodes in their traps."""
         for i, one in zip(chosen, drawn, strict=True):
             self.episodes.resume([i], one.simulation, one.episode, one.origin, generator=one.row[None])
+            self.set_further(i, one.further)
 
     def _draw(self, row: Rows, difficulty: Range | None, options: ResetOptions) -> Trapped:
         """The episode of one rover."""
@@ -121,14 +131,14 @@ class TrapBatch(RoverBatch):
             self.task.rules,
             trapped,
             goal=start.goal,
-            domain=list(domain.as_info().values()),
+            domain=domain.row,
             trunk_load_limit=load * domain.mass_scale * domain.gravity_scale,
             difficulty=scene.difficulty,
             normals=normals,
         )
         if episode is None:
             refuse(StateError, "q", q, "must give an observation that is finite in float32")
-        return Trapped(trapped, episode, origin_of(replace(scene, start=start)), row)
+        return Trapped(trapped, episode, origin_of(replace(scene, start=start)), row, domain.further)
 
     def _is_trapped(self) -> bool:
         """Lets the baseline drive; whether that ends in a trap."""

@@ -8,7 +8,8 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorWrapper
 
 from rover_gym.core import OptionError
-from rover_gym.core.validation import Range, refuse
+from rover_gym.core.validation import refuse
+from rover_gym.envs.distributions import Quantity
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.pushes import PushedRovers, push_options
 from rover_gym.envs.vector.vector_env import RoverVectorEnv
@@ -22,14 +23,14 @@ class RandomPushesVector(PushedRovers, VectorWrapper):
 
     Args:
         env: A `RoverVectorEnv`; wrappers go around this one.
-        force: Size of the force, N, or a range (low, high).
+        force: Size of the force, N, a range (low, high) or a distribution.
         **options: Other fields of `rover_gym.envs.PushOptions`.
 
     Raises:
         OptionError: `env` is another environment, or an option is out of its range.
     """
 
-    def __init__(self, env: RoverVectorEnv, force: float | Range, **options: Any) -> None:
+    def __init__(self, env: RoverVectorEnv, force: Quantity, **options: Any) -> None:
         if not isinstance(env, RoverVectorEnv):
             refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
         VectorWrapper.__init__(self, env)

@@ -54,7 +54,7 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         """Starts episodes, as `RoverVectorEnv.reset`."""
         observation, infos = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type] # seeds of rovers, too
         mask = (options or {}).get("reset_mask")
-        self.begin_sensors(range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist())
+        infos = self._begin(range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist(), infos)
         return with_readings(observation, self.all_readings()), infos
 
     def step(self, actions: npt.NDArray[Any]) -> tuple[dict[str, Any], Array, Mask, Mask, dict[str, Any]]:
@@ -65,8 +65,16 @@ class SensorVectorObservation(SensedRovers, VectorWrapper):
         for i in np.flatnonzero(infos.get("_final_obs", ())).tolist():
             infos["final_obs"][i] = with_readings(infos["final_obs"][i], self.readings_of(i))
             begun.add(i)
-        self.begin_sensors(sorted(begun - set(self._batch.over) if self._same_step else begun))
+        infos = self._begin(sorted(begun - set(self._batch.over) if self._same_step else begun), infos)
         return with_readings(observation, self.all_readings()), reward, terminated, truncated, infos
+
+    def _begin(self, chosen: Sequence[int], infos: dict[str, Any]) -> dict[str, Any]:
+        """Draws the sensors' properties for episodes that have begun, and adds them to the infos."""
+        self.begin_sensors(chosen)
+        for i in chosen:
+            if drawn := self.suite.domain(self._state(i)):
+                infos = self.unwrapped._add_info(infos, {"domain": drawn}, i)
+        return infos
 
 
 def make_rover_vector(

@@ -219,7 +219,7 @@ class LiveRover:
             self.env.task.rules,
             simulation,
             goal=goal,
-            domain=list(domain.as_info().values()),
+            domain=domain.row,
             trunk_load_limit=limit,
             difficulty=self.info["difficulty"],
         )
@@ -350,5 +350,4 @@ def _with_properties(
     """Scene and progress of an environment with another friction and another gravity, m/s²."""
     domain = replace(scene.domain, friction=friction, gravity_scale=gravity / math.hypot(*env.gravity))
     limit = TRUNK_LOAD * env.model.mass * domain.mass_scale * gravity
-    properties = list(domain.as_info().values())
-    return replace(scene, domain=domain), progress.changed(domain=properties, trunk_load_limit=limit)
+    return replace(scene, domain=domain), progress.changed(domain=domain.row, trunk_load_limit=limit)
