@@ -1,0 +1,382 @@
+"""Scenes of several rovers that the compiled core steps on several threads, with an episode for each rover."""
+
+import copy
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.error import ResetNeeded
+
+from rover_gym.core import CommandError, OptionError, Plane, Simulation, SimulationBatch
+from rover_gym.core.validation import refuse, whole
+from rover_gym.envs.batch import MAX_THREADS, STEP_FAILED
+from rover_gym.envs.generators import row_of
+from rover_gym.envs.observation import Array
+from rover_gym.envs.reward_terms import earn
+from rover_gym.envs.sensors.sensor import Moment
+from rover_gym.envs.sensors.sensor_suite import SensorLike, SensorSuite, SuiteState, with_readings
+from rover_gym.envs.several.joined_episode import JoinedEpisode, PeriodWork
+from rover_gym.envs.several.joined_scene import JoinedScene, Team, TeamOptions
+from rover_gym.envs.several.machine_view import MachineReader, MachineView
+from rover_gym.envs.start import drive_signs
+from rover_gym.envs.task import check_actions
+
+#: Most scenes of a batch.
+MAX_SCENES = 10_000
+
+
+@dataclass(frozen=True)
+class RoverPeriod:
+    """The outcome of a control period of one rover.
+
+    Attributes:
+        observation: The observation; a dictionary where there are sensors.
+        reward: The reward.
+        terminated: Whether the episode has ended.
+        truncated: Whether it has reached the time limit.
+        info: As of `RoverEnv`, and `contact_forces`: the mean force of each other rover that touched this one in the
+            period, by name, (3,), world frame, N.
+    """
+
+    observation: Any
+    reward: float
+    terminated: bool
+    truncated: bool
+    info: dict[str, Any]
+
+
+@dataclass
+class RunningScene:
+    """A scene whose episodes run.
+
+    Attributes:
+        drawn: The scene as it was drawn.
+        random: Generator of noise and of the next scene.
+        readers: Readers of the rovers.
+        episodes: Their episodes.
+        sensors: States of their sensors; none without sensors.
+        steps: Control periods since the start.
+        live: Which rovers' episodes run, (n,).
+    """
+
+    drawn: JoinedScene
+    random: np.random.Generator
+    readers: list[MachineReader]
+    live: np.ndarray[Any, np.dtype[np.bool_]]
+    episodes: list[JoinedEpisode] = field(default_factory=list)
+    sensors: list[SuiteState] = field(default_factory=list)
+    steps: int = 0
+    solver: dict[str, Any] = field(default_factory=dict)
+
+    def begin_period(self, team: Team) -> list[PeriodWork]:
+        """Forgets the last period."""
+        self.solver = {"status": "converged", "iterations": 0, "residual": 0.0, "n_contacts": 0}
+        return [PeriodWork(len(task.model.wheel_names)) for task in team.tasks]
+
+    def note_solver(self, numbers: Array) -> None:
+        """Adds the solver's numbers of a physics step, as a reading has them."""
+        solver = self.solver
+        if numbers[0]:
+            solver["status"] = "not_converged"
+        solver["iterations"] += int(numbers[1])
+        solver["residual"] = max(solver["residual"], float(numbers[2]))
+        solver["n_contacts"] = max(solver["n_contacts"], int(numbers[3]))
+
+
+class JoinedBatch:
+    """Scenes of several rovers, each scene one joined simulation.
+
+    Args:
+        n: Number of scenes.
+        team: The rovers.
+        threads: Threads that step the scenes; None for one per core.
+        max_episode_steps: Control periods until a scene is truncated; None for no limit.
+        sensors: The sensors of each rover; None for none.
+
+    Attributes:
+        observation_spaces: Space of each rover's observation.
+        action_spaces: Space of each rover's action.
+
+    Raises:
+        OptionError: An argument is out of range, or a sensor does not fit a rover.
+    """
+
+    def __init__(
+        self,
+        n: int,
+        team: Team,
+        *,
+        threads: int | None = None,
+        max_episode_steps: int | None = None,
+        sensors: Sequence[SensorLike] | None = None,
+    ) -> None:
+        self.n = whole("n_scenes", n, at_least=1, at_most=MAX_SCENES)
+        self.team, self.max_episode_steps = team, max_episode_steps
+        threads = None if threads is None else whole("threads", threads, at_least=1, at_most=MAX_THREADS)
+        waiting = Simulation(team.model, Plane(), **team.tasks[0].simulation_options)
+        self._core = SimulationBatch([waiting] * self.n, threads=threads)
+        self._layout = self._core.reading_layout
+        self._machines = [team.model.machines[agent] for agent in team.agents]
+        self._owners = {solid: k for k, machine in enumerate(self._machines) for solid in machine.solids}
+        self._joints = [np.asarray(task.model.wheel_joint_indices) for task in team.tasks]
+        self._signs = [drive_signs(task.model) for task in team.tasks]
+        self._torques = np.zeros((self.n, len(team.model.wheel_names)))
+        self._set_points = np.zeros_like(self._torques)
+        self._scenes: list[RunningScene | None] = [None] * self.n
+        self._randoms = [np.random.default_rng() for _ in range(self.n)]
+        made = {task.model: None if sensors is None else SensorSuite(sensors, task.model, task.dt) for task in team.tasks}
+        self._suites = [made[task.model] for task in team.tasks]
+        self.action_spaces = [gym.spaces.Box(-1.0, 1.0, (task.n_actions,), np.float32) for task in team.tasks]
+        self.observation_spaces = [self._space(k) for k in range(team.n)]
+
+    def _space(self, k: int) -> gym.Space[Any]:
+        layout, suite = self.team.tasks[k].layout, self._suites[k]
+        box = gym.spaces.Box(layout.low, layout.high, dtype=np.float32)
+        return box if suite is None else suite.space(box)
+
+    def scene(self, s: int) -> RunningScene:
+        """The running scene of an index.
+
+        Raises:
+            ResetNeeded: It has not been reset.
+        """
+        scene = self._scenes[s]
+        if scene is None:
+            raise ResetNeeded(f"scene {s}: call reset() first")
+        return scene
+
+    def simulation(self, s: int) -> Simulation:
+        """A copy of a scene's simulation."""
+        return self._core.simulation(s)
+
+    def reset(self, s: int, seed: int | None = None, options: TeamOptions | None = None) -> None:
+        """Draws a scene and starts the episodes of its rovers.
+
+        Args:
+            s: Index of the scene.
+            seed: Checked seed; None to continue with the scene's generator.
+            options: What replaces draws.
+
+        Raises:
+            TerrainError: The rovers have no room; nothing has changed.
+            StateError: A given state leaves a coupling open; nothing has changed.
+        """
+        random = copy.deepcopy(self._randoms[s]) if seed is None else np.random.default_rng(seed)
+        team = self.team
+        drawn = team.draw(random, team.check_options(None) if options is None else options)
+        readers = [
+            MachineReader(team.alone(k, drawn), machine, task.scan, self._layout)
+            for k, (machine, task) in enumerate(zip(self._machines, team.tasks, strict=True))
+        ]
+        scene = RunningScene(drawn, random, readers, np.ones(team.n, np.bool_))
+        scene.begin_period(team)
+        self._begin_episodes(scene)
+        self._core.replace(s, drawn.simulation)
+        self._torques[s] = self._set_points[s] = 0.0
+        self._randoms[s], self._scenes[s] = random, scene
+
+    def _begin_episodes(self, scene: RunningScene) -> None:
+        simulation = scene.drawn.simulation
+        whole, near = simulation.reading(), self._near(simulation)
+        for k, (task, reader) in enumerate(zip(self.team.tasks, scene.readers, strict=True)):
+            start, view, suite = scene.drawn.rovers[k], reader.view(simulation), self._suites[k]
+            reading = reader.read(view, whole, start.start.goal, near=near[k])
+            scene.episodes.append(JoinedEpisode(task, start, reading, self._normals(scene, k)))
+            if suite is not None:
+                scene.sensors.append(suite.begin(_moment(view), np.append(row_of(scene.random), np.uint64(k))))
+
+    def _normals(self, scene: RunningScene, k: int) -> Array:
+        task = self.team.tasks[k]
+        return scene.random.standard_normal(task.layout.size) if task.is_noisy else np.zeros(0)
+
+    def _near(self, simulation: Simulation) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Which rovers have another one within their height scan or their reach, (n,)."""
+        q = simulation.q
+        places = np.array([[q[m.coordinates.start], q[m.coordinates.start + 2]] for m in self._machines])
+        reach = np.array(self.team.radii)
+        scans = [0.0 if task.scan is None else float(np.abs(task.scan).max()) * 2.0**0.5 for task in self.team.tasks]
+        distances = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+        np.fill_diagonal(distances, np.inf)
+        within: np.ndarray[Any, np.dtype[np.bool_]] = distances < reach + np.maximum(np.array(scans), reach)[:, None] + 1.0
+        return within.any(axis=1)
+
+    def observation(self, s: int, k: int) -> Any:
+        """The last observation of a rover."""
+        scene, suite = self.scene(s), self._suites[k]
+        seen = scene.episodes[k].observation.copy()
+        return seen if suite is None else with_readings(seen, suite.readings(scene.sensors[k]))
+
+    def info(self, s: int, k: int) -> dict[str, Any]:
+        """The info of a rover's last period or of its start."""
+        scene = self.scene(s)
+        return scene.episodes[k].info(scene.solver)
+
+    def check_actions(self, actions: Sequence[Mapping[str, object]]) -> list[list[Array | None]]:
+        """Checks the actions of every scene, by rover, and returns them in the order of the rovers.
+
+        Raises:
+            CommandError: An action is missing or of a rover whose episode does not run, has a wrong shape or an entry
+                that is not finite.
+            ResetNeeded: A scene has not been reset.
+        """
+        checked = []
+        for s, given in enumerate(actions):
+            scene = self.scene(s)
+            live = [agent for agent, runs in zip(self.team.agents, scene.live, strict=True) if runs]
+            if set(given) != set(live):
+                refuse(CommandError, "actions", list(given), f"must be one of each of {', '.join(live) or 'nobody'}")
+            row = [
+                check_actions(given[agent], (task.n_actions,)) if agent in given else None
+                for agent, task in zip(self.team.agents, self.team.tasks, strict=True)
+            ]
+            checked.append(row)
+        return checked
+
+    def step(self, actions: Sequence[Sequence[Array | None]]) -> list[list[RoverPeriod | None]]:
+        """Applies actions for one control period; scenes without any stay as they are.
+
+        Args:
+            actions: Checked actions of every scene, in the order of the rovers; None of a rover whose episode has
+                ended.
+
+        Returns:
+            The outcome of each rover that has an action, else None.
+        """
+        moving = np.zeros(self.n, np.bool_)
+        given: list[list[Array | None]] = []
+        for s, row in enumerate(actions):
+            given.append([None if one is None else np.clip(one, -1.0, 1.0) for one in row])
+            self._command(s, given[s])
+            moving[s] = any(one is not None for one in row)
+        done, messages = self._take_steps(moving)
+        results: list[list[RoverPeriod | None]] = []
+        for s in range(self.n):
+            results.append([None] * self.team.n)
+            if moving[s]:
+                self.scene(s).steps += 1
+                results[s] = self._conclude(s, given[s], actions[s], done[s], messages.get(s, ""))
+        return results
+
+    def _command(self, s: int, actions: Sequence[Array | None]) -> None:
+        """Sets the torques and set-points of a scene; rovers without an action get no torque and keep their steering."""
+        for k, (action, task) in enumerate(zip(actions, self.team.tasks, strict=True)):
+            wheels, n_wheels = self._machines[k].wheels, len(task.model.wheel_names)
+            self._torques[s, wheels] = 0.0
+            if action is None:
+                continue
+            gain = self.scene(s).drawn.rovers[k].domain.actuator_gain
+            self._torques[s, wheels] = action[:n_wheels] * task.model.wheel_torque_limits * gain
+            steered = np.append(action[n_wheels:], 0.0) * task.max_steering
+            self._set_points[s, wheels] = steered[list(task.steering.entries)]
+
+    def _take_steps(
+        self, moving: np.ndarray[Any, np.dtype[np.bool_]]
+    ) -> tuple[dict[int, list[PeriodWork]], dict[int, str]]:
+        """Takes the physics steps of a period, and adds up work and impulses between rovers."""
+        scenes = {int(s): self.scene(int(s)) for s in np.flatnonzero(moving)}
+        done = {s: scene.begin_period(self.team) for s, scene in scenes.items()}
+        before = {s: self._core.simulation(s).q for s in scenes}
+        active, messages = moving.copy(), {}
+        for _ in range(self.team.tasks[0].substeps):
+            rows, failed = self._core.step(self._torques, self._set_points, 1, active=active)
+            messages |= failed
+            active[list(failed)] = False
+            for s in np.flatnonzero(active).tolist():
+                simulation = self._core.simulation(s)
+                scenes[s].note_solver(rows[s, self._layout["solver"]])
+                before[s] = self._add_work(simulation, before[s], done[s])
+        return done, messages
+
+    def _add_work(self, simulation: Simulation, before: Array, done: list[PeriodWork]) -> Array:
+        """Adds the work and the impulses of a physics step, and returns the coordinates after it."""
+        q, torques = simulation.q, simulation.motor_torques
+        for k, machine in enumerate(self._machines):
+            joints = machine.coordinates.start + self._joints[k]
+            done[k].work += torques[machine.wheels] * self._signs[k] * (q[joints] - before[joints])
+        if self._near(simulation).any():
+            self._add_impulses(simulation, done)
+        return q
+
+    def _add_impulses(self, simulation: Simulation, done: list[PeriodWork]) -> None:
+        contacts = simulation.contacts
+        rows = list(zip(contacts.bodies, contacts.others, strict=True))
+        for i, (body, other) in enumerate(rows):
+            mine, its = self._owners.get(body), self._owners.get(other or "")
+            if mine is None or its is None or mine == its:
+                continue
+            impulse = contacts.impulses[i] @ contacts.frames[i]
+            for k, by, on in ((mine, its, impulse), (its, mine, -impulse)):
+                name = self.team.agents[by]
+                done[k].impulses[name] = done[k].impulses.get(name, np.zeros(3)) + on
+
+    def _conclude(
+        self,
+        s: int,
+        actions: Sequence[Array | None],
+        asked: Sequence[Array | None],
+        done: list[PeriodWork],
+        message: str,
+    ) -> list[RoverPeriod | None]:
+        """The outcome of a scene's period."""
+        scene, simulation = self.scene(s), self._core.simulation(s)
+        whole, near = simulation.reading(), self._near(simulation)
+        truncated = self.max_episode_steps is not None and scene.steps >= self.max_episode_steps
+        results: list[RoverPeriod | None] = [None] * self.team.n
+        for k, action in enumerate(actions):
+            if action is None:
+                continue
+            episode, view, suite = scene.episodes[k], scene.readers[k].view(simulation), self._suites[k]
+            episode.clipped = int((np.abs(np.asarray(asked[k])) > 1.0).sum())
+            before = episode.observation
+            reading = scene.readers[k].read(view, whole, episode.goal, near=near[k])
+            reward = episode.advance(reading, action, done[k], self._normals(scene, k), message)
+            reward += self._earn_own(episode, before, action, scene)
+            if suite is not None:
+                suite.advance(scene.sensors[k], _moment(view))
+            results[k] = RoverPeriod(self.observation(s, k), reward, bool(episode.ending), truncated, self.info(s, k))
+        ended = [k for k, one in enumerate(results) if one is not None and (one.terminated or one.truncated)]
+        scene.live[ended] = False
+        if ended and scene.live.any():
+            self._park(s, simulation, ended)
+        return results
+
+    def _earn_own(self, episode: JoinedEpisode, before: Array, action: Array, scene: RunningScene) -> float:
+        """Calls the functions of `reward_terms` and returns the sum of their terms."""
+        task = episode.task
+        if not task.reward_terms:
+            return 0.0
+        info, counts = episode.info(scene.solver), episode.ending != STEP_FAILED
+        own = earn(task.reward_terms, task.layout, before, action, episode.observation, info, counts)
+        episode.reward_terms |= {name: float(term) for name, term in own.items()}
+        return float(sum(own.values()))
+
+    def _park(self, s: int, simulation: Simulation, rovers: Sequence[int]) -> None:
+        """Brakes rovers whose episodes have ended; wheels without gains to hold them turn freely."""
+        names = self.team.model.dof_names
+        for k in rovers:
+            joints = self._machines[k].coordinates.start + self._joints[k]
+            with suppress(CommandError):
+                simulation.hold([names[j] for j in sorted(set(joints.tolist()))])
+        self._core.replace(s, simulation)
+
+
+def _moment(view: MachineView) -> Moment:
+    """A rover among others, for its sensors."""
+    simulation: Any = view
+    return Moment(simulation, view.time)
+
+
+def check_limit(max_episode_steps: object) -> int | None:
+    """Checks the control periods until truncation; -1 for no limit.
+
+    Raises:
+        OptionError: It is no whole number from 1, nor -1.
+    """
+    if max_episode_steps == -1:
+        return None
+    if isinstance(max_episode_steps, bool):
+        refuse(OptionError, "max_episode_steps", max_episode_steps, "must be a whole number from 1, or -1 for no limit")
+    return whole("max_episode_steps", max_episode_steps, at_least=1)
