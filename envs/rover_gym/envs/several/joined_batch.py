@@ -14,15 +14,18 @@ from rover_gym.core import CommandError, OptionError, Plane, Simulation, Simulat
 from rover_gym.core.validation import refuse, whole
 from rover_gym.envs.batch import MAX_THREADS, STEP_FAILED
 from rover_gym.envs.generators import row_of
-from rover_gym.envs.observation import Array
+from rover_gym.envs.observation import Array, Mask
 from rover_gym.envs.reward_terms import earn
 from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.envs.sensors.sensor_suite import SensorLike, SensorSuite, SuiteState, with_readings
-from rover_gym.envs.several.joined_episode import JoinedEpisode, PeriodWork
+from rover_gym.envs.several.joined_episode import JoinedEpisode, PeriodSums
 from rover_gym.envs.several.joined_scene import JoinedScene, Team, TeamOptions
-from rover_gym.envs.several.machine_view import MachineReader, MachineView
-from rover_gym.envs.start import drive_signs
+from rover_gym.envs.several.machine_contacts import MachineContacts
+from rover_gym.envs.several.machine_view import MachineContact, MachineReader, MachineView
 from rover_gym.envs.task import check_actions
+
+#: What `info` has of the solver before the first step.
+NOTHING_SOLVED: Mapping[str, Any] = {"status": "converged", "iterations": 0, "residual": 0.0, "n_contacts": 0}
 
 #: Most scenes of a batch.
 MAX_SCENES = 10_000
@@ -65,25 +68,50 @@ class RunningScene:
     drawn: JoinedScene
     random: np.random.Generator
     readers: list[MachineReader]
-    live: np.ndarray[Any, np.dtype[np.bool_]]
+    live: Mask
     episodes: list[JoinedEpisode] = field(default_factory=list)
     sensors: list[SuiteState] = field(default_factory=list)
     steps: int = 0
-    solver: dict[str, Any] = field(default_factory=dict)
+    solver: dict[str, Any] = field(default_factory=lambda: dict(NOTHING_SOLVED))
 
-    def begin_period(self, team: Team) -> list[PeriodWork]:
-        """Forgets the last period."""
-        self.solver = {"status": "converged", "iterations": 0, "residual": 0.0, "n_contacts": 0}
-        return [PeriodWork(len(task.model.wheel_names)) for task in team.tasks]
 
-    def note_solver(self, numbers: Array) -> None:
-        """Adds the solver's numbers of a physics step, as a reading has them."""
-        solver = self.solver
-        if numbers[0]:
-            solver["status"] = "not_converged"
-        solver["iterations"] += int(numbers[1])
-        solver["residual"] = max(solver["residual"], float(numbers[2]))
-        solver["n_contacts"] = max(solver["n_contacts"], int(numbers[3]))
+class Period:
+    """What a scene sums up over the physics steps of a control period.
+
+    Args:
+        v: Velocities of all rovers at the beginning, (nv,).
+        contacts: Sums over contacts.
+    """
+
+    def __init__(self, v: Array, contacts: MachineContacts) -> None:
+        self._v, self._contacts = v, contacts
+        self.work: Array = np.zeros(contacts.wheels[-1].stop)
+        self.impulses: dict[tuple[int, int], Array] = {}
+        self.solver: dict[str, Any] = dict(NOTHING_SOLVED)
+        self.message = ""
+
+    def add(self, simulation: Simulation, solver: Array) -> None:
+        """Adds a physics step.
+
+        Args:
+            simulation: All rovers after it.
+            solver: What a reading has of the solver, (4,).
+        """
+        self.work += self._contacts.work(simulation, self._v)
+        self._v = simulation.v
+        for one, other, impulse in self._contacts.pushes(simulation.contacts):
+            for pair, own in (((one, other), impulse), ((other, one), -impulse)):
+                self.impulses[pair] = self.impulses.get(pair, np.zeros(3)) + own
+        if solver[0]:
+            self.solver["status"] = "not_converged"
+        self.solver["iterations"] += int(solver[1])
+        self.solver["residual"] = max(self.solver["residual"], float(solver[2]))
+        self.solver["n_contacts"] = max(self.solver["n_contacts"], int(solver[3]))
+
+    def sums(self, k: int, agents: Sequence[str]) -> PeriodSums:
+        """The sums of rover k."""
+        impulses = {agents[other]: impulse for (one, other), impulse in self.impulses.items() if one == k}
+        return PeriodSums(self.work[self._contacts.wheels[k]], impulses)
 
 
 class JoinedBatch:
@@ -120,14 +148,14 @@ class JoinedBatch:
         self._core = SimulationBatch([waiting] * self.n, threads=threads)
         self._layout = self._core.reading_layout
         self._machines = [team.model.machines[agent] for agent in team.agents]
-        self._owners = {solid: k for k, machine in enumerate(self._machines) for solid in machine.solids}
-        self._joints = [np.asarray(task.model.wheel_joint_indices) for task in team.tasks]
-        self._signs = [drive_signs(task.model) for task in team.tasks]
+        self._contacts = MachineContacts(team.model)
         self._torques = np.zeros((self.n, len(team.model.wheel_names)))
         self._set_points = np.zeros_like(self._torques)
         self._scenes: list[RunningScene | None] = [None] * self.n
         self._randoms = [np.random.default_rng() for _ in range(self.n)]
-        made = {task.model: None if sensors is None else SensorSuite(sensors, task.model, task.dt) for task in team.tasks}
+        made = {
+            task.model: None if sensors is None else SensorSuite(sensors, task.model, task.dt) for task in team.tasks
+        }
         self._suites = [made[task.model] for task in team.tasks]
         self.action_spaces = [gym.spaces.Box(-1.0, 1.0, (task.n_actions,), np.float32) for task in team.tasks]
         self.observation_spaces = [self._space(k) for k in range(team.n)]
@@ -172,7 +200,6 @@ class JoinedBatch:
             for k, (machine, task) in enumerate(zip(self._machines, team.tasks, strict=True))
         ]
         scene = RunningScene(drawn, random, readers, np.ones(team.n, np.bool_))
-        scene.begin_period(team)
         self._begin_episodes(scene)
         self._core.replace(s, drawn.simulation)
         self._torques[s] = self._set_points[s] = 0.0
@@ -180,10 +207,10 @@ class JoinedBatch:
 
     def _begin_episodes(self, scene: RunningScene) -> None:
         simulation = scene.drawn.simulation
-        whole, near = simulation.reading(), self._near(simulation)
+        whole, near, nothing = simulation.reading(), self._near(simulation), MachineContact(0.0, 0.0)
         for k, (task, reader) in enumerate(zip(self.team.tasks, scene.readers, strict=True)):
             start, view, suite = scene.drawn.rovers[k], reader.view(simulation), self._suites[k]
-            reading = reader.read(view, whole, start.start.goal, near=near[k])
+            reading = reader.read(view, whole, nothing, start.start.goal, near=near[k])
             scene.episodes.append(JoinedEpisode(task, start, reading, self._normals(scene, k)))
             if suite is not None:
                 scene.sensors.append(suite.begin(_moment(view), np.append(row_of(scene.random), np.uint64(k))))
@@ -192,7 +219,7 @@ class JoinedBatch:
         task = self.team.tasks[k]
         return scene.random.standard_normal(task.layout.size) if task.is_noisy else np.zeros(0)
 
-    def _near(self, simulation: Simulation) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def _near(self, simulation: Simulation) -> Mask:
         """Which rovers have another one within their height scan or their reach, (n,)."""
         q = simulation.q
         places = np.array([[q[m.coordinates.start], q[m.coordinates.start + 2]] for m in self._machines])
@@ -200,7 +227,7 @@ class JoinedBatch:
         scans = [0.0 if task.scan is None else float(np.abs(task.scan).max()) * 2.0**0.5 for task in self.team.tasks]
         distances = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
         np.fill_diagonal(distances, np.inf)
-        within: np.ndarray[Any, np.dtype[np.bool_]] = distances < reach + np.maximum(np.array(scans), reach)[:, None] + 1.0
+        within: Mask = distances < reach + np.maximum(np.array(scans), reach)[:, None] + 1.0
         return within.any(axis=1)
 
     def observation(self, s: int, k: int) -> Any:
@@ -245,23 +272,21 @@ class JoinedBatch:
         Returns:
             The outcome of each rover that has an action, else None.
         """
-        moving = np.zeros(self.n, np.bool_)
-        given: list[list[Array | None]] = []
-        for s, row in enumerate(actions):
-            given.append([None if one is None else np.clip(one, -1.0, 1.0) for one in row])
+        given = [[None if one is None else np.clip(one, -1.0, 1.0) for one in row] for row in actions]
+        moving = np.array([any(one is not None for one in row) for row in given])
+        for s in np.flatnonzero(moving).tolist():
             self._command(s, given[s])
-            moving[s] = any(one is not None for one in row)
-        done, messages = self._take_steps(moving)
-        results: list[list[RoverPeriod | None]] = []
-        for s in range(self.n):
-            results.append([None] * self.team.n)
-            if moving[s]:
-                self.scene(s).steps += 1
-                results[s] = self._conclude(s, given[s], actions[s], done[s], messages.get(s, ""))
+        periods, rows = self._take_steps(moving)
+        results: list[list[RoverPeriod | None]] = [[None] * self.team.n for _ in range(self.n)]
+        for s, period in periods.items():
+            self.scene(s).steps += 1
+            for k, (asked, action) in enumerate(zip(actions[s], given[s], strict=True)):
+                self.scene(s).episodes[k].clipped = 0 if asked is None else int((asked != action).sum())
+            results[s] = self._conclude(s, given[s], period, rows[s])
         return results
 
     def _command(self, s: int, actions: Sequence[Array | None]) -> None:
-        """Sets the torques and set-points of a scene; rovers without an action get no torque and keep their steering."""
+        """Sets the torques and set-points of a scene; without an action, torques are 0 and the steering is kept."""
         for k, (action, task) in enumerate(zip(actions, self.team.tasks, strict=True)):
             wheels, n_wheels = self._machines[k].wheels, len(task.model.wheel_names)
             self._torques[s, wheels] = 0.0
@@ -272,67 +297,43 @@ class JoinedBatch:
             steered = np.append(action[n_wheels:], 0.0) * task.max_steering
             self._set_points[s, wheels] = steered[list(task.steering.entries)]
 
-    def _take_steps(
-        self, moving: np.ndarray[Any, np.dtype[np.bool_]]
-    ) -> tuple[dict[int, list[PeriodWork]], dict[int, str]]:
-        """Takes the physics steps of a period, and adds up work and impulses between rovers."""
-        scenes = {int(s): self.scene(int(s)) for s in np.flatnonzero(moving)}
-        done = {s: scene.begin_period(self.team) for s, scene in scenes.items()}
-        before = {s: self._core.simulation(s).q for s in scenes}
-        active, messages = moving.copy(), {}
+    def _take_steps(self, moving: Mask) -> tuple[dict[int, Period], Array]:
+        """Takes the physics steps of a period; returns sums of the scenes that move, and the last readings of all."""
+        periods = {s: Period(self._core.simulation(s).v, self._contacts) for s in np.flatnonzero(moving).tolist()}
+        active, rows = moving.copy(), np.zeros(0)
         for _ in range(self.team.tasks[0].substeps):
             rows, failed = self._core.step(self._torques, self._set_points, 1, active=active)
-            messages |= failed
-            active[list(failed)] = False
+            for s, message in failed.items():
+                periods[s].message, active[s] = message, False
             for s in np.flatnonzero(active).tolist():
-                simulation = self._core.simulation(s)
-                scenes[s].note_solver(rows[s, self._layout["solver"]])
-                before[s] = self._add_work(simulation, before[s], done[s])
-        return done, messages
-
-    def _add_work(self, simulation: Simulation, before: Array, done: list[PeriodWork]) -> Array:
-        """Adds the work and the impulses of a physics step, and returns the coordinates after it."""
-        q, torques = simulation.q, simulation.motor_torques
-        for k, machine in enumerate(self._machines):
-            joints = machine.coordinates.start + self._joints[k]
-            done[k].work += torques[machine.wheels] * self._signs[k] * (q[joints] - before[joints])
-        if self._near(simulation).any():
-            self._add_impulses(simulation, done)
-        return q
-
-    def _add_impulses(self, simulation: Simulation, done: list[PeriodWork]) -> None:
-        contacts = simulation.contacts
-        rows = list(zip(contacts.bodies, contacts.others, strict=True))
-        for i, (body, other) in enumerate(rows):
-            mine, its = self._owners.get(body), self._owners.get(other or "")
-            if mine is None or its is None or mine == its:
-                continue
-            impulse = contacts.impulses[i] @ contacts.frames[i]
-            for k, by, on in ((mine, its, impulse), (its, mine, -impulse)):
-                name = self.team.agents[by]
-                done[k].impulses[name] = done[k].impulses.get(name, np.zeros(3)) + on
+                periods[s].add(self._core.simulation(s), rows[s, self._layout["solver"]])
+        return periods, rows
 
     def _conclude(
-        self,
-        s: int,
-        actions: Sequence[Array | None],
-        asked: Sequence[Array | None],
-        done: list[PeriodWork],
-        message: str,
+        self, s: int, actions: Sequence[Array | None], period: Period, whole: Array
     ) -> list[RoverPeriod | None]:
-        """The outcome of a scene's period."""
+        """The outcome of a scene's period.
+
+        Args:
+            s: Index of the scene.
+            actions: Actions of its rovers, within [-1, 1].
+            period: Sums over the period.
+            whole: The last reading of all rovers.
+        """
         scene, simulation = self.scene(s), self._core.simulation(s)
-        whole, near = simulation.reading(), self._near(simulation)
+        scene.solver = period.solver
+        near, slips = self._near(simulation), self._contacts.slip_ratios(simulation)
+        forces = self._contacts.ground_forces(simulation)
         truncated = self.max_episode_steps is not None and scene.steps >= self.max_episode_steps
         results: list[RoverPeriod | None] = [None] * self.team.n
         for k, action in enumerate(actions):
             if action is None:
                 continue
             episode, view, suite = scene.episodes[k], scene.readers[k].view(simulation), self._suites[k]
-            episode.clipped = int((np.abs(np.asarray(asked[k])) > 1.0).sum())
-            before = episode.observation
-            reading = scene.readers[k].read(view, whole, episode.goal, near=near[k])
-            reward = episode.advance(reading, action, done[k], self._normals(scene, k), message)
+            contact, before = MachineContact(float(slips[k]), float(forces[k])), episode.observation
+            reading = scene.readers[k].read(view, whole, contact, episode.goal, near=near[k])
+            sums, normals = period.sums(k, self.team.agents), self._normals(scene, k)
+            reward = episode.advance(reading, action, sums, normals, period.message)
             reward += self._earn_own(episode, before, action, scene)
             if suite is not None:
                 suite.advance(scene.sensors[k], _moment(view))
@@ -355,11 +356,11 @@ class JoinedBatch:
 
     def _park(self, s: int, simulation: Simulation, rovers: Sequence[int]) -> None:
         """Brakes rovers whose episodes have ended; wheels without gains to hold them turn freely."""
-        names = self.team.model.dof_names
+        model = self.team.model
         for k in rovers:
-            joints = self._machines[k].coordinates.start + self._joints[k]
+            joints = sorted(set(model.wheel_joint_indices[self._machines[k].wheels]))
             with suppress(CommandError):
-                simulation.hold([names[j] for j in sorted(set(joints.tolist()))])
+                simulation.hold([model.dof_names[j] for j in joints])
         self._core.replace(s, simulation)
 
 

@@ -5,6 +5,8 @@ layout and weights, and readings of one machine of several; a test compares both
 """
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,17 +29,17 @@ MOST_PROGRESS, MOST_WORK, MOST_TIME, MOST_RATIO = 30.0, 4e5, 60.0, 2.0
 FAILURE = "failure"
 
 
-class PeriodWork:
-    """What a scene adds up for a rover over the physics steps of a control period.
+@dataclass(frozen=True)
+class PeriodSums:
+    """Sums over the physics steps of a control period.
 
     Attributes:
         work: Work of each wheel's drive, (n_wheels,), J.
-        impulses: Impulse of each other rover on this one, by name, (3,), world frame, N s.
+        impulses: Impulse of each other rover that touched this one, by name, (3,), world frame, N s.
     """
 
-    def __init__(self, n_wheels: int) -> None:
-        self.work: Array = np.zeros(n_wheels)
-        self.impulses: dict[str, Array] = {}
+    work: Array
+    impulses: Mapping[str, Array]
 
 
 class JoinedEpisode:
@@ -80,26 +82,31 @@ class JoinedEpisode:
         return self.goals[min(self.reached, len(self.goals) - 1)]
 
     def advance(
-        self, reading: MachineReading, action: Array, done: PeriodWork, normals: Array, message: str = ""
+        self,
+        reading: MachineReading,
+        action: Array,
+        sums: PeriodSums,
+        normals: Array,
+        message: str = "",
     ) -> float:
         """Goes on by a control period and returns its reward, without the terms that the user has given.
 
         Args:
             reading: The rover at the end of the period, with `goal` as its target.
             action: The action, within [-1, 1], (n_actions,).
-            done: What was added up over the period.
+            sums: Sums over the period.
             normals: Of the observation's noise, (size,).
             message: Message of the physics step that failed; empty if none did.
         """
         approach = self.distance - float(reading.shared[-1])
         changes = (action - self.previous_action) ** 2
-        self.message, self._forces = message, {name: p / self.task.dt for name, p in done.impulses.items()}
+        self.message, self._forces = message, {name: p / self.task.dt for name, p in sums.impulses.items()}
         self.previous_action, self._reading = action, reading
         self.distance = float(reading.shared[-1])
-        work = np.abs(done.work).sum()
+        work = np.abs(sums.work).sum()
         self.energy += work
-        self.energy_positive += np.maximum(done.work, 0.0).sum()
-        is_stuck = reading.trunk_force > self.trunk_load and reading.speed <= STUCK_SPEED
+        self.energy_positive += np.maximum(sums.work, 0.0).sum()
+        is_stuck = reading.contact.trunk_force > self.trunk_load and reading.speed <= STUCK_SPEED
         self.stuck_time = self.stuck_time + self.task.dt if is_stuck else 0.0
         if not message:
             self._reach(reading)
@@ -167,7 +174,7 @@ class JoinedEpisode:
             "progress": np.clip(approach, -MOST_PROGRESS, MOST_PROGRESS),
             "time": dt,
             "energy": min(work, MOST_WORK),
-            "slip": min(reading.slip_ratio, MOST_RATIO) * dt,
+            "slip": min(reading.contact.slip_ratio, MOST_RATIO) * dt,
             "tilt": min(1.0 - reading.cos_tilt, MOST_RATIO) * dt,
             "torque_change": changes[:n_wheels].mean(),
             "steering_change": steering.mean() if len(steering) else 0.0,
@@ -194,7 +201,7 @@ class JoinedEpisode:
             "distance_to_goal": self.distance,
             "energy": float(self.energy),
             "energy_positive": float(self.energy_positive),
-            "slip_ratio": reading.slip_ratio,
+            "slip_ratio": reading.contact.slip_ratio,
             "tilt": math.acos(min(max(reading.cos_tilt, -1.0), 1.0)),
             "difficulty": self.scene.difficulty,
             "domain": self.scene.domain.as_info(),

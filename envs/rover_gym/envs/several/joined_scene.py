@@ -30,7 +30,6 @@ from rover_gym.envs.episode_scene import (
     check_reset_options,
     scene_of,
 )
-from rover_gym.envs.observation import Array
 from rover_gym.envs.start import Domain, Point, Start
 from rover_gym.envs.task import Task, make_task
 from rover_gym.ground.terrain_parts import parts_of, plane_of, surfaces_of
@@ -216,8 +215,8 @@ class Team:
         self._check_goals_apart(starts, options)
         layout = self._lay_out(starts, int(random.integers(FIELD_SEEDS)), options.shared)
         rovers = []
-        for start in starts:
-            start = replace(start, slope=layout.start.slope, uphill=layout.start.uphill)
+        for drawn in starts:
+            start = replace(drawn, slope=layout.start.slope, uphill=layout.start.uphill)
             mass, gain = (float(random.uniform(*self.given[name])) for name in ("mass_scale", "actuator_gain"))
             domain = replace(layout.domain, mass_scale=mass, actuator_gain=gain)
             rovers.append(EpisodeScene(start, layout.terrain, layout.rocks, domain))
@@ -288,7 +287,9 @@ class Team:
         """A simulation with the friction and the gravity of an episode."""
         task = self.tasks[0]
         gravity = tuple(domain.gravity_scale * g for g in task.gravity)
-        return Simulation(model, terrain, **{**task.simulation_options, "friction": domain.friction, "gravity": gravity})
+        return Simulation(
+            model, terrain, **{**task.simulation_options, "friction": domain.friction, "gravity": gravity}
+        )
 
     def alone(self, k: int, scene: JoinedScene) -> Simulation:
         """A simulation of rover k alone in a scene."""
@@ -311,7 +312,7 @@ def _models(rovers: object, model: object) -> list[RoverModel | None]:
     """The model of each rover; None stands for the default."""
     if isinstance(rovers, (list, tuple)):
         if model is not None:
-            refuse(OptionError, "model", model, "must not be given together with a list of rovers, which has the models")
+            refuse(OptionError, "model", model, "must not be given together with a list of rovers")
         if not rovers:
             refuse(OptionError, "rovers", rovers, "must have at least one rover")
         return [check_model(f"rovers[{k}]", one) for k, one in enumerate(rovers)]

@@ -6,12 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from rover_gym.core import Contacts, Machine, RoverModel, Simulation, Terrain
+from rover_gym.core import Machine, RoverModel, Simulation, Terrain
 from rover_gym.envs.observation import Array
-from rover_gym.envs.start import SLIP_SPEED, drive_signs, scan_points
-
-#: Kinds of contacts of solids that are no wheels.
-BODY_KINDS = frozenset({"box", "sphere", "collider"})
+from rover_gym.envs.start import scan_points
 
 #: Parts of a reading that depend on contacts, and entries of each wheel.
 WHEEL_ENTRIES = {"wheel_gaps": 1, "wheel_contacts": 1, "normal_forces": 1, "tangential_forces": 2}
@@ -62,11 +59,6 @@ class MachineView:
         """Velocities, (nv,)."""
         return self.joined.v[self.machine.coordinates]
 
-    @cached_property
-    def contacts(self) -> Contacts:
-        """The contacts of all machines in the last step."""
-        return self.joined.contacts
-
     @property
     def rotation(self) -> Array:
         """Rotation matrix of the trunk, (3, 3)."""
@@ -116,37 +108,18 @@ class MachineView:
         found, _ = self.joined.cast_rays(origins, down, 2.0 * SCAN_HEIGHT, parts=True, without=self.machine.solids)
         return SCAN_HEIGHT - found
 
-    def slip_ratio(self) -> float:
-        """Mean over the wheels' contacts of the last step of rim slip over the faster of rim and ground, 0 to 2."""
-        contacts = self.contacts
-        wheels = np.asarray(contacts.wheels)
-        mine = (wheels >= self.machine.wheels.start) & (wheels < self.machine.wheels.stop)
-        own = wheels[mine] - self.machine.wheels.start
-        joints = np.asarray(self.model.wheel_joint_indices)[own]
-        rim = self.model.wheel_radii[own] * drive_signs(self.model)[own] * self.v[joints]
-        along, across = np.asarray(contacts.velocities)[mine, 1:].T
-        slip = np.hypot(along, across)
-        faster = np.maximum(np.maximum(np.abs(rim), np.hypot(rim + along, across)), SLIP_SPEED)
-        ratios = [*(slip / faster).tolist(), *self._slips_in_sand()]
-        return sum(ratios) / len(ratios) if ratios else 0.0
 
-    def _slips_in_sand(self) -> list[float]:
-        sand = self.joined.sand()
-        if sand is None:
-            return []
-        touching = np.asarray(sand["force"])[self.machine.wheels].any(axis=1)
-        slips: list[float] = np.asarray(sand["slip"])[self.machine.wheels][touching].tolist()
-        return slips
+@dataclass(frozen=True)
+class MachineContact:
+    """Sums over a machine's contacts of the last step.
 
-    def ground_force(self) -> float:
-        """Mean normal force of the ground in the last step on all own solids but the wheels, N."""
-        contacts = self.contacts
-        solids = set(self.machine.solids)
-        rows = zip(contacts.kinds, contacts.bodies, contacts.others, contacts.impulses, strict=True)
-        carried = sum(
-            impulse[0] for kind, body, other, impulse in rows if other is None and kind in BODY_KINDS and body in solids
-        )
-        return float(carried) / self.joined.time_step
+    Attributes:
+        slip_ratio: Mean slip ratio of the wheels in contact, 0 to 2.
+        trunk_force: Mean normal force of the ground on all but the wheels, N.
+    """
+
+    slip_ratio: float
+    trunk_force: float
 
 
 @dataclass(frozen=True)
@@ -158,8 +131,7 @@ class MachineReading:
         heights: Heights of the scan, m; (0,) without one.
         cos_tilt: Cosine of the trunk's tilt from the vertical.
         speed: Horizontal speed of the trunk's origin, m/s.
-        trunk_force: Mean normal force of the ground in the last step on all but the wheels, N.
-        slip_ratio: Mean slip ratio of the wheels in contact.
+        contact: What the machine's contacts of the last step sum up to.
         time: Time of the episode, s.
     """
 
@@ -167,8 +139,7 @@ class MachineReading:
     heights: Array
     cos_tilt: float
     speed: float
-    trunk_force: float
-    slip_ratio: float
+    contact: MachineContact
     time: float
 
 
@@ -182,9 +153,7 @@ class MachineReader:
         whole: Layout of the reading of all machines.
     """
 
-    def __init__(
-        self, alone: Simulation, machine: Machine, scan: Array | None, whole: Mapping[str, slice]
-    ) -> None:
+    def __init__(self, alone: Simulation, machine: Machine, scan: Array | None, whole: Mapping[str, slice]) -> None:
         self.alone, self.machine, self.scan, self._whole = alone, machine, scan, whole
         self._layout = alone.reading_layout(0 if scan is None else len(scan))
         self._n_shared = self._layout["target"].stop
@@ -193,12 +162,15 @@ class MachineReader:
         """The machine in a joined simulation."""
         return MachineView(joined, self.machine, self.alone.model)
 
-    def read(self, view: MachineView, whole: Array, goal: Sequence[float], *, near: bool) -> MachineReading:
+    def read(
+        self, view: MachineView, whole: Array, contact: MachineContact, goal: Sequence[float], *, near: bool
+    ) -> MachineReading:
         """Reads the machine.
 
         Args:
             view: The machine, as `view` returns it.
             whole: The reading of all machines, as `Simulation.reading` returns it.
+            contact: What the machine's contacts sum up to.
             goal: The present goal (x, z), m.
             near: Whether another machine may be within the height scan.
         """
@@ -216,8 +188,6 @@ class MachineReader:
             heights=heights,
             cos_tilt=float(row[self._layout["cos_tilt"]][0]),
             speed=float(row[self._layout["speed"]][0]),
-            trunk_force=view.ground_force(),
-            slip_ratio=view.slip_ratio(),
+            contact=contact,
             time=view.time,
         )
-

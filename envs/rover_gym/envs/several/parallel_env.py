@@ -157,7 +157,7 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]]):
 
         Raises:
             OptionError: The seed is no whole number from 0, or an option is unknown or out of range.
-            StateError: `q` or `v` of a rover has a wrong shape or an entry that is not finite, or leaves a coupling open.
+            StateError: `q` or `v` of a rover has a wrong shape or is not finite, or a coupling cannot be closed.
             TerrainError: The rovers have no room in each of 100 drawn scenes.
         """
         self.batch.reset(0, check_seed(seed), self.team.check_options(options))
