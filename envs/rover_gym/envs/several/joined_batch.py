@@ -254,9 +254,10 @@ class JoinedBatch:
             scene = self.scene(s)
             live = [agent for agent, runs in zip(self.team.agents, scene.live, strict=True) if runs]
             if set(given) != set(live):
-                refuse(CommandError, "actions", list(given), f"must be one of each of {', '.join(live) or 'nobody'}")
+                reason = f"must be those of {', '.join(live)}" if live else "must be none: call reset() first"
+                refuse(CommandError, "actions", list(given), reason)
             row = [
-                check_actions(given[agent], (task.n_actions,)) if agent in given else None
+                check_actions(given[agent], (task.n_actions,), f"actions.{agent}") if agent in given else None
                 for agent, task in zip(self.team.agents, self.team.tasks, strict=True)
             ]
             checked.append(row)

@@ -117,7 +117,7 @@ class JoinedEpisode:
                 self.message = "the observation is not finite"
         self.ending = self._ending(reading)
         self._earn(approach, float(work), changes, reading)
-        return math.fsum(self.reward_terms.values())
+        return sum(self.reward_terms[name] for name in self.rules["weights"])
 
     def _reach(self, reading: MachineReading) -> None:
         """Counts the goals that are reached, and aims at the next."""

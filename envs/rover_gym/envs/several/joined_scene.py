@@ -15,6 +15,7 @@ from rover_gym.core import (
     Plane,
     RoverModel,
     Simulation,
+    StepError,
     Terrain,
     TerrainError,
     Union,
@@ -39,6 +40,9 @@ SHARED_OPTIONS = ("difficulty", "field_seed", "slope_deg", "uphill_deg")
 
 #: Deepest overlap at a start, m, as in scenes of one rover.
 START_OVERLAP = 0.01
+
+#: Time step that finds contacts between rovers at a start, s.
+PROBE_STEP = 1e-6
 
 #: Free space between rovers that start in a row, m.
 ROW_GAP = 1.0
@@ -254,7 +258,8 @@ class Team:
         """
         task = self._layout
         first, *places = [place for start in starts for place in (start.position, *start.goals)]
-        fixed = {**shared, "position": first, "heading": starts[0].heading, "goal": places[0], "further": places[1:]}
+        further = np.reshape(places[1:], (-1, 2))
+        fixed = {**shared, "position": first, "heading": starts[0].heading, "goal": places[0], "further": further}
         simulation = Simulation(task.model, Plane(), **task.simulation_options)
         episodes = EpisodeBatch(task.rules, simulation, 1, threads=1)
         drawn = episodes.draw(task.episodes, seed_generators([seed]), attempts=1, fixed=fixed)
@@ -299,9 +304,13 @@ class Team:
         overlap = simulation.deepest_overlap
         if overlap < -START_OVERLAP:
             raise TerrainError(f"a rover penetrates the ground by {-overlap:.3g} m at its start")
-        probe = Simulation(simulation.model, simulation.terrain, time_step=simulation.time_step)
+        # Only where the contacts are matters, not how they are solved.
+        probe = Simulation(simulation.model, simulation.terrain, time_step=PROBE_STEP, budget=0, acceptable=1.0)
         probe.set_state(simulation.q)
-        probe.step(1)
+        try:
+            probe.step(1)
+        except StepError as error:
+            raise TerrainError(f"the rovers have no room at their starts: {error}") from error
         contacts = probe.contacts
         gaps = [gap for gap, other in zip(contacts.gaps, contacts.others, strict=True) if other is not None]
         if min(gaps, default=0.0) < -START_OVERLAP:

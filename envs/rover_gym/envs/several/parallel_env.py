@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.utils import EzPickle
 
 from rover_gym.core import Simulation
 from rover_gym.core.extras import MissingExtraError
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 Stepped = tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]
 
 
-class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]]):
+class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle):
     """Several rovers in one scene, each with the task of `Rover-v0`: PettingZoo's parallel interface.
 
     The rovers are machines of one simulation: they meet, push, and tow each other where couplings tie them. Action,
@@ -86,6 +87,10 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]]):
     | max_episode_steps | 1200    | control periods until all agents are truncated; -1: no limit                      |
     | threads           | 1       | threads that step the scene                                                       |
 
+    ## Copies
+
+    A copy or a pickle is the environment as it was made, without its episode: reset it.
+
     ## Version history
 
     - v0: numbers may change until the first release.
@@ -107,6 +112,8 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]]):
         threads: int = 1,
         **arguments: Unpack[RoverArguments],
     ) -> None:
+        own = {"starts": starts, "loops": loops, "sensors": sensors, "threads": threads}
+        EzPickle.__init__(self, rovers, max_episode_steps=max_episode_steps, **own, **arguments)
         self.team = Team(rovers, starts=starts, loops=loops, **arguments)
         limit = check_limit(max_episode_steps)
         self.batch = JoinedBatch(1, self.team, threads=threads, max_episode_steps=limit, sensors=sensors)
