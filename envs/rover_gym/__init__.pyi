@@ -25,4 +25,4 @@ from .core import (
 )
 from .drive.pd.pd_policy import PDPolicy as PDPolicy
 from .envs.rover_env import RoverEnv as RoverEnv
-from .envs.several.parallel_env import parallel_env as parallel_env
+from .envs.several.making import parallel_env as parallel_env

@@ -13,7 +13,6 @@ import rover_gym
 from rover_gym import RoverEnv
 from rover_gym.core import CommandError, ModelError, OptionError, RoverGymError, StateError, TerrainError
 from rover_gym.envs.sensors import DepthCamera, InertialUnit, LaserScanner
-from rover_gym.envs.several import RoverParallelEnv
 
 pytest.importorskip("pettingzoo", reason="pip install 'rover-gym[agents]'")
 
@@ -21,6 +20,9 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)  # PettingZoo's, when its tests are imported
     from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, seed_test
     from pettingzoo.utils import parallel_to_aec
+
+from rover_gym.envs.several.pettingzoo_env import RoverParallelEnv
+from rover_gym.envs.tasks.commanded_rovers import DriveRoversByCommand
 
 #: Starts that are far from each other, m.
 APART = [(0.0, 0.0), (0.0, 30.0), (30.0, 0.0)]
@@ -136,12 +138,12 @@ def test_rovers_that_meet_push_each_other_with_equal_forces():
 
 
 def test_each_rover_sees_the_others_in_scan_and_camera():
-    sensors = [LaserScanner(elevations_deg=(-15.0,)), DepthCamera(width=8, height=6)]
-    near, far = (facing(gap, sensors=sensors, height_scan=True) for gap in (2.3, 60.0))
+    sensors = [LaserScanner(elevations_deg=(-30.0,)), DepthCamera(width=8, height=6)]
+    near, far = (facing(gap, sensors=sensors, height_scan=True) for gap in (1.7, 60.0))
     seen, alone = (env.batch.observation(0, 0) for env in (near, far))
     layout = near.observation_layout("rover_0")
     ahead, before = (layout.split(one["state"])["height_scan"].reshape(13, 9) for one in (seen, alone))
-    # The other rover's wheels and trunk stand over the farthest row, 1.5 m ahead, and not over the nearest.
+    # The trunk of the other rover lies over the farthest row, 1.5 m ahead, and not over the nearest.
     assert (ahead - before)[0].max() > 0.1
     np.testing.assert_array_equal(ahead[-1], before[-1])
     # Ray 90 of 180 looks ahead. The other one hides the ground there.
@@ -310,11 +312,38 @@ def test_actions_are_refused_by_the_agents_name():
 def test_a_copy_is_made_anew_and_gives_the_same_episodes():
     env = rover_gym.parallel_env(2, terrain="rocks", sensors=[InertialUnit(gyroscope_noise=1e-3)], starts=APART[:2])
     first, _ = env.reset(seed=4)
-    again, _ = pickle.loads(pickle.dumps(env)).reset(seed=4)
+    again, _ = pickle.loads(pickle.dumps(env)).reset(seed=4)  # noqa: S301 - written here
     for agent in env.agents:
         for name in ("state", "imu"):
             np.testing.assert_array_equal(first[agent][name], again[agent][name])
     assert not np.array_equal(first["rover_0"]["imu"], first["rover_1"]["imu"])
+
+
+def test_rovers_that_are_driven_by_commands_hold_them_until_they_end():
+    rovers = rover_gym.parallel_env(2, height_scan=True, heading_deg=0.0)
+    env = DriveRoversByCommand(rovers, repeat=6)
+    options = {"rover_0": {"goal": (1.0, 0.0)}, "rover_1": {"goal": (15.0, 9.0)}}
+    observations, _ = env.reset(seed=0, options=options)
+    for agent in env.agents:
+        assert env.observation_space(agent).contains(observations[agent])
+    decisions, earned = 0, 0.0
+    while len(env.agents) == 2:
+        observations, rewards, terminated, _, infos = env.step(dict.fromkeys(env.agents, np.array([1.0, 0.0, 0.0])))
+        decisions, earned = decisions + 1, earned + rewards["rover_0"]
+    assert terminated == {"rover_0": True, "rover_1": False}
+    assert infos["rover_0"]["termination"] == "goal"
+    # 0.5 m of progress and 10 at the goal; 6 periods of 0.05 s for a command.
+    assert earned == pytest.approx(10.5, abs=0.2)
+    assert infos["rover_1"]["time"] == pytest.approx(0.3 * decisions)
+    assert rovers.simulation.q[21] == pytest.approx(rovers.simulation.q[0], abs=0.2)
+    for command, text in (({}, "must be those of rover_1"), (dict.fromkeys(options, np.zeros(3)), "of rover_1")):
+        with pytest.raises(CommandError, match=text):
+            env.step(command)
+    observations, *_ = env.step({"rover_1": np.zeros(3)})
+    assert list(observations) == ["rover_1"]
+    with pytest.raises(OptionError) as refused:
+        DriveRoversByCommand(rover_gym.parallel_env(2, sensors=[InertialUnit()]))
+    assert refused.value.field == "env"
 
 
 def test_the_card_lists_the_arguments():
@@ -329,6 +358,6 @@ def test_the_card_lists_the_arguments():
 def test_without_pettingzoo_the_error_names_the_extra(monkeypatch):
     assert issubclass(RoverGymError, Exception)
     monkeypatch.setitem(__import__("sys").modules, "pettingzoo", None)
-    monkeypatch.delitem(__import__("sys").modules, "rover_gym.envs.several.parallel_env")
+    monkeypatch.delitem(__import__("sys").modules, "rover_gym.envs.several.pettingzoo_env")
     with pytest.raises(ImportError, match=r"pip install 'rover-gym\[agents\]'"):
-        __import__("rover_gym.envs.several.parallel_env")
+        __import__("rover_gym.envs.several.pettingzoo_env")

@@ -1,6 +1,7 @@
 """Several rovers in one simulation: PettingZoo's parallel interface, and a vector of scenes for stable-baselines3.
 
-`rover_gym.envs.several.sb3_rovers` has the vector for stable-baselines3, which it imports.
+The classes are in `rover_gym.envs.several.pettingzoo_env` and `rover_gym.envs.several.sb3_rovers`, which import
+PettingZoo and stable-baselines3.
 """
 
 import lazy_loader

@@ -14,7 +14,7 @@ from rover_gym.core import CommandError, OptionError, Plane, Simulation, Simulat
 from rover_gym.core.validation import refuse, whole
 from rover_gym.envs.batch import MAX_THREADS, STEP_FAILED
 from rover_gym.envs.generators import row_of
-from rover_gym.envs.observation import Array, Mask
+from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.reward_terms import earn
 from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.envs.sensors.sensor_suite import SensorLike, SensorSuite, SuiteState, with_readings
@@ -160,6 +160,11 @@ class JoinedBatch:
         self.action_spaces = [gym.spaces.Box(-1.0, 1.0, (task.n_actions,), np.float32) for task in team.tasks]
         self.observation_spaces = [self._space(k) for k in range(team.n)]
 
+    @property
+    def has_sensors(self) -> bool:
+        """Whether the rovers have sensors."""
+        return self._suites[0] is not None
+
     def _space(self, k: int) -> gym.Space[Any]:
         layout, suite = self.team.tasks[k].layout, self._suites[k]
         box = gym.spaces.Box(layout.low, layout.high, dtype=np.float32)
@@ -228,7 +233,7 @@ class JoinedBatch:
         distances = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
         np.fill_diagonal(distances, np.inf)
         within: Mask = distances < reach + np.maximum(np.array(scans), reach)[:, None] + 1.0
-        return within.any(axis=1)
+        return np.asarray(within.any(axis=1))
 
     def observation(self, s: int, k: int) -> Any:
         """The last observation of a rover."""
@@ -345,7 +350,7 @@ class JoinedBatch:
             self._park(s, simulation, ended)
         return results
 
-    def _earn_own(self, episode: JoinedEpisode, before: Array, action: Array, scene: RunningScene) -> float:
+    def _earn_own(self, episode: JoinedEpisode, before: Observations, action: Array, scene: RunningScene) -> float:
         """Calls the functions of `reward_terms` and returns the sum of their terms."""
         task = episode.task
         if not task.reward_terms:

@@ -31,6 +31,7 @@ from rover_gym.envs.episode_scene import (
     check_reset_options,
     scene_of,
 )
+from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.start import Domain, Point, Start
 from rover_gym.envs.task import Task, make_task
 from rover_gym.ground.terrain_parts import parts_of, plane_of, surfaces_of
@@ -108,6 +109,8 @@ class Team:
 
     Attributes:
         agents: Names of the rovers: rover_0, rover_1, ...
+        arguments: The arguments of `RoverEnv` as they were given.
+        given: The same checked, for the first rover.
         tasks: The task of each.
         model: All rovers as one model.
 
@@ -124,6 +127,7 @@ class Team:
         loops: Sequence[Mapping[str, Any]] | None = None,
         **arguments: Any,
     ) -> None:
+        self.arguments = arguments
         models = _models(rovers, arguments.get("model"))
         made = {model: make_task(check_arguments("parallel_env", {**arguments, "model": model})) for model in models}
         self.tasks: tuple[Task, ...] = tuple(made[model] for model in models)
@@ -140,6 +144,10 @@ class Team:
     def n(self) -> int:
         """Number of rovers."""
         return len(self.agents)
+
+    def prototype(self, k: int) -> RoverEnv:
+        """Rover k alone with the same arguments, for what is read of its layout, model and limits."""
+        return RoverEnv(**{**self.arguments, "model": self.tasks[k].model})
 
     def _check_number(self) -> None:
         most = (MAX_WAYPOINTS + 1) // (1 + self.given["waypoints"])

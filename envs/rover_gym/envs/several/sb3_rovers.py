@@ -73,6 +73,8 @@ class RoversVecEnv(VecEnv):
         limit = check_limit(max_episode_steps)
         self.batch = JoinedBatch(n_scenes, team, threads=threads, max_episode_steps=limit, sensors=sensors)
         self.team, self.render_mode = team, None
+        #: A rover alone with the same arguments, which gives layout, model and limits.
+        self.prototype = team.prototype(0)
         spaces, actions = self.batch.observation_spaces, self.batch.action_spaces
         if any(space != spaces[0] for space in spaces) or any(space != actions[0] for space in actions):
             refuse(OptionError, "rovers", rovers, "must all have equal spaces, as they share a policy")
@@ -164,18 +166,16 @@ class RoversVecEnv(VecEnv):
         """Reads an attribute of the vector, which all rows share."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
-    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Not available: rows have no attributes of their own.
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:  # noqa: ARG002 - as VecEnv's
+        """Refused: rows have no attributes of their own.
 
         Raises:
             AttributeError: Always.
         """
         raise AttributeError(f"{attr_name} of a row cannot be set")
 
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Not available: rows have no methods of their own.
+    def env_method(self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any) -> list[Any]:  # noqa: ARG002
+        """Refused: rows have no methods of their own.
 
         Raises:
             AttributeError: Always.

@@ -1,6 +1,5 @@
-"""`parallel_env`: several rovers in one scene, by PettingZoo's parallel interface. The class docstring is the card."""
+"""Several rovers in one scene, by PettingZoo's parallel interface. The class docstring is the card."""
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Unpack
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
 Stepped = tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]
 
 
-class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle):
+class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle):  # type: ignore[misc]
     """Several rovers in one scene, each with the task of `Rover-v0`: PettingZoo's parallel interface.
 
     The rovers are machines of one simulation: they meet, push, and tow each other where couplings tie them. Action,
@@ -224,17 +223,3 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle)
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
-
-
-def parallel_env(rovers: int | Sequence[str | os.PathLike[str] | Any] = 2, **arguments: Any) -> RoverParallelEnv:
-    """Makes several rovers in one scene, by PettingZoo's parallel interface.
-
-    Args:
-        rovers: Number of rovers with the argument `model`, or a list with the model of each.
-        **arguments: Those of `RoverParallelEnv`.
-
-    Raises:
-        RoverGymError: An argument is out of range; `field` names it.
-        ImportError: PettingZoo is not installed (`pip install 'rover-gym[agents]'`).
-    """
-    return RoverParallelEnv(rovers, **arguments)
