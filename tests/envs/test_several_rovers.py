@@ -138,7 +138,7 @@ def test_rovers_that_meet_push_each_other_with_equal_forces():
 
 
 def test_each_rover_sees_the_others_in_scan_and_camera():
-    sensors = [LaserScanner(elevations_deg=(-30.0,)), DepthCamera(width=8, height=6)]
+    sensors = [LaserScanner(elevations_deg=(-30.0, -55.0)), DepthCamera(width=8, height=6)]
     near, far = (facing(gap, sensors=sensors, height_scan=True) for gap in (1.7, 60.0))
     seen, alone = (env.batch.observation(0, 0) for env in (near, far))
     layout = near.observation_layout("rover_0")
@@ -151,8 +151,10 @@ def test_each_rover_sees_the_others_in_scan_and_camera():
     assert nearer[90] > 0.3
     assert nearer[0] == 0.0
     assert (alone["depth"] - seen["depth"]).max() > 0.3
-    # The own wheels are seen behind, at both.
-    assert (seen["scan"][0] < 1.6).sum() > (alone["scan"][0] < 1.6).sum() > 0
+    # The lower ring meets the ground at 1.65 m, and before that the own front wheels, 40 degrees to the left and right.
+    own = alone["scan"][1] < 1.6
+    assert own[90 + 20 - 5 : 90 + 20 + 1].any()
+    assert own[90 - 20 : 90 - 20 + 6].any()
 
 
 def test_a_rover_tows_another():

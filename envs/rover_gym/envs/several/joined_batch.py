@@ -18,14 +18,11 @@ from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.reward_terms import earn
 from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.envs.sensors.sensor_suite import SensorLike, SensorSuite, SuiteState, with_readings
-from rover_gym.envs.several.joined_episode import JoinedEpisode, PeriodSums
+from rover_gym.envs.several.joined_episode import NOTHING_SOLVED, JoinedEpisode, PeriodSums
 from rover_gym.envs.several.joined_scene import JoinedScene, Team, TeamOptions
 from rover_gym.envs.several.machine_contacts import MachineContacts
 from rover_gym.envs.several.machine_view import MachineContact, MachineReader, MachineView
 from rover_gym.envs.task import check_actions
-
-#: What `info` has of the solver before the first step.
-NOTHING_SOLVED: Mapping[str, Any] = {"status": "converged", "iterations": 0, "residual": 0.0, "n_contacts": 0}
 
 #: Most scenes of a batch.
 MAX_SCENES = 10_000
@@ -40,15 +37,12 @@ class RoverPeriod:
         reward: The reward.
         terminated: Whether the episode has ended.
         truncated: Whether it has reached the time limit.
-        info: As of `RoverEnv`, and `contact_forces`: the mean force of each other rover that touched this one in the
-            period, by name, (3,), world frame, N.
     """
 
     observation: Any
     reward: float
     terminated: bool
     truncated: bool
-    info: dict[str, Any]
 
 
 @dataclass
@@ -72,7 +66,6 @@ class RunningScene:
     episodes: list[JoinedEpisode] = field(default_factory=list)
     sensors: list[SuiteState] = field(default_factory=list)
     steps: int = 0
-    solver: dict[str, Any] = field(default_factory=lambda: dict(NOTHING_SOLVED))
 
 
 class Period:
@@ -111,7 +104,7 @@ class Period:
     def sums(self, k: int, agents: Sequence[str]) -> PeriodSums:
         """The sums of rover k."""
         impulses = {agents[other]: impulse for (one, other), impulse in self.impulses.items() if one == k}
-        return PeriodSums(self.work[self._contacts.wheels[k]], impulses)
+        return PeriodSums(self.work[self._contacts.wheels[k]], impulses, self.solver)
 
 
 class JoinedBatch:
@@ -243,8 +236,7 @@ class JoinedBatch:
 
     def info(self, s: int, k: int) -> dict[str, Any]:
         """The info of a rover's last period or of its start."""
-        scene = self.scene(s)
-        return scene.episodes[k].info(scene.solver)
+        return self.scene(s).episodes[k].info()
 
     def check_actions(self, actions: Sequence[Mapping[str, object]]) -> list[list[Array | None]]:
         """Checks the actions of every scene, by rover, and returns them in the order of the rovers.
@@ -327,7 +319,6 @@ class JoinedBatch:
             whole: The last reading of all rovers.
         """
         scene, simulation = self.scene(s), self._core.simulation(s)
-        scene.solver = period.solver
         near, slips = self._near(simulation), self._contacts.slip_ratios(simulation)
         forces = self._contacts.ground_forces(simulation)
         truncated = self.max_episode_steps is not None and scene.steps >= self.max_episode_steps
@@ -340,25 +331,15 @@ class JoinedBatch:
             reading = scene.readers[k].read(view, whole, contact, episode.goal, near=near[k])
             sums, normals = period.sums(k, self.team.agents), self._normals(scene, k)
             reward = episode.advance(reading, action, sums, normals, period.message)
-            reward += self._earn_own(episode, before, action, scene)
+            reward += _earn_own(episode, before, action)
             if suite is not None:
                 suite.advance(scene.sensors[k], _moment(view))
-            results[k] = RoverPeriod(self.observation(s, k), reward, bool(episode.ending), truncated, self.info(s, k))
+            results[k] = RoverPeriod(self.observation(s, k), reward, bool(episode.ending), truncated)
         ended = [k for k, one in enumerate(results) if one is not None and (one.terminated or one.truncated)]
         scene.live[ended] = False
         if ended and scene.live.any():
             self._park(s, simulation, ended)
         return results
-
-    def _earn_own(self, episode: JoinedEpisode, before: Observations, action: Array, scene: RunningScene) -> float:
-        """Calls the functions of `reward_terms` and returns the sum of their terms."""
-        task = episode.task
-        if not task.reward_terms:
-            return 0.0
-        info, counts = episode.info(scene.solver), episode.ending != STEP_FAILED
-        own = earn(task.reward_terms, task.layout, before, action, episode.observation, info, counts)
-        episode.reward_terms |= {name: float(term) for name, term in own.items()}
-        return float(sum(own.values()))
 
     def _park(self, s: int, simulation: Simulation, rovers: Sequence[int]) -> None:
         """Brakes rovers whose episodes have ended; wheels without gains to hold them turn freely."""
@@ -368,6 +349,17 @@ class JoinedBatch:
             with suppress(CommandError):
                 simulation.hold([model.dof_names[j] for j in joints])
         self._core.replace(s, simulation)
+
+
+def _earn_own(episode: JoinedEpisode, before: Observations, action: Array) -> float:
+    """Calls the functions of `reward_terms` and returns the sum of their terms."""
+    task = episode.task
+    if not task.reward_terms:
+        return 0.0
+    counts = episode.ending != STEP_FAILED
+    own = earn(task.reward_terms, task.layout, before, action, episode.observation, episode.info(), counts)
+    episode.reward_terms |= {name: float(term) for name, term in own.items()}
+    return float(sum(own.values()))
 
 
 def _moment(view: MachineView) -> Moment:

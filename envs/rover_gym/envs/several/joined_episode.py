@@ -25,8 +25,11 @@ STUCK_SPEED = 0.05
 #: Bounds of a period's progress (m), work (J), time (s) and ratios in the reward.
 MOST_PROGRESS, MOST_WORK, MOST_TIME, MOST_RATIO = 30.0, 4e5, 60.0, 2.0
 
-#: Terms of a period that fails.
+#: The only term of a period that fails.
 FAILURE = "failure"
+
+#: What `info` has of the solver before the first step.
+NOTHING_SOLVED: Mapping[str, Any] = {"status": "converged", "iterations": 0, "residual": 0.0, "n_contacts": 0}
 
 
 @dataclass(frozen=True)
@@ -36,10 +39,12 @@ class PeriodSums:
     Attributes:
         work: Work of each wheel's drive, (n_wheels,), J.
         impulses: Impulse of each other rover that touched this one, by name, (3,), world frame, N s.
+        solver: The entry `solver` of the info, without its message.
     """
 
     work: Array
     impulses: Mapping[str, Array]
+    solver: Mapping[str, Any]
 
 
 class JoinedEpisode:
@@ -74,6 +79,7 @@ class JoinedEpisode:
         self.clipped, self.ending, self.message = 0, "", ""
         self._reading = reading
         self._forces: dict[str, Array] = {}
+        self._solver = NOTHING_SOLVED
         self.observation = self._observe(reading, normals)
 
     @property
@@ -100,7 +106,8 @@ class JoinedEpisode:
         """
         approach = self.distance - float(reading.shared[-1])
         changes = (action - self.previous_action) ** 2
-        self.message, self._forces = message, {name: p / self.task.dt for name, p in sums.impulses.items()}
+        self.message, self._solver = message, sums.solver
+        self._forces = {name: p / self.task.dt for name, p in sums.impulses.items()}
         self.previous_action, self._reading = action, reading
         self.distance = float(reading.shared[-1])
         work = np.abs(sums.work).sum()
@@ -186,11 +193,11 @@ class JoinedEpisode:
             counts = name == FAILURE or not failed
             self.reward_terms[name] = float(weight * quantities[name]) + 0.0 if counts else 0.0  # no negative zero
 
-    def info(self, solver: dict[str, Any]) -> dict[str, Any]:
+    def info(self) -> dict[str, Any]:
         """The info of the last period, as `RoverEnv` has it, and `contact_forces`.
 
-        Args:
-            solver: The entry `solver`.
+        `contact_forces` are the mean forces of the other rovers that touched this one in the period, by name, (3,),
+        world frame, N.
         """
         reading, n_goals = self._reading, len(self.goals)
         info: dict[str, Any] = {
@@ -206,7 +213,7 @@ class JoinedEpisode:
             "difficulty": self.scene.difficulty,
             "domain": self.scene.domain.as_info(),
             "reward_terms": dict(self.reward_terms),
-            "solver": {**solver, "message": self.message, **({"status": "failed"} if self.message else {})},
+            "solver": {**self._solver, "message": self.message, **({"status": "failed"} if self.message else {})},
             "clipped_actions": self.clipped,
             "contact_forces": dict(self._forces),
         }

@@ -192,7 +192,7 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle)
             {agent: one.reward for agent, one in own.items()},
             {agent: one.terminated for agent, one in own.items()},
             {agent: one.truncated for agent, one in own.items()},
-            {agent: one.info for agent, one in own.items()},
+            {agent: self.batch.info(0, self.possible_agents.index(agent)) for agent in own},
         )
 
     def render(self) -> npt.NDArray[np.uint8] | None:

@@ -129,7 +129,11 @@ class RoversVecEnv(VecEnv):
             last = self._last.pop(i)
             seen = self._nothing() if each[i] is None else last.observation
             timed_out = last.truncated and not last.terminated
-            infos[i] = {**last.info, "TimeLimit.truncated": timed_out, "terminal_observation": seen}
+            infos[i] = {
+                **self.batch.info(*divmod(i, n)),
+                "TimeLimit.truncated": timed_out,
+                "terminal_observation": seen,
+            }
         over = np.flatnonzero(dones[::n]).tolist()
         for s in over:
             self.batch.reset(s)
