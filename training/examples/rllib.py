@@ -52,16 +52,19 @@ class Scene(MultiAgentEnv):  # type: ignore[misc]
         return observations, infos
 
     def step(self, actions: dict[str, Any]) -> tuple[Any, ...]:
-        """Holds the commands of the rovers whose episodes run; the scene ends with the last of them."""
+        """Holds the commands of the rovers whose episodes run; the scene ends with the last of them.
+
+        RLlib takes agents that are truncated one by one for terminated, so the time limit is one of the scene.
+        """
         observations, rewards, terminated, truncated, infos = self.scene.step(actions)
         self.agents = list(self.scene.agents)
-        over = not self.agents
-        ends = {**terminated, "__all__": over and not any(truncated.values())}
-        return observations, rewards, ends, {**truncated, "__all__": over and any(truncated.values())}, infos
+        is_cut = any(truncated.values())
+        ends = {**terminated, "__all__": not self.agents and not is_cut}
+        return observations, rewards, ends, {"__all__": is_cut}, infos
 
 
 def configuration(
-    workers: int, envs: int, batch: int, environment: dict[str, Any], seed: int, *, shares: bool
+    workers: int, envs: int, batch: int, environment: dict[str, Any], seed: int, *, shares: bool = False
 ) -> PPOConfig:
     """PPO over env runners that each step `envs` rovers or scenes, and that are replaced if they die.
 
