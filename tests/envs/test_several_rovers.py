@@ -10,7 +10,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 
 import rover_gym
-from rover_gym import RoverEnv
+from rover_gym import HeightField, RoverEnv
 from rover_gym.core import CommandError, ModelError, OptionError, RoverGymError, StateError, TerrainError
 from rover_gym.envs.sensors import DepthCamera, InertialUnit, LaserScanner
 
@@ -213,6 +213,25 @@ def test_rovers_drive_over_every_ground(terrain):
         _, _, terminated, *_ = env.step({a: np.full(env.action_space(a).shape, 0.3) for a in env.agents})
     assert not any(terminated.values())
     assert np.abs(env.simulation.q - start).max() > 0.1
+
+
+def test_a_rover_that_leaves_the_map_ends_the_episodes_of_all():
+    flat = HeightField(np.zeros((20, 20)), 0.5, origin=(-4.0, -4.0))
+    env = rover_gym.parallel_env(2, terrain=flat, heading_deg=0.0, starts=[(3.5, -1.0), (0.0, 2.0)])
+    goals = {"rover_0": {"goal": (5.0, -2.9)}, "rover_1": {"goal": (0.0, -2.0)}}
+    before, _ = env.reset(seed=0, options=goals)
+    while env.agents:
+        after, rewards, terminated, _, infos = env.step({"rover_0": forward(1.0), "rover_1": forward(0.0)})
+        before = before if terminated["rover_1"] else after
+    assert infos["rover_0"]["time"] < 5.0
+    for agent in env.possible_agents:
+        assert infos[agent]["termination"] == "step_failed"
+        assert infos[agent]["solver"]["status"] == "failed"
+        assert infos[agent]["solver"]["message"]
+        assert rewards[agent] == -10.0
+        np.testing.assert_array_equal(after[agent], before[agent])
+    env.reset(seed=0, options=goals)
+    assert env.agents == ["rover_0", "rover_1"]
 
 
 def test_rovers_of_different_models_have_spaces_of_their_own():
