@@ -11,6 +11,7 @@ import rover_gym  # noqa: F401 - registers the environments
 from rover_gym import RoverEnv
 from rover_gym.envs import RoverGrainsEnv
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.envs.several.pettingzoo_env import RoverParallelEnv
 from rover_gym.envs.tasks import RoverArcsEnv, RoverCommandEnv, RoverGoalEnv, RoverTrapEnv
 
 #: Environments whose docstring is a card, by name.
@@ -21,6 +22,7 @@ CARDS = {
     "RoverCommand-v0": RoverCommandEnv,
     "RoverGoal-v0": RoverGoalEnv,
     "RoverTrap-v0": RoverTrapEnv,
+    "rovers_v0": RoverParallelEnv,
 }
 
 #: The others: the task, and where the manual says more.

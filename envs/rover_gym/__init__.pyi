@@ -25,3 +25,4 @@ from .core import (
 )
 from .drive.pd.pd_policy import PDPolicy as PDPolicy
 from .envs.rover_env import RoverEnv as RoverEnv
+from .envs.several.making import parallel_env as parallel_env

@@ -23,6 +23,7 @@ EXTRAS = {
     "McapWriter": "mcap",
     "from_urdf": "yourdfpy",
     "from_mjcf": "mujoco",
+    "parallel_env": "pettingzoo",
     "scipy": "scipy",
     "stable_baselines3": "stable_baselines3",
     "torch_rollout": "torch",

@@ -116,7 +116,7 @@ def test_every_environment_has_a_card_and_is_named_in_gallery_and_contents(
     """Five of the registered environments had no card."""
     told = extension("cards").pages()
     names = {name: f"{name.lower()}.md" for name in ENVIRONMENTS}
-    assert set(names.values()) == told.keys()
+    assert {*names.values(), "rovers_v0.md"} == told.keys()  # PettingZoo's is not registered with Gymnasium
     assert all(told[file].startswith(f"# {name}\n") for name, file in names.items())
     contents, gallery = ((DOCS / name).read_text(encoding="utf-8") for name in ("index.md", "gallery.md"))
     assert [name for name in names if f"_generated/{name.lower()}\n" not in contents] == []

@@ -123,6 +123,13 @@ for ending in ("obj", "ply", "stl", "off", "glb"):
     TriangleMesh.from_file(f"ground.{ending}")
 rover("drive", "--terrain", "ground.stl", *BRIEFLY)
 """,
+    "agents": """
+import rover_gym
+
+env = rover_gym.parallel_env(2)
+env.reset(seed=0)
+env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+""",
     "planning": """
 rover("drive", "--difficulty", "1", "--policy", "planner", "--time-limit", "0.5")
 """,

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import ray
 from ray.cluster_utils import Cluster
+from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 from ray.rllib.env.single_agent_env_runner import SingleAgentEnvRunner
 
 from rover_gym import PDPolicy
@@ -159,7 +160,7 @@ def check_training(first: str, second: str, node: Any) -> None:
 
 
 def check_env_runner() -> None:
-    """An env runner has one vector of the core."""
+    """An env runner has one vector of the core, or scenes of several rovers."""
     sys.path.insert(0, str(ROOT / "training" / "examples"))
     import rllib  # noqa: PLC0415 - the example
 
@@ -171,6 +172,12 @@ def check_env_runner() -> None:
     episodes = runner.sample(num_timesteps=80, random_actions=True)
     assert sum(len(episode) for episode in episodes) >= 80
     assert any(episode.is_truncated for episode in episodes)
+    ray.tune.registry.register_env("Rover", rllib.Scene)
+    scenes = {"max_episode_steps": 20, "rovers": 3}
+    config = rllib.configuration(workers=0, envs=2, batch=128, environment=scenes, seed=1, shares=True)
+    episodes = MultiAgentEnvRunner(config=config).sample(num_timesteps=40)
+    assert {len(episode.agent_episodes) for episode in episodes} == {3}
+    assert any(episode.is_truncated and not episode.is_terminated for episode in episodes)
 
 
 def start() -> tuple[Cluster, Any]:

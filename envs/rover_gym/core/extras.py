@@ -7,6 +7,7 @@ from typing import Any
 PROJECTS = {
     "PIL": "Pillow",
     "imageio_ffmpeg": "imageio-ffmpeg",
+    "pettingzoo": "PettingZoo",
     "stable_baselines3": "stable-baselines3",
     "vtkmodules": "VTK",
     "yaml": "PyYAML",

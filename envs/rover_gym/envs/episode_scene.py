@@ -146,7 +146,9 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None, field: st
             refuse(
                 OptionError, f"{field}.goal", given["goal"], "must not be given together with goals, which contain it"
             )
-        fixed["goal"], *fixed["further"] = _course(task, f"{field}.goals", given["goals"])
+        fixed["goal"], *further = _course(task, f"{field}.goals", given["goals"])
+        if further:
+            fixed["further"] = further
 
     if "v" in given and "q" not in given:
         refuse(OptionError, f"{field}.v", given["v"], "must be given together with q")

@@ -326,14 +326,14 @@ def _steering_limit(rover: RoverModel, steering: Steering, asked_deg: float | No
     return min(limit, math.radians(asked_deg))
 
 
-def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+def check_actions(actions: object, shape: tuple[int, ...], field: str = "action") -> npt.NDArray[np.float64]:
     """Checks that actions `(n_actions,)` or `(n, n_actions)` are finite and returns a float64 copy."""
-    commands = array("action", actions, error=CommandError)
+    commands = array(field, actions, error=CommandError)
     if commands.shape != shape:
-        refuse(CommandError, "action", commands.shape, f"must have shape {shape}")
+        refuse(CommandError, field, commands.shape, f"must have shape {shape}")
     if not np.isfinite(commands).all():
         index = tuple(int(k) for k in np.argwhere(~np.isfinite(commands))[0])
-        refuse(CommandError, f"action[{', '.join(map(str, index))}]", commands[index], "must be finite")
+        refuse(CommandError, f"{field}[{', '.join(map(str, index))}]", commands[index], "must be finite")
     return commands
 
 
