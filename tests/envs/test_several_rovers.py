@@ -12,6 +12,7 @@ from gymnasium.error import ResetNeeded
 import rover_gym
 from rover_gym import HeightField, RoverEnv
 from rover_gym.core import CommandError, ModelError, OptionError, RoverGymError, StateError, TerrainError
+from rover_gym.envs import Normal
 from rover_gym.envs.sensors import DepthCamera, InertialUnit, LaserScanner
 
 pytest.importorskip("pettingzoo", reason="pip install 'rover-gym[agents]'")
@@ -268,6 +269,17 @@ def test_a_term_of_the_users_own_is_earned_by_each():
         assert rewards[agent] == pytest.approx(sum(terms.values()))
 
 
+def test_each_rover_has_wheels_of_its_own_and_all_have_one_friction():
+    env = rover_gym.parallel_env(2, wheel_radius_scale=(0.9, 1.0), friction=Normal(0.7, 0.05))
+    _, infos = env.reset(seed=3)
+    one, other = (infos[agent]["domain"] for agent in env.agents)
+    assert len({*one["wheel_radius_scale"], *other["wheel_radius_scale"]}) == 12
+    assert 0.55 < one["friction"] == other["friction"] != 0.7
+    radii = [wheel["contact_radius"] for wheel in env.simulation.model.to_dict()["wheels"]]
+    plain = [wheel["radius"] for wheel in rover_gym.RoverModel().to_dict()["wheels"]]
+    assert np.allclose(radii, np.concatenate([one["wheel_radius_scale"], other["wheel_radius_scale"]]) * (plain * 2))
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "field"),
     [
@@ -282,6 +294,8 @@ def test_a_term_of_the_users_own_is_earned_by_each():
         ({"threads": 0}, OptionError, "threads"),
         ({"sensors": []}, OptionError, "sensors"),
         ({"difficulty": 1.0}, OptionError, "difficulty"),
+        ({"command_delay": (0, 2)}, OptionError, "command_delay"),
+        ({"material_friction": {"ground": 0.3}}, OptionError, "material_friction"),
     ],
 )
 def test_arguments_are_refused_by_name(arguments, error, field):

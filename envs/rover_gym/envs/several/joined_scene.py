@@ -24,6 +24,8 @@ from rover_gym.core import (
 )
 from rover_gym.core.validation import known_keys, mapping, refuse, vector, whole
 from rover_gym.envs.arguments import MAX_WAYPOINTS, check_arguments, check_model
+from rover_gym.envs.distributions import sampled
+from rover_gym.envs.domain import OF_MODEL, Domain
 from rover_gym.envs.episode_scene import (
     FIELD_SEEDS,
     PLACING_ATTEMPTS,
@@ -32,7 +34,7 @@ from rover_gym.envs.episode_scene import (
     scene_of,
 )
 from rover_gym.envs.rover_env import RoverEnv
-from rover_gym.envs.start import Domain, Point, Start
+from rover_gym.envs.start import Point, Start
 from rover_gym.envs.task import Task, make_task
 from rover_gym.ground.terrain_parts import parts_of, plane_of, surfaces_of
 
@@ -134,6 +136,7 @@ class Team:
         self.agents = tuple(f"rover_{k}" for k in range(len(models)))
         self.given = check_arguments("parallel_env", {**arguments, "model": models[0]})
         self._check_number()
+        self._check_domain()
         self.loops = None if loops is None else list(loops)
         self.radii = [task.model.clear_radius for task in self.tasks]
         self.starts = self._row() if starts is None else self._check_starts(starts)
@@ -154,6 +157,12 @@ class Team:
         if self.n > most:
             reason = f"must be at most {most} with {self.given['waypoints']} goals each"
             refuse(OptionError, "rovers", self.n, reason)
+
+    def _check_domain(self) -> None:
+        for name, (own, _) in self.tasks[0].domain.further.items():
+            if name not in OF_MODEL:
+                argument = name.partition(".")[0]
+                refuse(OptionError, argument, own, "is not known in scenes of several rovers; it must be the default")
 
     def _row(self) -> list[Point]:
         """Starts along z, so far apart that each rover has room to turn."""
@@ -225,12 +234,13 @@ class Team:
     def _draw_once(self, random: np.random.Generator, options: TeamOptions) -> JoinedScene:
         starts = [self._draw_start(k, random, options.rovers[k]) for k in range(self.n)]
         self._check_goals_apart(starts, options)
-        layout = self._lay_out(starts, int(random.integers(FIELD_SEEDS)), options.shared)
+        layout = self._lay_out(starts, random, options.shared)
         rovers = []
-        for drawn in starts:
+        for drawn, task in zip(starts, self.tasks, strict=True):
             start = replace(drawn, slope=layout.start.slope, uphill=layout.start.uphill)
-            mass, gain = (float(random.uniform(*self.given[name])) for name in ("mass_scale", "actuator_gain"))
-            domain = replace(layout.domain, mass_scale=mass, actuator_gain=gain)
+            mass, gain = (float(sampled(random, self.given[name])) for name in ("mass_scale", "actuator_gain"))
+            _, further = task.domain.draw(random)
+            domain = replace(layout.domain, mass_scale=mass, actuator_gain=gain, further=further)
             rovers.append(EpisodeScene(start, layout.terrain, layout.rocks, domain))
         return self._place(tuple(rovers), options)
 
@@ -258,7 +268,7 @@ class Team:
             if math.hypot(c - a, d - b) < self.radii[i] + self.radii[k]:
                 raise TerrainError(f"the goals of {self.agents[i]} and {self.agents[k]} are too close to each other")
 
-    def _lay_out(self, starts: Sequence[Start], seed: int, shared: Mapping[str, Any]) -> EpisodeScene:
+    def _lay_out(self, starts: Sequence[Start], random: np.random.Generator, shared: Mapping[str, Any]) -> EpisodeScene:
         """Draws the ground with room at all starts and goals.
 
         Raises:
@@ -270,10 +280,13 @@ class Team:
         fixed = {**shared, "position": first, "heading": starts[0].heading, "goal": places[0], "further": further}
         simulation = Simulation(task.model, Plane(), **task.simulation_options)
         episodes = EpisodeBatch(task.rules, simulation, 1, threads=1)
-        drawn = episodes.draw(task.episodes, seed_generators([seed]), attempts=1, fixed=fixed)
+        ranges, _ = task.domain.draw(random)
+        distribution = task.episodes_in(Domain(1.0, ranges["friction"][0], 1.0, 1.0), ranges)
+        seed = int(random.integers(FIELD_SEEDS))
+        drawn = episodes.draw(distribution, seed_generators([seed]), attempts=1, fixed=fixed)
         episodes.begin([0], drawn)
         terrain = episodes.terrain(0) if task.ground is None else task.ground
-        return scene_of(task, *episodes.origin(0), terrain)
+        return scene_of(task, episodes.origin(0), terrain, {})
 
     def _place(self, rovers: tuple[EpisodeScene, ...], options: TeamOptions) -> JoinedScene:
         """Places the rovers on their starts.
@@ -285,12 +298,14 @@ class Team:
         models, q, v = [], [], []
         for task, scene, fixed in zip(self.tasks, rovers, options.rovers, strict=True):
             scale, start = scene.domain.mass_scale, scene.start
-            model = task.model if scale == 1.0 else task.model.replace(mass_scale=scale)
+            model = scene.domain.model_of(task.model)
+            model = model if scale == 1.0 else model.replace(mass_scale=scale)
             models.append(model)
             resting = "q" not in fixed
             q.append(model.resting_pose(_firm(terrain), start.position, start.heading) if resting else fixed["q"])
             v.append(fixed.get("v", np.zeros(model.nv)))
-        joined = self.model if all(s.domain.mass_scale == 1.0 for s in rovers) else self._join(models)
+        is_own = all(model is task.model for model, task in zip(models, self.tasks, strict=True))
+        joined = self.model if is_own else self._join(models)
         simulation = self._simulate(joined, terrain, rovers[0].domain)
         simulation.set_state(*joined.close_loops(np.concatenate(q), np.concatenate(v)))
         self._check_room(simulation)

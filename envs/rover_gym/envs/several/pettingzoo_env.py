@@ -61,8 +61,8 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle)
     The rovers start in a row along z, with room to turn, or at `starts`; `heading_deg`, `goal_distance` and
     `goal_bearing_deg` are drawn for each. Final goals lie far enough apart for all rovers to reach them. Rocks leave
     room at every start and goal, and on hills a way leads from one to the next. The size of rocks is that among rovers
-    of the model that needs most room. `mass_scale` and `actuator_gain` are drawn for each rover, all other properties
-    for the scene.
+    of the model that needs most room. Friction and gravity are drawn for the scene, all other properties for each
+    rover. Faults of commands, `soil_scale` and `material_friction` are refused.
 
     `reset(options=...)` fixes `difficulty`, `field_seed`, `slope_deg` and `uphill_deg` of the scene, and under an
     agent's name `position`, `heading_deg`, `goal`, `goals`, `map_position`, `map_goal`, `q` and `v` of its rover:
