@@ -1,6 +1,6 @@
 """`rover benchmark`: scores policies on fixed sets, and puts them beside this package's policies."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -42,7 +42,9 @@ def benchmark(
     sets: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", help="A set; repeat it for several. Default: all.", autocompletion=lambda: list(benchmark_sets()[1])
+            "--set",
+            help="A set; repeat it for several. Default: all.",
+            autocompletion=lambda: list(benchmark_sets()[1]),
         ),
     ] = None,
     episodes: Annotated[
@@ -128,7 +130,7 @@ def _shown(policy: str) -> Iterator[Any]:
         yield partial(_show, bar, policy, {})
 
 
-def _show(bar: Progress, policy: str, tasks: dict[str, Any], name: str, done: int, of: int) -> None:
+def _show(bar: Progress, policy: str, tasks: dict[str, Any], name: str, of: int, done: int) -> None:
     if name not in tasks:
         tasks[name] = bar.add_task(f"{policy}, {name}", total=of, state="")
     bar.update(tasks[name], completed=done, state=f"{done} of {of}")

@@ -5,6 +5,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from rover_gym.core import OptionError, RoverModel, TerrainError
 from rover_gym.core.files import write_whole
-from rover_gym.core.validation import number, refuse, regular_file
+from rover_gym.core.validation import known_keys, number, refuse, regular_file
 from rover_gym.drive.benchmark_sets import BENCHMARK, BenchmarkSet, benchmark_sets
 from rover_gym.drive.commands.driven import Policy
 from rover_gym.drive.evaluation import EvaluatedEpisode, drive_each, timed
@@ -68,7 +69,9 @@ class Interface:
     def __post_init__(self) -> None:
         for name in self.arguments:
             if name in ARGUMENTS and name not in OWN_ARGUMENTS:
-                refuse(OptionError, f"argument.{name}", self.arguments[name], "is part of the sets and not of the policy")
+                refuse(
+                    OptionError, f"argument.{name}", self.arguments[name], "is part of the sets and not of the policy"
+                )
 
     def of(self, named: NamedPolicy) -> dict[str, Any]:
         """All that the policy chooses: what it needs, and what was given."""
@@ -214,7 +217,12 @@ def _repeat(frequency: object, environment: str) -> int:
     given = number("control_frequency", frequency, above=0.0)
     repeat = round(FREQUENCY / given)
     if repeat < 1 or not math.isclose(repeat * given, FREQUENCY) or (repeat > 1 and environment != ROVER):
-        refuse(OptionError, "control_frequency", frequency, f"must be {FREQUENCY:g} Hz, with {ROVER} also over a whole number")
+        refuse(
+            OptionError,
+            "control_frequency",
+            frequency,
+            f"must be {FREQUENCY:g} Hz, with {ROVER} also over a whole number",
+        )
     return repeat
 
 
@@ -255,7 +263,13 @@ class BenchmarkResult:
         Raises:
             OSError: It cannot be written.
         """
-        head = {"format": FORMAT, "benchmark": self.benchmark, "policy": self.policy, "key": self.key, "made": self.made}
+        head = {
+            "format": FORMAT,
+            "benchmark": self.benchmark,
+            "policy": self.policy,
+            "key": self.key,
+            "made": self.made,
+        }
         lines = [f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in head.items()]
         sets = ",\n".join(_set_lines(name, one) for name, one in self.sets.items())
         write_whole(path, "{\n" + ",\n".join([*lines, f'  "sets": {{\n{sets}\n  }}']) + "\n}\n")
@@ -269,17 +283,18 @@ class BenchmarkResult:
             OSError: It cannot be read.
         """
         file = regular_file(path, error=OptionError)
+        expected = {"format": FORMAT, "benchmark": benchmark_sets()[0]}
         try:
             read = json.loads(file.read_text(encoding="utf-8"))
-            versions = read["format"], read["benchmark"]
-            expected = FORMAT, benchmark_sets()[0]
-            if versions == expected:
-                sets = {name: _read_set(one) for name, one in read["sets"].items()}
-                return cls(str(read["policy"]), dict(read["key"]), dict(read["made"]), sets)
+            found = {name: read[name] for name in expected}
+            sets = {name: _read_set(one) for name, one in read["sets"].items()} if found == expected else {}
+            result = cls(str(read["policy"]), dict(read["key"]), dict(read["made"]), sets)
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
             refuse(OptionError, "results", str(path), f"must be a file of `rover benchmark` ({error!r})")
-        reason = "must have format {} and version {} of the benchmark, not {} and {}".format(*expected, *versions)
-        refuse(OptionError, "results", str(path), reason)
+        for name, version in expected.items():
+            if found[name] != version:
+                refuse(OptionError, f"results.{name}", found[name], f"must be {version}, the version of this package")
+        return result
 
 
 #: Columns of an episode in a file of results.
@@ -307,7 +322,9 @@ def _read_set(given: Mapping[str, Any]) -> ScoredSet:
     if "refused" in given:
         return ScoredSet(refused=str(given["refused"]))
     rows = (dict(zip(given["columns"], row, strict=True)) for row in given["episodes"])
-    return ScoredSet(tuple(ScoredEpisode(**{key: math.nan if one is None else one for key, one in row.items()}) for row in rows))
+    return ScoredSet(
+        tuple(ScoredEpisode(**{key: math.nan if one is None else one for key, one in row.items()}) for row in rows)
+    )
 
 
 def score(
@@ -318,7 +335,7 @@ def score(
     *,
     names: tuple[str, ...] = (),
     episodes: int | None = None,
-    progress: Callable[[str, int, int], None] = lambda _name, _done, _n: None,
+    progress: Callable[[str, int, int], None] = lambda _name, _of, _done: None,
 ) -> BenchmarkResult:
     """Drives a policy through the sets that its file lacks, and writes the file after each.
 
@@ -329,32 +346,29 @@ def score(
         interface: How the policy meets the rover.
         names: Names of the sets; all by default.
         episodes: The first so many episodes of each; None for all.
-        progress: Called with the set, its episodes done and their number.
+        progress: Called with the set, the number of its episodes, and how many are done.
 
     Raises:
         OptionError: There is no such set, or the policy fits none.
         OSError: The file cannot be written.
     """
     _, known = benchmark_sets()
-    for name in names:
-        if name not in known:
-            refuse(OptionError, "set", name, f"must be one of {', '.join(known)}")
-    for name in names or known:
-        seeds = known[name].seeds(episodes)
-        kept = result.sets.get(name)
-        if kept is not None and kept.refused is None and len(kept.episodes) >= len(seeds):
+    known_keys("set", names, known)
+    chosen = {name: known[name] for name in names or known}
+    for name, one in chosen.items():
+        n = len(one.seeds(episodes))
+        if name in result.sets and len(result.sets[name].episodes) >= n:
             continue
+        show = partial(progress, name, n)
         try:
-            driven = score_set(
-                known[name], policy, interface, episodes=episodes, progress=lambda n, name=name, of=len(seeds): progress(name, n, of)
-            )
+            driven = score_set(one, policy, interface, episodes=episodes, progress=show)
             result.sets[name] = ScoredSet(tuple(driven))
         except (PolicyError, OptionError) as error:
             result.sets[name] = ScoredSet(refused=str(error))
         result.write(path)
-    refused = [result.sets[name].refused for name in names or known]
+    refused = [result.sets[name].refused for name in chosen]
     if None not in refused:
-        refuse(OptionError, "policy", result.policy, f"fits none of the sets ({refused[0]})")
+        refuse(OptionError, "policy", result.policy, f"must fit one of the sets ({refused[0]})")
     return result
 
 

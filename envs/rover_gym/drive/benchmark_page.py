@@ -16,8 +16,9 @@ NOTHING = "-"
 
 
 def benchmark_page(results: Sequence[BenchmarkResult]) -> str:
-    """The page of results: success on all sets, the figures of each set, and what made them."""
+    """The page of results, the best first: success on all sets, the figures of each set, and what made them."""
     version, sets = benchmark_sets()
+    results = sorted(results, key=_rank)
     parts = [f"# Benchmark, version {version}", WORDS, in_markdown(success_table(results))]
     for one in sets.values():
         table = set_table(one, results)
@@ -29,10 +30,10 @@ def benchmark_page(results: Sequence[BenchmarkResult]) -> str:
 
 
 #: What the columns mean.
-WORDS = """Success in percent with Wilson's 95% interval. *Mean* is the mean over all sets. Other intervals are 95%, too: time
-is that of the episodes that reached the goal, energy is the work of the wheel motors over the way driven, slip is the mean
-over an episode. *Peak impulse* is the largest impulse of the ground on the rover in 0.05 s over that of its weight, 1 at rest.
-Decisions: processor time, median and 99%, each the median over the episodes."""
+WORDS = """Success in percent with Wilson's 95% interval; *mean* is the mean over all sets. The other intervals are 95%,
+too. Time is that of the episodes that reached the goal, energy the work of the wheel motors over the way driven, slip
+the mean over an episode. *Peak impulse* is the largest impulse of the ground on the rover in 0.05 s over that of its
+weight: 1 at rest. *Decision* is processor time, median and 99%, each the median over the episodes."""
 
 
 def success_table(results: Sequence[BenchmarkResult]) -> Table:
@@ -41,25 +42,50 @@ def success_table(results: Sequence[BenchmarkResult]) -> Table:
     table: Table = [("policy", *sets, "mean")]
     for result in results:
         driven = [result.sets.get(name, ScoredSet()).episodes for name in sets]
-        shares = [sum(episode.success for episode in one) / len(one) for one in driven if one]
-        mean = f"{100.0 * sum(shares) / len(shares):.1f}" if len(shares) == len(sets) else NOTHING
-        table.append((f"`{result.policy}`", *map(_success, driven), mean))
+        mean = mean_success(result)
+        table.append((result.policy, *map(_success, driven), NOTHING if mean is None else f"{100.0 * mean:.1f}"))
     return table
+
+
+def mean_success(result: BenchmarkResult) -> float | None:
+    """Mean over the sets of the share of episodes that succeeded; None where a set was not driven."""
+    _, sets = benchmark_sets()
+    driven = [result.sets.get(name, ScoredSet()).episodes for name in sets]
+    if not all(driven):
+        return None
+    return sum(sum(episode.success for episode in one) / len(one) for one in driven) / len(driven)
+
+
+def _rank(result: BenchmarkResult) -> tuple[float, str]:
+    """Sorts by the mean success, the best first, then by name."""
+    mean = mean_success(result)
+    return (1.0 if mean is None else -mean, result.policy)
 
 
 def set_table(one: BenchmarkSet, results: Sequence[BenchmarkResult]) -> Table:
     """The figures of each policy that has driven a set."""
-    heads = ("policy", "episodes", "time to goal, s", "energy, J/m", "slip", "peak impulse", "decision, ms", "other ends")
+    heads = (
+        "policy",
+        "episodes",
+        "time to goal, s",
+        "energy, J/m",
+        "slip",
+        "peak impulse",
+        "decision, ms",
+        "other ends",
+    )
     table: Table = [heads]
     for result in results:
         episodes = result.sets.get(one.name, ScoredSet()).episodes
         if not episodes:
             continue
         row = summarise(result.policy, episodes)
-        decisions = (sorted(getattr(episode, name) for episode in episodes) for name in ("decision_median", "decision_99"))
+        decisions = (
+            sorted(getattr(episode, name) for episode in episodes) for name in ("decision_median", "decision_99")
+        )
         table.append(
             (
-                f"`{result.policy}`",
+                result.policy,
                 str(len(episodes)) if len(episodes) == one.episodes else f"{len(episodes)} of {one.episodes}",
                 interval_cell(row.time, ".1f"),
                 interval_cell(row.energy_per_metre, ".0f"),
@@ -78,8 +104,14 @@ def made_table(results: Sequence[BenchmarkResult]) -> Table:
     for result in results:
         made, key = result.made, result.key
         revision = str(made.get("revision") or NOTHING)[:10]
-        cells = (key.get("policy"), _interface(key), made.get("versions", {}).get("rover-gym"), revision, made.get("machine"))
-        table.append((f"`{result.policy}`", *(str(cell or NOTHING) for cell in cells)))
+        cells = (
+            key.get("policy"),
+            _interface(key),
+            made.get("versions", {}).get("rover-gym"),
+            revision,
+            made.get("machine"),
+        )
+        table.append((result.policy, *(str(cell or NOTHING) for cell in cells)))
     return table
 
 

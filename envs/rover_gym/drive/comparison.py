@@ -238,6 +238,7 @@ def in_markdown(table: Sequence[Sequence[str]]) -> str:
 
 
 def interval_cell(estimate: IntervalEstimate, form: str, factor: float = 1.0) -> str:
+    """An estimate as a cell of a table, with half its interval."""
     if math.isnan(estimate.value):
         return "-"
     value, half = factor * estimate.value, 0.5 * factor * (estimate.interval[1] - estimate.interval[0])

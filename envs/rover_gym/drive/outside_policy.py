@@ -86,9 +86,8 @@ class FunctionPolicy:
 class OnnxPolicy:
     """A network in an ONNX file as a policy; needs the extra `onnx`.
 
-    The inputs of the graph have the environment's observations as `(n, ...) float32`: a single one whatever its name, or
-    one for each part of a dictionary, by its name. The first output is `(n, n_actions)`, or a score for each discrete
-    action, of which the largest is chosen.
+    The graph has one input of observations `(n, size) float32`, or for dictionaries an input of each part by its name.
+    Its first output is `(n, n_actions)`. If actions are discrete, it has a score for each, and the largest is chosen.
 
     Args:
         env: The environment.
@@ -163,4 +162,6 @@ def onnx_arguments(path: Path) -> dict[str, Any]:
 
 def _fits(shape: tuple[Any, ...], wanted: tuple[int, ...]) -> bool:
     """Whether a shape of a graph, whose sizes may be names, can be another one."""
-    return len(shape) == len(wanted) and all(a == b or not isinstance(a, int) for a, b in zip(shape, wanted, strict=True))
+    return len(shape) == len(wanted) and all(
+        a == b or not isinstance(a, int) for a, b in zip(shape, wanted, strict=True)
+    )
