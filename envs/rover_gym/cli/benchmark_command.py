@@ -63,8 +63,8 @@ def benchmark(
     """Score policies on fixed sets: rocks, hills, sand, traps, maps, three rovers.
 
     Writes NAME.json with every episode for each policy, and a page that has the policies of this package beside them.
-    A later call into the same folder drives only the sets that are missing, unless the policy's files, the package's
-    policies or its compiled core have changed. Episodes are driven one after the other, on one core.
+    A later call into the same folder drives only the episodes that are missing, unless the policy's files, the
+    package's policies or its compiled core have changed. Episodes are driven one after the other, on one core.
 
     The environment and its arguments are those that the policy observes and acts by, such as height_scan=true; ground,
     rover and time limit belong to the sets. `rover train` refuses the seeds of the sets, and one of the rovers.

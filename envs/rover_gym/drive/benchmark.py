@@ -151,7 +151,7 @@ def score_set(
     policy: Callable[[RoverModel | None], NamedPolicy],
     interface: Interface | None = None,
     *,
-    episodes: int | None = None,
+    seeds: range | None = None,
     progress: Callable[[int], None] = lambda _done: None,
 ) -> list[ScoredEpisode]:
     """Drives a policy through a set, one episode after the other.
@@ -160,7 +160,7 @@ def score_set(
         one: The set.
         policy: Gives the policy for a rover.
         interface: How the policy meets the rover.
-        episodes: The first so many episodes; None for all.
+        seeds: Seeds of the set that are driven; None for all.
         progress: Called with the number of episodes done.
 
     Raises:
@@ -174,13 +174,13 @@ def score_set(
     own = meets.of(named)
     repeat = _repeat(own.pop("control_frequency", FREQUENCY), meets.environment)
     found: list[ScoredEpisode] = []
-    for arguments, seeds in one.scenes(episodes):
+    for arguments, driven in one.scenes(one.seeds() if seeds is None else seeds):
         name = one.environment if meets.environment == ROVER else meets.environment
         made = gym.make(name, max_episode_steps=-1, **{**arguments, **own})
         env = timed(HeldActions(made, repeat) if repeat > 1 else made, one.seconds)
         try:
             driver = named.make(env)
-            for seed in seeds:
+            for seed in driven:
                 found.append(_score(env, driver, one, seed))
                 progress(len(found))
         finally:
@@ -337,16 +337,16 @@ def score(
     episodes: int | None = None,
     progress: Callable[[str, int, int], None] = lambda _name, _of, _done: None,
 ) -> BenchmarkResult:
-    """Drives a policy through the sets that its file lacks, and writes the file after each.
+    """Drives the episodes that a policy's file lacks, and writes the file after each set.
 
     Args:
-        result: What is known of the policy before; its sets are kept as far as they have the episodes asked for.
+        result: What is known of the policy, whose episodes are kept.
         path: The file to write.
         policy: Gives the policy for a rover.
         interface: How the policy meets the rover.
         names: Names of the sets; all by default.
         episodes: The first so many episodes of each; None for all.
-        progress: Called with the set, the number of its episodes, and how many are done.
+        progress: Called with the set, the number of episodes that it lacked, and how many are done.
 
     Raises:
         OptionError: There is no such set, or the policy fits none.
@@ -356,13 +356,13 @@ def score(
     known_keys("set", names, known)
     chosen = {name: known[name] for name in names or known}
     for name, one in chosen.items():
-        n = len(one.seeds(episodes))
-        if name in result.sets and len(result.sets[name].episodes) >= n:
+        kept = result.sets.get(name, ScoredSet()).episodes
+        missing = one.seeds(episodes)[len(kept) :]
+        if not missing:
             continue
-        show = partial(progress, name, n)
         try:
-            driven = score_set(one, policy, interface, episodes=episodes, progress=show)
-            result.sets[name] = ScoredSet(tuple(driven))
+            driven = score_set(one, policy, interface, seeds=missing, progress=partial(progress, name, len(missing)))
+            result.sets[name] = ScoredSet((*kept, *driven))
         except (PolicyError, OptionError) as error:
             result.sets[name] = ScoredSet(refused=str(error))
         result.write(path)

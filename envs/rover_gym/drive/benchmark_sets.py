@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -60,15 +61,16 @@ class BenchmarkSet:
         named = self.arguments.get("model")
         return None if named is None else open_model(named)
 
-    def scenes(self, most: int | None = None) -> list[tuple[dict[str, Any], range]]:
-        """The arguments of each environment of the set, and the seeds that are driven in it."""
+    def scenes(self, seeds: range) -> list[tuple[dict[str, Any], range]]:
+        """The arguments of each environment that the seeds need, and those that are driven in it."""
         model = {} if self.model is None else {"model": self.rover()}
         given = {name: tuple(one) if isinstance(one, list) else one for name, one in self.arguments.items()} | model
-        seeds = self.seeds(most)
         if self.maps is None:
             return [(given, seeds)]
         n = self.episodes_per_map
-        return [({**given, "terrain": self._map(k // n)}, seeds[k : k + n]) for k in range(0, len(seeds), n)]
+        blocks = groupby(seeds, lambda seed: (seed - self.seed) // n)
+        of_maps = [(k, list(block)) for k, block in blocks]
+        return [({**given, "terrain": self._map(k)}, range(block[0], block[-1] + 1)) for k, block in of_maps]
 
     def places(self, seed: int) -> Iterable[dict[str, Any]]:
         """Reset options to try one after the other until the rover has room: starts on a map."""
