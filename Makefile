@@ -160,6 +160,10 @@ policies: $(STAMPS)/release ## success, time and energy of the package's policie
 	$(MEASURE) comparison.policies
 	$(COMPARE).headlines
 
+benchmark: $(STAMPS)/release ## score the package's policies by `rover benchmark`: their results in envs/, docs/tables/benchmark.md (an hour of one core)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/rover benchmark pd scan anywhere guided $(BENCHMARK) \
+		--output envs/rover_gym/data/benchmark/results --page docs/tables/benchmark.md
+
 chart-gpu: $(STAMPS)/test $(MODULE) ## rovers a second and error on a graphics card, where there is one: docs/comparison/gpu.json, docs/many-rovers.md
 	$(MEASURE) comparison.gpu_chart
 	$(COMPARE).headlines

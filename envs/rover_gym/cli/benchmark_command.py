@@ -86,7 +86,7 @@ def benchmark(
                 results.append(_scored(policy, path, interface, tuple(sets or ()), episodes))
                 said.path("results", path)
         except KeyboardInterrupt:
-            typer.echo("interrupted: the next call goes on with the sets that are missing", err=True)
+            typer.echo("interrupted: the next call goes on after the sets that are done", err=True)
             raise typer.Exit(INTERRUPTED) from None
         shown = [*results, *(one for one in baselines() if one.policy not in names)]
         write_whole(page, benchmark_page(shown))

@@ -3,7 +3,7 @@
 import json
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import partial
 from pathlib import Path
@@ -321,7 +321,7 @@ def _read_set(given: Mapping[str, Any]) -> ScoredSet:
     """A set of a file of results."""
     if "refused" in given:
         return ScoredSet(refused=str(given["refused"]))
-    rows = (dict(zip(given["columns"], row, strict=True)) for row in given["episodes"])
+    rows: Iterator[dict[str, Any]] = (dict(zip(given["columns"], row, strict=True)) for row in given["episodes"])
     return ScoredSet(
         tuple(ScoredEpisode(**{key: math.nan if one is None else one for key, one in row.items()}) for row in rows)
     )

@@ -83,7 +83,7 @@ class BenchmarkSet:
 
     def _map(self, k: int) -> HeightField:
         assert self.maps is not None  # noqa: S101 - only sets with maps ask
-        given = {name: tuple(one) if isinstance(one, list) else one for name, one in self.maps.items()}
+        given: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in self.maps.items()}
         return fractal_map(**given, seed=self.seed + k)
 
 

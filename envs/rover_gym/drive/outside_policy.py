@@ -52,12 +52,13 @@ def object_policy(found: Any, env: Any) -> Any:
     Raises:
         PolicyError: The class makes objects without `predict`.
     """
-    made = found(env) if inspect.isclass(found) else found
+    is_class = inspect.isclass(found)
+    made: Any = found(env) if is_class else found
     if callable(getattr(made, "predict", None)):
         return made
-    if made is not found:
-        refuse(PolicyError, "policy", found.__name__, "must be a class of objects with `predict`")
-    return FunctionPolicy(found, env.observation_space)
+    if is_class:
+        refuse(PolicyError, "policy", type(made).__name__, "must be a class of objects with `predict`")
+    return FunctionPolicy(made, env.observation_space)
 
 
 class FunctionPolicy:
@@ -102,12 +103,13 @@ class OnnxPolicy:
     def __init__(self, env: gym.Env[Any, Any], path: Path) -> None:
         self._session = onnx_session(path)
         self._actions, space = env.action_space, env.observation_space
+        self._shapes: dict[str, tuple[int, ...]]
         inputs = {one.name: tuple(one.shape[1:]) for one in self._session.get_inputs()}
         if isinstance(space, gym.spaces.Dict):
-            wanted = {name: part.shape for name, part in space.items()}
+            self._shapes = {name: part.shape or () for name, part in space.items()}
         else:
-            wanted = dict.fromkeys(inputs if len(inputs) == 1 else ("observation",), space.shape)
-        self._shapes = wanted
+            self._shapes = dict.fromkeys(inputs if len(inputs) == 1 else ("observation",), space.shape or ())
+        wanted = self._shapes
         if inputs.keys() != wanted.keys() or not all(_fits(inputs[name], wanted[name]) for name in inputs):
             refuse(PolicyError, "policy", str(path), f"has inputs {inputs}, but the environment's are {wanted}")
         n_out = self._actions.n if isinstance(self._actions, gym.spaces.Discrete) else self._actions.shape[0]  # type: ignore[index]
