@@ -13,7 +13,7 @@ import pytest
 from commands import error_of, output_of, rover
 from refusals import refused
 
-from rover_gym import OptionError, PDPolicy, RoverModel
+from rover_gym import OptionError, PDPolicy, RoverEnv, RoverModel
 from rover_gym.drive import (
     HELD_BACK_SEEDS,
     BenchmarkResult,
@@ -80,8 +80,6 @@ def test_the_first_episode_of_a_set_is_as_ever(name: str) -> None:
     assert place == pytest.approx(PLACES[name], abs=1e-6)
 
 
-
-
 def test_a_policy_drives_as_it_does_in_an_evaluation() -> None:
     found = score_set(SHORT, by_name("pd"))
     ((arguments, seeds),) = SHORT.scenes(SHORT.seeds())
@@ -102,11 +100,12 @@ def test_the_impulse_of_the_ground_is_that_of_all_contacts() -> None:
     weight = simulation.model.mass * 9.81 * env.unwrapped.dt
     for _ in range(300):
         observation, _, terminated, _, _ = env.step(policy.predict(observation)[0])
-        contacts = env.unwrapped.simulation.contacts()
+        contacts = env.unwrapped.simulation.contacts
         given = np.einsum("nij,ni->j", contacts.frames, contacts.impulses)
         largest = max(largest, float(np.linalg.norm(given)) / weight)
         assert not terminated
-    assert peak.largest == pytest.approx(largest, rel=1e-6)
+    # The scheme's momenta are those of the configuration at the beginning of a step.
+    assert peak.largest == pytest.approx(largest, rel=2e-3)
     assert largest > 1.5
 
 
@@ -138,7 +137,7 @@ def test_a_policy_chooses_what_it_sees_but_not_the_ground() -> None:
     brief = BenchmarkSet("brief", "Rover-v0", {}, seed=1, episodes=1, seconds=1.0)
     (episode,) = score_set(brief, lambda _model: named)
     assert (episode.end, episode.time, len(sizes)) == ("time", pytest.approx(1.0), 5)
-    assert set(sizes) == {79 + 12}
+    assert set(sizes) == {RoverEnv().observation_layout.size + 12}
     with refused(OptionError, "argument.friction"):
         Interface(arguments={"friction": 0.9})
     with refused(OptionError, "control_frequency"):
@@ -150,11 +149,12 @@ def test_a_policy_chooses_what_it_sees_but_not_the_ground() -> None:
 def test_every_map_has_a_seed_of_its_own_and_starts_apart() -> None:
     one = SETS["maps"]
     scenes = one.scenes(one.seeds())
+    points = np.random.default_rng(1).uniform(-30.0, 30.0, (50, 2))
     assert [len(seeds) for _, seeds in scenes] == [one.episodes_per_map] * 5
-    a, b = (scene["terrain"].heights for scene, _ in scenes[:2])
+    a, b = (scene["terrain"].heights(points) for scene, _ in scenes[:2])
     assert np.abs(a - b).max() > 0.1
     (again, _), *_ = one.scenes(range(one.seed + 3, one.seed + 5))
-    np.testing.assert_array_equal(again["terrain"].heights, a)
+    np.testing.assert_array_equal(again["terrain"].heights(points), a)
     starts = [next(iter(one.places(seed)))["position"] for seed in one.seeds()]
     assert len(set(starts)) == one.episodes
     assert max(abs(x) for start in starts for x in start) <= one.starts
@@ -309,7 +309,7 @@ def test_the_command_writes_results_and_a_page_beside_ours(tmp_path: Path, monke
     assert told["version"] == VERSION
     rows = {row["policy"]: row for row in told["success"]}
     assert rows["my_driver.crawl"]["unknown-rocks"].startswith("0 (0 to ")
-    assert rows.keys() >= {"my_driver.crawl", "pd", "scan"}
+    assert rows.keys() == {"my_driver.crawl", *(one.policy for one in baselines())}
     page = Path("results/benchmark.md").read_text(encoding="utf-8")
     assert "| my_driver.crawl | 1 of 50 |" in page
     result = BenchmarkResult.read("results/my_driver.crawl.json")
