@@ -21,7 +21,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench benchmark chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
