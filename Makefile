@@ -21,7 +21,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench benchmark chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -159,6 +159,10 @@ chart: $(STAMPS)/release $(STAMPS)/peers $(STAMPS)/debian-peers ## error against
 policies: $(STAMPS)/release ## success, time and energy of the package's policies: docs/comparison/policies.json, docs/policy-results.md (an hour)
 	$(MEASURE) comparison.policies
 	$(COMPARE).headlines
+
+benchmark: $(STAMPS)/release ## score the package's policies by `rover benchmark`: their results in envs/, docs/tables/benchmark.md (an hour of one core)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/rover benchmark pd scan anywhere guided $(BENCHMARK) \
+		--output envs/rover_gym/data/benchmark/results --page docs/tables/benchmark.md
 
 chart-gpu: $(STAMPS)/test $(MODULE) ## rovers a second and error on a graphics card, where there is one: docs/comparison/gpu.json, docs/many-rovers.md
 	$(MEASURE) comparison.gpu_chart

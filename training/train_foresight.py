@@ -22,6 +22,7 @@ from rich.progress import Progress, TaskID
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
 from rover_gym.cli.options import BUILT_IN, ModelName, named_model
 from rover_gym.drive import FORECAST_FILE, ScanPolicy
+from rover_gym.drive.benchmark_sets import check_training_model
 from rover_gym.learn.fit_forecast import ArcOutcomes, fit_forecast, try_arcs
 from rover_gym.learn.provenance import provenance
 
@@ -50,6 +51,7 @@ def train(
     """Train a forecast and write it."""
     folder = output or Path("runs") / "train" / f"foresight-seed{seed}"
     scenes = SCENES if model == BUILT_IN else (({"terrain": "rocks", "difficulty": (1.0, 2.0), "model": model}, 1.0),)
+    check_training_model(None if model == BUILT_IN else model)
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
     clock = time.process_time()

@@ -18,7 +18,7 @@ The package consists of the subpackages below. Each one may import those above i
     drive.scan       the policy that plans over the height scan
     drive.arcs       policies that choose among its arcs by a network
     drive.planning   the policy that plans with the simulator itself
-    drive            policies by name, and their evaluation
+    drive            policies by name, their evaluation and benchmark
     envs.tasks       the environments with other actions or tasks
     learn            training with stable-baselines3
     show.replay      saved runs for the browser, VRML and glTF

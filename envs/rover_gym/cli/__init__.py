@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rover_gym.cli.benchmark_command import benchmark
 from rover_gym.cli.console import DEBUG, one_line, say_first_steps
 from rover_gym.cli.drive_command import drive
 from rover_gym.cli.evaluate_command import evaluate
@@ -40,6 +41,7 @@ EXCHANGE = "Other programs"
 for _command in (drive, live, replay, plot):
     app.command(rich_help_panel=DRIVE)(_command)
 app.command(rich_help_panel=POLICIES)(evaluate)
+app.command(rich_help_panel=POLICIES)(benchmark)
 app.command(rich_help_panel=POLICIES, cls=ManySeeds)(train)
 app.command(rich_help_panel=POLICIES)(speed)
 app.add_typer(model, name="model", rich_help_panel=WORLDS)

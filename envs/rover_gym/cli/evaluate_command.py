@@ -40,6 +40,7 @@ from rover_gym.core import OptionError, RoverModel
 from rover_gym.core.extras import MissingExtraError, require
 from rover_gym.core.files import write_whole
 from rover_gym.core.validation import number, refuse
+from rover_gym.drive.benchmark_sets import check_training_seeds
 from rover_gym.drive.comparison import (
     ComparedScene,
     Contender,
@@ -50,6 +51,7 @@ from rover_gym.drive.comparison import (
     in_markdown,
     named_contender,
     other_ends,
+    policy_name,
     short_tables,
 )
 from rover_gym.drive.evaluation import EvaluatedEpisode, PolicySummary, drive_all, summarise
@@ -118,6 +120,7 @@ def evaluate(
     drive = _driver(ray, threads)
     contenders = _contenders(policies or ["pd"], model, environment)
     seeds = range(seed, seed + episodes)
+    check_training_seeds(seeds)
     evaluation = _Evaluation(contenders, seeds, output, drive)
     reads = {"the ground": terrain, "the model": model, "the policy": [one.files for one in contenders]}
     check_paths(reads, output=Into(output, evaluation.names([level for level, _ in scenes], films)))
@@ -273,9 +276,9 @@ def _scene(
 def _contender(policy: str, rover: RoverModel | None, environment: str | None) -> Contender:
     """A policy by its name, its folder or its file."""
     if is_model_file(policy):
-        chosen, path = named_driver(policy, rover), Path(policy)
-        name = path.parent.name if path.stem == "model" and path.parent.name else path.stem
-        return Contender(name, chosen.make, chosen.arguments, (path,), environment or "Rover-v0")
+        chosen = named_driver(policy, rover)
+        name = policy_name(policy)
+        return Contender(name, chosen.make, chosen.arguments, chosen.files, environment or "Rover-v0")
     return replace(named_contender(policy, rover), environment=environment)
 
 

@@ -74,7 +74,7 @@ def complete_model(incomplete: str) -> list[str]:
 
 def complete_policy(incomplete: str) -> list[str]:
     """Names of policies, folders, and models' files."""
-    return _named(incomplete, DRIVERS) + _files(incomplete, (".zip",))
+    return _named(incomplete, DRIVERS) + _files(incomplete, (".zip", ".onnx"))
 
 
 def complete_recording(incomplete: str) -> list[str]:

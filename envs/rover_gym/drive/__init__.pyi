@@ -1,6 +1,20 @@
 from .arcs.arc_network import ArcNetwork as ArcNetwork
 from .arcs.arc_network_policy import ArcNetworkPolicy as ArcNetworkPolicy
 from .arcs.guided_policy import GuidedPolicy as GuidedPolicy
+from .benchmark import (
+    BenchmarkResult as BenchmarkResult,
+    Interface as Interface,
+    ScoredEpisode as ScoredEpisode,
+    ScoredSet as ScoredSet,
+    score_set as score_set,
+)
+from .benchmark_sets import (
+    HELD_BACK_SEEDS as HELD_BACK_SEEDS,
+    BenchmarkSet as BenchmarkSet,
+    benchmark_sets as benchmark_sets,
+    check_training_model as check_training_model,
+    check_training_seeds as check_training_seeds,
+)
 from .commands.command import CommandController as CommandController, CommandLimits as CommandLimits
 from .commands.driven import ObservingPolicy as ObservingPolicy, Policy as Policy
 from .commands.features import Features as Features

@@ -26,9 +26,7 @@ from rover_gym.drive.evaluation import (
     run_episode,
     timed,
 )
-from rover_gym.drive.forecast.arc_forecast import FORECAST_FILE
-from rover_gym.drive.forecast.network_files import FOLDER
-from rover_gym.drive.named_policy import NAMES, named_policy, network_folder
+from rover_gym.drive.named_policy import NAMES, named_policy
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
 from rover_gym.models.lookup import ModelLike
@@ -73,15 +71,15 @@ def named_contender(policy: str, model: ModelLike | None = None) -> Contender:
         OSError: Its files may not be read.
     """
     chosen = named_policy(policy, model)
-    network = network_folder(policy)
-    files: list[Path] = []
-    if network is not None:
-        files = [network / ARCS_FILE]
-    elif policy == "foresight":
-        files = sorted(FOLDER.glob("foresight*/*"))
-    elif policy not in NAMES:
-        files = [Path(policy) / FORECAST_FILE]
-    return Contender(policy if policy in NAMES else Path(policy).name, chosen.make, chosen.arguments, tuple(files))
+    return Contender(policy_name(policy), chosen.make, chosen.arguments, chosen.files)
+
+
+def policy_name(policy: str) -> str:
+    """Name of a policy's row: its own, its folder's or its file's, of `module:name` with a dot."""
+    path = Path(policy.replace(":", "."))
+    if path.suffix not in (".zip", ".onnx"):
+        return path.name
+    return path.parent.name if path.stem == "model" and path.parent.name else path.stem
 
 
 def drive_or_reuse(
@@ -115,7 +113,7 @@ def drive_or_reuse(
         "id": contender.environment,
         "environment": environment,
         "seeds": [seeds.start, len(seeds)],
-        "files": _digest([*files, *contender.files]),
+        "files": digest([*files, *contender.files]),
     }
     plain_key = json.loads(json.dumps(key))
     kept = _kept(path, plain_key)
@@ -132,8 +130,8 @@ def drive_or_reuse(
     return drives
 
 
-def _digest(files: Sequence[Path]) -> str:
-    """SHA-256 of a policy's files, the package's policies and the compiled core."""
+def digest(files: Sequence[Path]) -> str:
+    """SHA-256 of a policy's files, the package's policies and the compiled core: what episodes depend on."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in (*files, *sorted(package.glob("drive/**/*.py")), *sorted(package.glob("_core.*[!i]"))):
@@ -162,10 +160,10 @@ def comparison_table(rows: Sequence[PolicySummary]) -> list[tuple[str, ...]]:
                 "" if row.difficulty is None else f"{row.difficulty:g}",
                 f"{row.successes} of {row.episodes}, {row.success.value:.1%}",
                 f"{100.0 * low:.1f} to {high:.1%}",
-                _cell(row.time, ".1f"),
-                _cell(row.energy_per_metre, ".0f"),
-                _cell(row.slip, ".3f"),
-                _cell(row.tilt, ".2f"),
+                interval_cell(row.time, ".1f"),
+                interval_cell(row.energy_per_metre, ".0f"),
+                interval_cell(row.slip, ".3f"),
+                interval_cell(row.tilt, ".2f"),
                 ", ".join(f"{n} {outcome_words(end)}" for end, n in row.ends.items() if n and end not in SUCCESSES),
             )
         )
@@ -182,10 +180,10 @@ def short_tables(rows: Sequence[PolicySummary]) -> list[tuple[float | None, list
             if row.difficulty == level:
                 low, high = row.success.interval
                 cells = (
-                    _cell(row.time, ".1f"),
-                    _cell(row.energy_per_metre, ".0f"),
-                    _cell(row.slip, ".1f", 100.0),
-                    _cell(row.tilt, ".1f"),
+                    interval_cell(row.time, ".1f"),
+                    interval_cell(row.energy_per_metre, ".0f"),
+                    interval_cell(row.slip, ".1f", 100.0),
+                    interval_cell(row.tilt, ".1f"),
                 )
                 table.append(
                     (row.policy, f"{row.success.value:.1%}", f"{100.0 * low:.0f} to {100.0 * high:.0f}", *cells)
@@ -239,7 +237,8 @@ def in_markdown(table: Sequence[Sequence[str]]) -> str:
     return "\n".join([lines[0], "|" + "---|" * len(table[0]), *lines[1:]])
 
 
-def _cell(estimate: IntervalEstimate, form: str, factor: float = 1.0) -> str:
+def interval_cell(estimate: IntervalEstimate, form: str, factor: float = 1.0) -> str:
+    """An estimate as a cell of a table, with half its interval."""
     if math.isnan(estimate.value):
         return "-"
     value, half = factor * estimate.value, 0.5 * factor * (estimate.interval[1] - estimate.interval[0])

@@ -224,6 +224,8 @@ def drive_each(
     policy: Policy,
     seeds: Sequence[int],
     *,
+    options: Mapping[str, Any] | None = None,
+    on_period: Callable[[RoverEnv, Mapping[str, Any]], None] = lambda _env, _info: None,
     progress: Callable[[int], None] = lambda _done: None,
 ) -> list[EvaluatedEpisode]:
     """Runs one episode per seed in an environment of this package, wrapped or not, one after the other.
@@ -232,15 +234,22 @@ def drive_each(
         env: The environment, with a time limit.
         policy: The policy, which must fit the environment.
         seeds: Seeds of the resets.
+        options: Options of the resets.
+        on_period: Called with the environment and `info` after each reset and each control period.
         progress: Called with the number of episodes done.
     """
     done: list[EvaluatedEpisode] = []
     rover: RoverEnv = env.unwrapped  # type: ignore[assignment] # run_episode refuses any other
     for seed in seeds:
         tilts: list[float] = []
-        rover.on_period = lambda _rover, info, tilts=tilts: tilts.append(float(info["tilt"]))
+
+        def after_period(rover: RoverEnv, info: Mapping[str, Any], tilts: list[float] = tilts) -> None:
+            tilts.append(float(info["tilt"]))
+            on_period(rover, info)
+
+        rover.on_period = after_period
         try:
-            episode = run_episode(env, policy, seed)
+            episode = run_episode(env, policy, seed, options=options)
         finally:
             rover.on_period = None
         same = {name: getattr(episode, name) for name in ("seed", "end", "time", "distance", "energy", "slip")}

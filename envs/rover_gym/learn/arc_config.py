@@ -15,6 +15,7 @@ import yaml
 
 from rover_gym.core import OptionError
 from rover_gym.core.validation import known_keys, mapping, number, refuse, regular_file
+from rover_gym.drive.benchmark_sets import check_training_model, check_training_seeds
 from rover_gym.envs.arguments import ARGUMENTS
 from rover_gym.learn.configuration import build, plain
 
@@ -40,6 +41,7 @@ class ArcScene:
 
     def __post_init__(self) -> None:
         known_keys("environment", self.environment, ARGUMENTS)
+        check_training_model(self.environment.get("model"), "environment.model")
         if self.teacher not in TEACHERS:
             refuse(OptionError, "teacher", self.teacher, f"must be one of {', '.join(TEACHERS)}")
         number("share", self.share, above=0.0)
@@ -129,7 +131,8 @@ class ArcEvaluation:
     Attributes:
         scenes: Arguments of the environment by name.
         fields: Fields of each.
-        seed: Seed of the first field.
+        seed: Seed of the first field. It must not be one that `rover benchmark` holds back, since the best network is
+            selected here.
     """
 
     scenes: Mapping[str, Any] = field(default_factory=dict)
@@ -139,6 +142,7 @@ class ArcEvaluation:
     def __post_init__(self) -> None:
         number("evaluation.fields", self.fields, at_least=1)
         number("evaluation.seed", self.seed, at_least=1_000_000)
+        check_training_seeds(range(self.seed, self.seed + self.fields), "evaluation.seed")
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def policy_of_file(path: str | Path) -> NamedPolicy:
         described = json.loads(run.read_text(encoding="utf-8"))
         given = described.get("environment") if isinstance(described, dict) else None
         arguments = environment_arguments(given) if isinstance(given, dict) else {}
-    return NamedPolicy(arguments, lambda env: FilePolicy(env, file))
+    return NamedPolicy(arguments, lambda env: FilePolicy(env, file), (file,))
 
 
 def _algorithm(path: Path) -> tuple[str, str]:  # noqa: RET503 - `refuse` does not return
