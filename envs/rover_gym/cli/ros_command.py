@@ -2,6 +2,7 @@
 
 import json
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,8 +36,8 @@ from rover_gym.show.live.live_scene import BY_HAND
 
 #: Control frequency, Hz, where no policy drives: policies have their own.
 RATE = 50.0
-#: Sensors by the names of the option: pictures are smaller than those of real cameras, so that they keep up.
-SENSORS: dict[str, type[Sensor]] = {
+#: Sensors by the names of the option.
+SENSORS: dict[str, Callable[[], Sensor]] = {
     "imu": InertialUnit,
     "scan": LaserScanner,
     "depth": DepthCamera,

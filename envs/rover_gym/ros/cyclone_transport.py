@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.core import CommandError, OptionError, RoverGymError
+from rover_gym.core import OptionError, RoverGymError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
 from rover_gym.ros import messages
@@ -231,7 +231,7 @@ def _type_of(kind: str) -> Any:
     def hold(self: Any, data: bytes = b"") -> None:
         self.data = data
 
-    def read(cls: Any, data: bytes, **_: Any) -> Any:
+    def read(cls: Any, data: bytes, /, **_: Any) -> Any:
         return cls(data)
 
     def written(self: Any, **_: Any) -> bytes:

@@ -29,6 +29,9 @@ LARGEST_SPEED, LARGEST_CURVATURE = 100.0, 1e3
 ON_THE_SPOT = 1e-3
 #: Time constant of wheels under a command of their speed, s.
 RESPONSE = 0.1
+#: A rover that skids turns faster or slower than its wheels say: its command is corrected by this fraction of the
+#: missing yaw rate in a second, up to the largest correction, rad/s.
+YAW_CORRECTION, LARGEST_CORRECTION = 2.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,14 @@ Command: TypeAlias = TwistCommand | JointCommand
 class Driving:
     """Turns commands into the actions of an environment.
 
-    A rover that steers by its wheels keeps to the curvature that its steering can do, and does not turn on the spot. One
-    whose wheels all steer also moves to its side.
+    A rover that steers by its wheels keeps to the curvature that its steering can do, and does not turn on the spot.
+    One whose wheels all steer also moves to its side.
 
     Args:
         env: The environment, which has been reset.
+
+    Attributes:
+        correction: What a rover that skids adds to the yaw rate of its command, rad/s.
     """
 
     def __init__(self, env: RoverEnv) -> None:
@@ -80,7 +86,7 @@ class Driving:
         self._env, self._controller = env, CommandController(env, limits)
         self._regulator = WheelRegulator(env, RESPONSE)
         turning = Turning.of(model, model.mass * math.hypot(*env.gravity))
-        self._skids = turning.skids
+        self._skids, self.correction = turning.skids, 0.0
         self._sharpest = LARGEST_CURVATURE if turning.skids else turning.max_curvature(env.max_steering)
         self._wheels = [model.dof_names[i] for i in model.wheel_joint_indices]
         self._steering = [model.dof_names[i] for i in Steering.of(model).joints]
@@ -106,7 +112,8 @@ class Driving:
         """The action for a command that has been checked."""
         seen = self._env.complete_observation()[None]
         if isinstance(command, TwistCommand):
-            return self._controller.act(seen, self._arc(command)[None])[0]
+            arc: npt.NDArray[np.float32] = self._controller.act(seen, self._arc(command)[None])[0]
+            return arc
         action = np.zeros(self._env.action_space.shape or (), np.float32)
         n = len(self._wheels)
         if command.speeds:
@@ -117,18 +124,27 @@ class Driving:
                 action[i] = command.torques[name] / self._torque_limits[i]
         for i, name in enumerate(self._steering):
             action[n + i] = command.angles.get(name, 0.0) / self._env.max_steering
-        return np.clip(action, -1.0, 1.0)
+        limited: npt.NDArray[np.float32] = action.clip(-1.0, 1.0)
+        return limited
 
     def _arc(self, command: TwistCommand) -> Array:
         """Speed, curvature and direction of a twist, over their largest values."""
         forward, left = command.forward, command.left if self._controller.steers_sideways else 0.0
         speed = math.copysign(math.hypot(forward, left), forward)
         sideways = math.atan2(math.copysign(left, left * speed), abs(forward)) if left else 0.0
+        turn = command.turn + self._corrected(command.turn) if self._skids else command.turn
         if self._skids and abs(speed) < ON_THE_SPOT:
-            speed = math.copysign(ON_THE_SPOT, speed) if command.turn else 0.0
-        curvature = command.turn / speed if speed else 0.0
+            speed = math.copysign(ON_THE_SPOT, speed) if turn else 0.0
+        curvature = turn / speed if speed else 0.0
         curvature = min(max(curvature, -self._sharpest), self._sharpest)
         return np.array([speed / LARGEST_SPEED, curvature / LARGEST_CURVATURE, sideways / (0.5 * math.pi)])
+
+    def _corrected(self, turn: float) -> float:
+        """Integrates the yaw rate that is missing, and returns the correction; none where no turn is wanted."""
+        missing = turn - float(self._env.simulation.v[4])
+        added = self.correction + YAW_CORRECTION * self._env.dt * missing if turn else 0.0
+        self.correction = min(max(added, -LARGEST_CORRECTION), LARGEST_CORRECTION)
+        return self.correction
 
 
 def _finite(name: str, value: float) -> None:

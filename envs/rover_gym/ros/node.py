@@ -17,7 +17,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import CommandError, ModelError, RoverGymError
+from rover_gym.core import CommandError, ModelError
 from rover_gym.core.validation import number, refuse, whole
 from rover_gym.envs.sensors.sensor_suite import SensorSuite, SuiteState
 from rover_gym.envs.start import MAX_DIFFICULTY, drive_signs
@@ -30,7 +30,6 @@ from rover_gym.ros.transport import CLOCK, LATCHED, SENSOR, STATE
 from rover_gym.ros.wheel_loads import wheel_links, wheel_wrenches
 
 if TYPE_CHECKING:
-    from rover_gym.core import RoverModel
     from rover_gym.envs.sensors.sensor_suite import SensorLike
     from rover_gym.ros.driving import Command
     from rover_gym.ros.sources import Source
@@ -116,7 +115,7 @@ class RosNode:
     Topics are those of `TOPICS`, a wrench a wheel in `wheels/NAME/wrench`, and those of the sensors. Commands come on
     `cmd_vel` (`geometry_msgs/msg/Twist`), `cmd_vel_stamped` (`TwistStamped`) and `joint_commands`
     (`sensor_msgs/msg/JointState`: velocity or effort of wheels, position of joints that steer). Services are `reset`,
-    `pause`, `step`, `snapshot` and `restore` below the node's name; its parameters are `seed`, `difficulty` and `steps`.
+    `pause`, `step`, `snapshot` and `restore` below the node's name, its parameters `seed`, `difficulty` and `steps`.
 
     Stamps are simulated time, as in `/clock`, which never goes back: a reset goes on with the time of before.
 
@@ -172,7 +171,7 @@ class RosNode:
         """Steps and publishes until `stop` is called, or until a simulated time since the start, s."""
         due = time.perf_counter()
         while not self._stopping and 1e-9 * self.now < until:
-            if self._paused:
+            if self._paused or self._source.ended:
                 self._transport.spin(IDLE)
                 due = time.perf_counter()
                 continue
@@ -194,19 +193,21 @@ class RosNode:
 
     def step(self) -> None:
         """Takes a step and publishes; where the drive has ended, the time stops."""
-        if self._source.ended:
-            self._pause_for(self._source.ended)
-            return
-        valid = self._source.time < self._commanded.until
-        command = self._commanded.command if valid else self._at_rest
         before = self._source.time
+        if self._ended():
+            return
+        valid = before < self._commanded.until
+        command = self._commanded.command if valid else self._at_rest
         self._source.step(command)
         self.now += round(1e9 * (self._source.time - before))
         self.steps += 1
         self._sense()
         self._publish(self._source.time - before)
-        if self._source.ended:
-            self._pause_for(self._source.ended)
+        if self._ended():
+            self._tell(f"the drive has ended ({self._ended()}): call the service reset")
+
+    def _ended(self) -> str:
+        return self._source.ended
 
     def _wait(self, due: float) -> None:
         """Handles messages until a time of the clock, at least once."""
@@ -219,10 +220,6 @@ class RosNode:
     def _at_rest(self) -> Command | None:
         """What drives without a command: the rover's own driver, or nothing."""
         return None if self._source.drives_itself else TwistCommand()
-
-    def _pause_for(self, reason: str) -> None:
-        self._paused = True
-        self._tell(f"the drive has ended ({reason}): call the service reset")
 
     def _global(self, topic: str) -> str:
         return topic if topic.startswith("/") else f"{self._prefix}/{topic}"
@@ -244,8 +241,8 @@ class RosNode:
             )
 
     def _open_commands(self) -> None:
-        kinds = {
-            "cmd_vel": ("geometry_msgs/msg/Twist", lambda message: _twist(message)),
+        kinds: dict[str, tuple[str, Callable[[Any], Command]]] = {
+            "cmd_vel": ("geometry_msgs/msg/Twist", _twist),
             "cmd_vel_stamped": ("geometry_msgs/msg/TwistStamped", lambda message: _twist(message.twist)),
             "joint_commands": ("sensor_msgs/msg/JointState", self._joint_command),
         }
@@ -330,7 +327,6 @@ class RosNode:
         """Publishes what stays for a drive, and its first state."""
         source = self._source
         self._commanded = _Commanded()
-        self._paused = self.options.paused if self.steps == 0 else self._paused and not source.ended
         self._odometry, self._links = WheelOdometry(source.model), wheel_links(source.model)
         sensors = [] if self._sensed is None else list(self._sensed.suite.sensors.values())
         self._frames = frames.RoverFrames(source.model, sensors)

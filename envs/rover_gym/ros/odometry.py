@@ -51,7 +51,8 @@ class WheelOdometry:
         self._steering = np.array([steering.joints[i] if i >= 0 else 0 for i in steering.entries], np.intp)
         self._skids = not steering.joints
         self._turned: Array | None = None
-        self.place, self.rotation, self.velocity = np.zeros(3), np.eye(3), np.zeros(3)
+        self.place: Array = np.zeros(3)
+        self.rotation, self.velocity = np.eye(3), np.zeros(3)
         self._yaw = 0.0
 
     def advance(self, q: Array, attitude: Array, period: float) -> None:
@@ -62,14 +63,15 @@ class WheelOdometry:
             attitude: (3, 3) from `base_link` to `map`; its roll and pitch are measured.
             period: Time since the last call, s.
         """
-        turned, before = q[self._joints] * self._rim, self._turned
+        turned: Array = q[self._joints] * self._rim
+        before = self._turned
         self._turned = turned
         roll, pitch, _ = roll_pitch_yaw(attitude)
         if before is not None and period > 0.0:
             angles = np.where(self._steered, q[self._steering], 0.0)
             self.velocity = self._least_squares((turned - before) / period, angles)
             half = self._yaw + 0.5 * self.velocity[2] * period
-            self.place = self.place + _attitude(roll, pitch, half) @ [*(self.velocity[:2] * period), 0.0]
+            self.place = self.place + _attitude(roll, pitch, half)[:, :2] @ self.velocity[:2] * period
             self._yaw += float(self.velocity[2]) * period
         self.rotation = _attitude(roll, pitch, self._yaw)
 

@@ -87,11 +87,11 @@ class RclpyTransport:
     def spin(self, seconds: float) -> None:
         """Waits for messages and requests for a time, s, at most, and handles all that have come."""
         end = time.perf_counter() + seconds
-        self._executor.spin_once(timeout_sec=max(0.0, seconds))
-        for _ in range(MOST):
+        self._executor.spin_once(timeout_sec=seconds)
+        for _ in range(MOST):  # `spin_once` handles one callback and does not say whether there was one
+            self._executor.spin_once(timeout_sec=0.0)
             if time.perf_counter() >= end:
                 break
-            self._executor.spin_once(timeout_sec=max(0.0, end - time.perf_counter()))
 
     def close(self) -> None:
         """Leaves the network."""

@@ -25,19 +25,24 @@ class Source(Protocol):
 
     Attributes:
         drives_itself: Whether it moves without a command.
-        episodes: How many drives have begun; another number is another scene, perhaps of another rover.
     """
 
     drives_itself: bool
 
     @property
-    def episodes(self) -> int: ...
+    def episodes(self) -> int:
+        """How many drives have begun."""
+        ...
 
     @property
-    def model(self) -> RoverModel: ...
+    def model(self) -> RoverModel:
+        """The rover's model."""
+        ...
 
     @property
-    def simulation(self) -> Simulation: ...
+    def simulation(self) -> Simulation:
+        """The rover's simulation, to be read."""
+        ...
 
     @property
     def time(self) -> float:
@@ -147,14 +152,16 @@ class LiveSource:
         self.rover.restart(seed, difficulty)
         self._driving = Driving(self.rover.env)
 
-    def snapshot(self) -> LiveMoment:
+    def snapshot(self) -> tuple[LiveMoment, float]:
         """The present state."""
-        return self.rover.moment()
+        return self.rover.moment(), self._driving.correction
 
-    def restore(self, snapshot: LiveMoment) -> None:
+    def restore(self, snapshot: tuple[LiveMoment, float]) -> None:
         """Goes back to a state, also of an earlier drive."""
-        self.rover.go_back(snapshot)
+        moment, correction = snapshot
+        self.rover.go_back(moment)
         self._driving = Driving(self.rover.env)
+        self._driving.correction = correction
 
 
 class RecordedSource:
