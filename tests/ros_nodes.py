@@ -22,29 +22,34 @@ class KeptTransport:
         self.services: dict[str, Callable[..., str]] = {}
 
     def publisher(self, topic: str, kind: str, delivery: Delivery) -> Publish:
+        """Keeps the messages of a topic."""
         self.kinds[topic], self.deliveries[topic] = kind, delivery
         kept = self.messages.setdefault(topic, [])
         return lambda data: kept.append(messages.decode(data, kind))
 
     def subscribe(self, topic: str, kind: str, take: Callable[[bytes], None]) -> None:
+        """Keeps what takes the messages of a topic."""
         self.takers[topic] = kind, take
 
     def serve_trigger(self, name: str, act: Callable[[], str]) -> None:
+        """Keeps a service."""
         self.services[name] = act
 
     def serve_switch(self, name: str, act: Callable[[bool], str]) -> None:
+        """Keeps a service."""
         self.services[name] = act
 
     def serve_parameters(
         self, values: Mapping[str, ParameterValue], change: Callable[[str, ParameterValue], None]
     ) -> None:
+        """Keeps the parameters."""
         self.values, self.change = values, change
 
     def spin(self, seconds: float) -> None:
-        pass
+        """Waits for nothing."""
 
     def close(self) -> None:
-        pass
+        """Leaves nothing."""
 
     def send(self, topic: str, message: Any) -> None:
         """Sends the node a message."""

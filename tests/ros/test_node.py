@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from recordings import recorded
 from refusals import refused
+from ros_nodes import FREQUENCY, KeptTransport, drive, live_source, node_of
 from rovers import standing
 
 from rover_gym import OptionError, RoverModel
@@ -25,8 +26,6 @@ from rover_gym.ros import NodeOptions, RecordedSource, RosNode, frames, messages
 from rover_gym.show.live import LiveScene
 
 pytest.importorskip("rosbags")
-
-from ros_nodes import FREQUENCY, KeptTransport, drive, live_source, node_of
 
 MODELS = RoverModel.names()
 
@@ -257,8 +256,8 @@ def test_a_reset_takes_the_parameters_and_the_clock_goes_on() -> None:
     second = transport.last("/goal").pose.position
     assert (first.x, first.y) != (second.x, second.y)
     stamps = [nanoseconds(one.clock) for one in transport.messages["/clock"]]
-    assert stamps == sorted(stamps)
-    assert stamps[-1] == 1_020_000_000
+    assert stamps == sorted(set(stamps))
+    assert stamps[-1] == 1_040_000_000
     other, twin = node_of(LiveScene(ground="rocks", seed=7, difficulty=0.2))
     other.step()
     expected = twin.last("/goal").pose.position

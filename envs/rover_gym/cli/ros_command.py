@@ -126,7 +126,7 @@ def ros(
         source = LiveSource(_rover(scene, map_file, rate))
     transport = open_transport(middleware, name, namespace)
     if bag is not None:
-        transport = BagTransport(transport, bag, lambda: node.now)
+        transport = BagTransport(transport, bag)
     node = RosNode(source, transport, name=name, namespace=namespace, options=options, tell=_tell)
     for ending in (signal.SIGINT, signal.SIGTERM):
         signal.signal(ending, lambda *_: node.stop())

@@ -16,26 +16,25 @@ if TYPE_CHECKING:
 
 
 class BagTransport:
-    """A transport whose published messages go into a bag, too; `Transport` has its methods.
+    """A transport whose published messages go into a bag, too, at the time of `/clock`; `Transport` has its methods.
 
     Args:
         inner: The transport.
         folder: Folder of the bag, which must not exist.
-        clock: The time of messages, ns.
 
     Raises:
         OptionError: The folder exists.
         OSError: It cannot be created.
     """
 
-    def __init__(self, inner: Transport, folder: Path, clock: Callable[[], int]) -> None:
+    def __init__(self, inner: Transport, folder: Path) -> None:
         if folder.exists():
             refuse(OptionError, "bag", str(folder), "exists already")
         bags = require("rosbags.rosbag2", "ros")
         folder.parent.mkdir(parents=True, exist_ok=True)
         self._bag: Any = bags.Writer(folder, version=9, storage_plugin=bags.StoragePlugin.MCAP)
         self._bag.open()
-        self.inner, self._clock = inner, clock
+        self.inner, self._now = inner, 0
 
     def publisher(self, topic: str, kind: str, delivery: Delivery) -> Publish:
         """Opens a topic."""
@@ -46,7 +45,10 @@ class BagTransport:
 
         def write(data: bytes) -> None:
             publish(data)
-            self._bag.write(channel, self._clock(), data)
+            if topic == "/clock":
+                clock = messages.decode(data, kind).clock
+                self._now = clock.sec * 10**9 + clock.nanosec
+            self._bag.write(channel, self._now, data)
 
         return write
 

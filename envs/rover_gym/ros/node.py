@@ -157,7 +157,7 @@ class RosNode:
         self._commanded = _Commanded()
         self._snapshot: Any = None
         self.now, self.steps = 0, 0
-        self._begun = self._episode = -1.0
+        self._begun = False
         self._publishers: dict[str, Publish] = {
             topic: transport.publisher(self._global(topic), kind, delivery)
             for topic, (kind, delivery) in TOPICS.items()
@@ -201,6 +201,7 @@ class RosNode:
         self._source.step(command)
         self.now += round(1e9 * (self._source.time - before))
         self.steps += 1
+        self._publish_clock()
         self._sense()
         self._publish(self._source.time - before)
         if self._ended():
@@ -324,8 +325,10 @@ class RosNode:
         return f"back at {self._source.time:.3f} s"
 
     def _begin(self) -> None:
-        """Publishes what stays for a drive, and its first state."""
+        """Publishes what stays for a drive, and its first state, a step later: no two messages have the same stamp."""
         source = self._source
+        self.now += round(1e9 * source.dt) if self._begun else 0
+        self._begun = True
         self._commanded = _Commanded()
         self._odometry, self._links = WheelOdometry(source.model), wheel_links(source.model)
         sensors = [] if self._sensed is None else list(self._sensed.suite.sensors.values())
@@ -337,6 +340,7 @@ class RosNode:
             self._sensed.taken = {
                 name: [(own.reading, source.time)] for name, own in self._sensed.state.sensors.items()
             }
+        self._publish_clock()
         pairs, places, turns = zip(*self._frames.fixed, strict=True)
         self._send("/tf_static", messages.transforms(self.now, pairs, np.array(places), np.array(turns)))
         self._send("robot_description", messages.make("std_msgs/msg/String", data=self._description()))
@@ -364,11 +368,13 @@ class RosNode:
     def _send(self, topic: str, message: Any) -> None:
         self._publishers[topic](messages.encode(message))
 
+    def _publish_clock(self) -> None:
+        self._send("/clock", messages.make("rosgraph_msgs/msg/Clock", clock=messages.time_of(self.now)))
+
     def _publish(self, period: float) -> None:
         source, simulation, stamp = self._source, self._source.simulation, self.now
         place, attitude = frames.base_pose(simulation)
         self._odometry.advance(simulation.q, attitude, period)
-        self._send("/clock", messages.make("rosgraph_msgs/msg/Clock", clock=messages.time_of(stamp)))
         self._publish_transforms(place, attitude)
         self._publish_joints()
         self._publish_odometry(place, attitude)
