@@ -17,7 +17,7 @@ import rover_gym
 pytest.importorskip("cyclonedds")
 pytest.importorskip("rosbags")
 
-#: The virtual environment of ROS's own packages, beside that of the tests as `make ros` makes it.
+#: The virtual environment of ROS's own packages, beside that of the tests as `make ros-peer` makes it.
 PEER = Path(os.environ.get("ROVER_GYM_ROS", f"{sys.prefix}-ros")) / "bin" / "python"
 PROGRAM = Path(__file__).parent / "peer.py"
 RUN = "from rover_gym.cli import main; main()"
@@ -29,7 +29,7 @@ LOCAL = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "PYTHONPATH": OURS}
 DEPTH = '{"DepthCamera": {"rate": 10.0}}'
 NODE = ["ros", "--rate", "100", "--sensor", "imu", "--sensor", '{"LaserScanner": {"rate": 10.0}}', "--sensor", DEPTH]
 
-needs_peer = pytest.mark.skipif(not PEER.exists(), reason=f"{PEER} is not there: make ros")
+needs_peer = pytest.mark.skipif(not PEER.exists(), reason=f"{PEER} is not there: make ros-peer")
 
 
 @contextmanager
