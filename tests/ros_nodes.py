@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from rover_gym.core import RoverGymError
-from rover_gym.ros import Delivery, LiveSource, NodeOptions, RosNode, messages
+from rover_gym.ros import Delivery, DrivenRover, NodeOptions, RosNode, messages
 from rover_gym.ros.transport import ParameterValue, Publish
 from rover_gym.show.live import LiveChoices, LiveRover, LiveScene
 
@@ -67,9 +67,9 @@ class KeptTransport:
         return self.messages[topic][-1]
 
 
-def live_source(scene: LiveScene | None = None, frequency: float = FREQUENCY, **choices: Any) -> LiveSource:
+def live_source(scene: LiveScene | None = None, frequency: float = FREQUENCY, **choices: Any) -> DrivenRover:
     """A rover that drives at a control frequency."""
-    return LiveSource(LiveRover(scene, LiveChoices(arguments={"control_frequency": frequency}, **choices)))
+    return DrivenRover(LiveRover(scene, LiveChoices(arguments={"control_frequency": frequency}, **choices)))
 
 
 def node_of(

@@ -22,7 +22,7 @@ from rover_gym.envs.sensors import (
     Mount,
     WheelEncoders,
 )
-from rover_gym.ros import NodeOptions, RecordedSource, RosNode, frames, messages
+from rover_gym.ros import NodeOptions, RecordedRover, RosNode, messages, rover_frames as frames
 from rover_gym.show.live import LiveScene
 
 pytest.importorskip("rosbags")
@@ -325,7 +325,7 @@ def test_a_recording_plays(tmp_path: Path) -> None:
     simulation.set_wheel_torques(np.full(6, 20.0))
     rover_run = recorded(simulation, tmp_path / "run.h5", rows=20, steps=10)
     transport = KeptTransport()
-    node = RosNode(RecordedSource(rover_run), transport, options=NodeOptions(pace=0.0, sensors=[LaserScanner()]))
+    node = RosNode(RecordedRover(rover_run), transport, options=NodeOptions(pace=0.0, sensors=[LaserScanner()]))
     node.run(until=rover_run.time[-1] - rover_run.time[0] - 1e-6)
     truth = transport.last("/ground_truth/odom").pose.pose.position
     x, y, z = rover_run.trajectory["q"][-1, :3]

@@ -28,9 +28,9 @@ from rover_gym.core.validation import refuse
 from rover_gym.envs.sensors import ColourCamera, DepthCamera, InertialUnit, LaserScanner, Sensor
 from rover_gym.record import read_run
 from rover_gym.ros.bag import BagTransport
+from rover_gym.ros.middleware import MIDDLEWARES, open_transport
 from rover_gym.ros.node import NodeOptions, RosNode
-from rover_gym.ros.sources import LiveSource, RecordedSource, Source
-from rover_gym.ros.transport import MIDDLEWARES, open_transport
+from rover_gym.ros.node_rovers import DrivenRover, NodeRover, RecordedRover
 from rover_gym.show.live import LiveChoices, LiveRover, LiveScene
 from rover_gym.show.live.live_scene import BY_HAND
 
@@ -101,36 +101,33 @@ def ros(
 
     Ctrl-C ends it.
     """
-    options = NodeOptions(
-        sensors=_sensors(sensors),
-        pace=pace,
-        paused=paused,
-        localise=localise,
+    hard = LiveScene.difficulty if difficulty is None else difficulty
+    options = NodeOptions(_sensors(sensors), pace, paused, localise, seed, hard)
+    scene = LiveScene(
+        ground=chosen_terrain(terrain, difficulty),
+        model=model,
+        driver=policy,
+        difficulty=hard,
+        goal_distance=goal_distance,
+        friction=friction,
+        gravity=gravity,
         seed=seed,
-        difficulty=LiveScene.difficulty if difficulty is None else difficulty,
     )
-    if recording is not None:
-        source: Source = RecordedSource(read_run(recording))
-    else:
-        named = chosen_terrain(terrain, difficulty)
-        scene = LiveScene(
-            ground=named,
-            model=model,
-            driver=policy,
-            difficulty=options.difficulty,
-            goal_distance=goal_distance,
-            friction=friction,
-            gravity=gravity,
-            seed=seed,
-        )
-        source = LiveSource(_rover(scene, map_file, rate))
+    source: NodeRover = (
+        DrivenRover(_rover(scene, map_file, rate)) if recording is None else RecordedRover(read_run(recording))
+    )
     transport = open_transport(middleware, name, namespace)
     if bag is not None:
         transport = BagTransport(transport, bag)
     node = RosNode(source, transport, name=name, namespace=namespace, options=options, tell=_tell)
+    typer.echo(f"ros: node {namespace.rstrip('/')}/{name}, a step every {source.dt:g} s (Ctrl-C ends it)")
+    _run(node)
+
+
+def _run(node: RosNode) -> None:
+    """Runs a node until a signal ends it."""
     for ending in (signal.SIGINT, signal.SIGTERM):
         signal.signal(ending, lambda *_: node.stop())
-    typer.echo(f"ros: node {namespace.rstrip('/')}/{name}, a step every {source.dt:g} s (Ctrl-C ends it)")
     try:
         node.run()
     finally:

@@ -22,7 +22,7 @@ from rover_gym.core import OptionError, RoverGymError
 from rover_gym.core.extras import require
 from rover_gym.core.validation import refuse
 from rover_gym.ros import messages
-from rover_gym.ros.parameters import Parameters
+from rover_gym.ros.parameter_services import Parameters
 from rover_gym.ros.transport import Delivery, ParameterValue, Publish
 
 #: Before the request or the answer of a service: the client and the request.

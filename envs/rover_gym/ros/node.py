@@ -1,6 +1,6 @@
 """A rover as a ROS 2 node: it steps in real time, faster, or as a client asks, and publishes after each step.
 
-node = RosNode(LiveSource(LiveRover()), open_transport("auto", "rover"))
+node = RosNode(DrivenRover(LiveRover()), open_transport("auto", "rover"))
 node.run(until=10.0)
 node.close()
 """
@@ -22,7 +22,7 @@ from rover_gym.core.validation import number, refuse, whole
 from rover_gym.envs.sensors.sensor_suite import SensorSuite, SuiteState
 from rover_gym.envs.start import MAX_DIFFICULTY, drive_signs
 from rover_gym.models.file_writing import IGNORABLE, urdf_tree
-from rover_gym.ros import frames, messages
+from rover_gym.ros import messages, rover_frames as frames
 from rover_gym.ros.driving import JointCommand, TwistCommand
 from rover_gym.ros.odometry import WheelOdometry
 from rover_gym.ros.sensor_topics import SensorTopics
@@ -32,7 +32,7 @@ from rover_gym.ros.wheel_loads import wheel_links, wheel_wrenches
 if TYPE_CHECKING:
     from rover_gym.envs.sensors.sensor_suite import SensorLike
     from rover_gym.ros.driving import Command
-    from rover_gym.ros.sources import Source
+    from rover_gym.ros.node_rovers import NodeRover
     from rover_gym.ros.transport import ParameterValue, Publish, Transport
 
 Array = npt.NDArray[np.float64]
@@ -137,7 +137,7 @@ class RosNode:
 
     def __init__(
         self,
-        source: Source,
+        source: NodeRover,
         transport: Transport,
         *,
         name: str = "rover",

@@ -52,7 +52,8 @@ class WheelOdometry:
         self._skids = not steering.joints
         self._turned: Array | None = None
         self.place: Array = np.zeros(3)
-        self.rotation, self.velocity = np.eye(3), np.zeros(3)
+        self.velocity: Array = np.zeros(3)
+        self.rotation = np.eye(3)
         self._yaw = 0.0
 
     def advance(self, q: Array, attitude: Array, period: float) -> None:
@@ -71,7 +72,8 @@ class WheelOdometry:
             angles = np.where(self._steered, q[self._steering], 0.0)
             self.velocity = self._least_squares((turned - before) / period, angles)
             half = self._yaw + 0.5 * self.velocity[2] * period
-            self.place = self.place + _attitude(roll, pitch, half)[:, :2] @ self.velocity[:2] * period
+            moved: Array = _attitude(roll, pitch, half)[:, :2] @ self.velocity[:2]
+            self.place = self.place + period * moved
             self._yaw += float(self.velocity[2]) * period
         self.rotation = _attitude(roll, pitch, self._yaw)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rover_gym.core import OptionError
 from rover_gym.core.validation import refuse
 from rover_gym.envs.sensors import Camera, DepthCamera, InertialUnit, LaserScanner, Sensor
-from rover_gym.ros import frames, messages
+from rover_gym.ros import messages, rover_frames as frames
 from rover_gym.ros.transport import SENSOR
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ros.frames import ros_vector
+from rover_gym.ros.rover_frames import ros_vector
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -172,9 +172,7 @@ class LiveRover:
         """`(n, 4)` centres and radii of the rocks that were thrown, m."""
         return self._rocks.copy()
 
-    def step(
-        self, forward: float = 0.0, turn: float = 0.0, *, action: npt.NDArray[np.float32] | None = None
-    ) -> None:
+    def step(self, forward: float = 0.0, turn: float = 0.0, *, action: npt.NDArray[np.float32] | None = None) -> None:
         """Takes one control period, by hand or by the driver; a drive that has ended stays as it is.
 
         Args:

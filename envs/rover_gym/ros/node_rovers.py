@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rover_gym.show.live.live_rover import LiveMoment
 
 
-class Source(Protocol):
+class NodeRover(Protocol):
     """A rover over time.
 
     Attributes:
@@ -89,8 +89,8 @@ class Source(Protocol):
         ...
 
 
-class LiveSource:
-    """A rover in the simulator; `Source` has its methods.
+class DrivenRover:
+    """A rover in the simulator; `NodeRover` has its methods.
 
     Args:
         rover: The rover. It belongs to the source from here on.
@@ -164,8 +164,8 @@ class LiveSource:
         self._driving.correction = correction
 
 
-class RecordedSource:
-    """A recorded run, row by row; `Source` has its methods. It takes no commands and ends with its last row.
+class RecordedRover:
+    """A recorded run, row by row; `NodeRover` has its methods. It takes no commands and ends with its last row.
 
     Args:
         run: The run.
