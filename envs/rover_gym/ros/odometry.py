@@ -84,8 +84,8 @@ class WheelOdometry:
             return np.array([forward, 0.0, turn / WIDENING])
         c, s, x, y = np.cos(angles), np.sin(angles), self._x, self._y
         rows = np.concatenate((np.stack((c, s, x * s - y * c), axis=1), np.stack((-s, c, x * c + y * s), axis=1)))
-        found: Array = np.linalg.lstsq(rows, np.concatenate((speeds, np.zeros_like(speeds))), rcond=None)[0]
-        return found
+        found = np.linalg.lstsq(rows, np.concatenate((speeds, np.zeros_like(speeds))), rcond=None)[0]
+        return np.asarray(found, np.float64)
 
 
 def _attitude(roll: float, pitch: float, yaw: float) -> Array:
