@@ -21,7 +21,7 @@ TIER   ?= test# of the tests: quick, test or all
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs=2 --output-sync
 MODULE := $(or $(wildcard $(STAMPS)/release),$(STAMPS)/core)# as it is installed, or for development
 
-.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench benchmark chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray pins clean
+.PHONY: help demo quick test test-all check lint types deny format stub test-rust test-python same-bits wheel extras sizes docs bench benchmark chart chart-gpu policies stability torture film pace validate validate-sand orders bits instructions profiles train train-rllib ray ros-peer pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -90,7 +90,7 @@ SAME_DRAWS = $(if $(filter all,$(TIER)),,--hypothesis-seed=1)
 test-rust: ## the Rust tests only (of tier all with checks of arithmetic)
 	$(if $(filter all,$(TIER)),CARGO_PROFILE_DEV_DEBUG_ASSERTIONS=true CARGO_PROFILE_DEV_OVERFLOW_CHECKS=true) $(SAME_CASES) $(CARGO) test --workspace --tests --locked --quiet -- $(if $(filter all,$(TIER)),--include-ignored)
 
-test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test $(if $(filter all,$(TIER)),ray) ## the Python tests only, and the longest ten
+test-python: $(STAMPS)/test $(STAMPS)/core $(STAMPS)/fmu $(STAMPS)/debian-demo $(STAMPS)/debian-test $(if $(filter all,$(TIER)),ray $(if $(filter Linux-x86_64,$(shell uname -sm | tr ' ' -)),ros-peer)) ## the Python tests only, and the longest ten
 	$(BIN)/pytest --numprocesses auto --tier $(TIER) --durations 10 $(SAME_DRAWS) $(if $(filter test,$(TIER)),--ignore $(OF_DOCS))
 
 same-bits: $(STAMPS)/test $(MODULE) ## compare the bits of the development build and of the build that is shipped with the committed ones
@@ -143,6 +143,9 @@ train-rllib: $(STAMPS)/release ray ## train Rover-v0 on a local Ray with 2 worke
 
 ray: ## make the virtual environment of Ray, which pins other versions: .venv-rllib
 	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
+
+ros-peer: ## make the virtual environment of ROS's own packages, with which tests drive a rover: .venv-ros
+	@$(MAKE) --no-print-directory VENV=$(VENV)-ros $(VENV)-ros/stamps/ros-peer
 
 # Programs of benchmarks/, some of which use scenes and files of the tests; in a comparison every engine has one thread.
 MEASURE := PYTHONPATH="benchmarks$(if $(filter Windows_NT,$(OS)),;,:)tests" $(BIN)/python -m
@@ -206,15 +209,16 @@ pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build
 	$(call pin,test) --extra test --extra docs --extra train --group build --group lint --constraint requirements/demo.txt
 	$(call pin,rllib) --extra rllib --group build
+	$(call pin,ros-peer,--group ros-peer)
 	$(call pin,cross) --group cross --constraint requirements/demo.txt
 	$(call pin,peers) --extra peers --constraint requirements/test.txt
 
 clean: ## remove everything that make made, but for runs/
-	rm -rf $(VENV) $(VENV)-rllib target dist docs/_build envs/rover_gym/_core*.so envs/rover_gym/_fmu .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-rllib $(VENV)-ros target dist docs/_build envs/rover_gym/_core*.so envs/rover_gym/_fmu .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # One list for every Python from 3.11 on, versions only.
 pin = $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate \
-	--custom-compile-command "make pins" --excludes requirements/without/processor.txt --output-file requirements/$(1).txt pyproject.toml
+	--custom-compile-command "make pins" --excludes requirements/without/processor.txt --output-file requirements/$(1).txt $(or $(2),pyproject.toml)
 
 # pip fetches uv, and uv, which is several times faster, the rest.
 $(STAMPS)/venv: requirements/demo.txt
@@ -251,6 +255,11 @@ $(STAMPS)/test: requirements/test.txt $(STAMPS)/venv
 $(STAMPS)/ray: requirements/rllib.txt $(STAMPS)/venv
 	$(with_torch)
 	@echo $(CURDIR)/envs > $$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/rover_gym.pth
+	@touch $@
+
+# The wheels of ROS start the interpreter anew when it starts, so they have an environment of their own.
+$(STAMPS)/ros-peer: requirements/ros-peer.txt $(STAMPS)/venv
+	$(UV) --requirement $<
 	@touch $@
 
 # An engine that cannot be installed is left out of the comparison, which says so.

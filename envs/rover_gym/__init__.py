@@ -25,6 +25,7 @@ The package consists of the subpackages below. Each one may import those above i
     show.figures     figures of saved runs
     exports          runs, policies, simulations and contact problems for other programs
     show.live        a rover that is driven in the browser
+    ros              a rover as a ROS 2 node
     cli              the command `rover`
 """
 

@@ -17,6 +17,7 @@ from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.replay_command import plot, replay
 from rover_gym.cli.report_command import report
+from rover_gym.cli.ros_command import ros
 from rover_gym.cli.sand_commands import sand
 from rover_gym.cli.scene_command import scene
 from rover_gym.cli.speed_command import speed
@@ -54,6 +55,7 @@ app.add_typer(planar, name="planar", rich_help_panel=WORLDS)
 app.command(rich_help_panel=WORLDS)(report)
 app.add_typer(export, name="export", rich_help_panel=EXCHANGE)
 app.command(rich_help_panel=EXCHANGE)(dataset)
+app.command(rich_help_panel=EXCHANGE)(ros)
 
 
 def _print_version(wanted: bool) -> None:

@@ -381,6 +381,11 @@ def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Colle
             express and that are not in `ignore`.
         OSError: The file cannot be written.
     """
+    write_xml(urdf_tree(model, ignore), path)
+
+
+def urdf_tree(model: RoverModel, ignore: Collection[str]) -> ET.Element:
+    """The elements of a URDF file, as `write_urdf` writes them."""
     ignore = check_kinds(ignore, IGNORABLE)
     description = model.to_dict()
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
@@ -415,7 +420,7 @@ def write_urdf(model: RoverModel, path: str | os.PathLike[str], *, ignore: Colle
         ET.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
         ET.SubElement(transmission, "joint", name=name)
         ET.SubElement(transmission, "actuator", name=f"motor_{name}")
-    write_xml(robot, path)
+    return robot
 
 
 def _check(solid: WrittenSolid, ignore: Collection[str]) -> None:

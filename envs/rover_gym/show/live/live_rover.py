@@ -172,12 +172,13 @@ class LiveRover:
         """`(n, 4)` centres and radii of the rocks that were thrown, m."""
         return self._rocks.copy()
 
-    def step(self, forward: float = 0.0, turn: float = 0.0) -> None:
+    def step(self, forward: float = 0.0, turn: float = 0.0, *, action: npt.NDArray[np.float32] | None = None) -> None:
         """Takes one control period, by hand or by the driver; a drive that has ended stays as it is.
 
         Args:
             forward: By hand: the speed, over the largest; -1 to 1.
             turn: By hand: the curvature, over the largest, positive to the left; -1 to 1.
+            action: An action of `Rover-v0`, in the place of both and of the driver's.
 
         Raises:
             OptionError: A number is not within -1 to 1.
@@ -188,7 +189,9 @@ class LiveRover:
         if self.ended:
             return
         wheel, state = self._wheel, self._wheel.state
-        if wheel.driver is None:
+        if action is not None:
+            pass
+        elif wheel.driver is None:
             action = self._hand.act(self.env.complete_observation()[None], np.array([[*command, 0.0]]))[0]
         elif wheel.seen is None:
             action = self.env.progress.previous_action.astype(np.float32)
@@ -233,13 +236,15 @@ class LiveRover:
         if policy is not None:  # its plan of the ground, or to the goal, is out of date
             self._wheel = _Wheel(self.env, policy, policy.make(self.env))
 
-    def restart(self, seed: int | None = None) -> None:
-        """Begins again, with another seed if one is given.
+    def restart(self, seed: int | None = None, difficulty: float | None = None) -> None:
+        """Begins again, with another seed or another difficulty if they are given.
 
         Raises:
-            OptionError: The seed is no whole number from 0.
+            OptionError: The seed is no whole number from 0, or the difficulty is out of its range.
         """
-        self._begin(self.scene if seed is None else replace(self.scene, seed=seed))
+        given = {"seed": seed, "difficulty": difficulty}
+        changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        self._begin(replace(self.scene, **changes))
 
     def change(self, name: str, value: object) -> None:
         """Changes one of the choices; `LiveScene` lists them.

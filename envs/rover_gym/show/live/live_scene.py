@@ -34,6 +34,7 @@ class LiveChoices:
         models: Rovers by name; None is the built-in one.
         drivers: Names of the drivers, `BY_HAND` first.
         find_policy: Makes a driver of a name.
+        arguments: Further arguments of `RoverEnv`, such as `control_frequency`.
     """
 
     grounds: Mapping[str, str | Terrain] = field(default_factory=lambda: {name: name for name in TERRAINS})
@@ -44,6 +45,7 @@ class LiveChoices:
     )
     drivers: tuple[str, ...] = (BY_HAND, "pd", "scan", "foresight", "anywhere", "guided")
     find_policy: FindPolicy = named_policy
+    arguments: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -112,4 +114,5 @@ class LiveScene:
             "gravity": (0.0, -self.gravity, 0.0),
             "goal_distance": self.goal_distance,
             **rocky,
+            **choices.arguments,
         }
