@@ -3,7 +3,7 @@
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import partial
 from pathlib import Path
@@ -321,10 +321,9 @@ def _read_set(given: Mapping[str, Any]) -> ScoredSet:
     """A set of a file of results."""
     if "refused" in given:
         return ScoredSet(refused=str(given["refused"]))
-    rows: Iterator[dict[str, Any]] = (dict(zip(given["columns"], row, strict=True)) for row in given["episodes"])
-    return ScoredSet(
-        tuple(ScoredEpisode(**{key: math.nan if one is None else one for key, one in row.items()}) for row in rows)
-    )
+    rows: list[dict[str, Any]] = [dict(zip(given["columns"], row, strict=True)) for row in given["episodes"]]
+    whole: list[dict[str, Any]] = [{key: math.nan if one is None else one for key, one in row.items()} for row in rows]
+    return ScoredSet(tuple(ScoredEpisode(**row) for row in whole))
 
 
 def score(
