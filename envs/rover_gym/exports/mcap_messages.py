@@ -184,9 +184,7 @@ def raw_image(nanoseconds: int, frame: str, pixels: npt.NDArray[Any]) -> Any:
     encoding = "mono8" if pixels.dtype == np.uint8 else "32FC1"
     data = pixels.astype(pixels.dtype.newbyteorder("<")).tobytes()
     step = width * pixels.dtype.itemsize
-    found = message("RawImage")(
-        frame_id=frame, width=width, height=height, encoding=encoding, step=step, data=data
-    )
+    found = message("RawImage")(frame_id=frame, width=width, height=height, encoding=encoding, step=step, data=data)
     _stamp(found.timestamp, nanoseconds)
     return found
 

@@ -67,7 +67,8 @@ class McapWriter:
     | `/wheels` | JSON | by wheel: gap, forces, torques, set-point |
     | `/signals` | JSON | every other channel of the rows |
     | `/laser/points`, `/depth/points` | `foxglove.PointCloud` | of a run with these sensors, by `write_mcap` |
-    | `/NAME/image`, `/NAME/calibration` | `foxglove.CompressedImage` or `RawImage`, `CameraCalibration` | see `camera` |
+    | `/NAME/image` | `foxglove.CompressedImage` or `foxglove.RawImage` | see `camera` |
+    | `/NAME/calibration` | `foxglove.CameraCalibration` | once for each camera |
     | `/points`, `/camera` | `foxglove.PointCloud`, `foxglove.CompressedImage` | see `points` and `image` |
 
     Args:

@@ -177,7 +177,7 @@ def _bent(x: Array, distortion: tuple[float, float]) -> Array:
     return np.asarray(x * (1.0 + x**2 * (distortion[0] + x**2 * distortion[1])))
 
 
-def _table(fisheye: bool, distortion: tuple[float, float]) -> tuple[Array, Array]:  # noqa: FBT001 - a kind of lens
+def _table(fisheye: bool, distortion: tuple[float, float]) -> tuple[Array, Array]:
     """Values of x that a lens can show, and their distances from the middle, which rise."""
     x = np.linspace(0.0, FARTHEST[fisheye], TABLE)
     bent = _bent(x, distortion)
@@ -186,13 +186,13 @@ def _table(fisheye: bool, distortion: tuple[float, float]) -> tuple[Array, Array
     return x[:n], bent[:n]
 
 
-def _bent_back(shown: float, fisheye: bool, distortion: tuple[float, float]) -> bool:  # noqa: FBT001 - a kind of lens
+def _bent_back(shown: float, fisheye: bool, distortion: tuple[float, float]) -> bool:
     """Whether directions begin to approach the middle again nearer than a distance from it."""
     _, bent = _table(fisheye, distortion)
     return len(bent) < TABLE and shown > bent[-1]
 
 
-def _straightened(shown: Array, fisheye: bool, distortion: tuple[float, float]) -> Array:  # noqa: FBT001 - a kind of lens
+def _straightened(shown: Array, fisheye: bool, distortion: tuple[float, float]) -> Array:
     """The x of each distance from the middle; nan beyond the last that the lens can show."""
     x, bent = _table(fisheye, distortion)
     seen = np.interp(shown, bent, x)

@@ -216,7 +216,7 @@ GRAIN_SIZE = 128
 
 
 def grain() -> npt.NDArray[np.float64]:
-    """The ground's texture, fine and coarse grain that repeats: brightness (n, n) in steps of 1/255. Pages have it, too."""
+    """The ground's texture, which pages have, too: fine and coarse grain that repeats, (n, n) in steps of 1/255."""
     along = np.arange(GRAIN_SIZE) / GRAIN_SIZE
     u, v = np.meshgrid(along, along)
 

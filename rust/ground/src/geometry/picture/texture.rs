@@ -61,20 +61,32 @@ impl Grain {
     }
 
     /// Value between the four nearest pixels of a level.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 to the side
     fn between(&self, place: [f64; 2], level: usize) -> f64 {
         let (side, values) = (self.side >> level, &self.levels[level]);
-        let [[x, next_x, a], [y, next_y, b]] = place.map(|u| {
-            let at = (u - u.floor()) * side as f64 - 0.5;
-            let low = at.floor();
-            let wrap = |k: f64| (k + side as f64) % side as f64;
-            [wrap(low), wrap(low + 1.0), at - low]
+        let [[x, next_x], [y, next_y]] = place.map(|u| {
+            let (at, last) = (fraction(u) * side as f64 + 0.5, side - 1); // one more than its pixel
+            let low = whole(at) + last;
+            [low & last, (low + 1) & last]
         });
-        let value = |row: f64, column: f64| values[row as usize * side + column as usize];
-        let row = |y: f64| value(y, x) + a * (value(y, next_x) - value(y, x));
+        let [a, b] = place.map(|u| fraction(fraction(u) * side as f64 + 0.5));
+        let value = |row: usize, column: usize| values[row * side + column];
+        let row = |y: usize| value(y, x) + a * (value(y, next_x) - value(y, x));
         let (near, far) = (row(y), row(next_y));
         near + b * (far - near)
     }
+}
+
+/// Whole part of a number that is not negative.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // as asked for
+fn whole(x: f64) -> usize {
+    x as usize
+}
+
+/// What a number has beyond the whole number below it.
+#[allow(clippy::cast_possible_truncation)] // within the world's limits; without a call of `floor`
+fn fraction(x: f64) -> f64 {
+    let rest = x - (x as i64) as f64;
+    if rest < 0.0 { rest + 1.0 } else { rest }
 }
 
 /// The patch of a horizontal plane that a pixel shows: its extents along x and z, and across, m.
@@ -120,8 +132,8 @@ impl Checks {
         patch: &Patch,
     ) -> Colour {
         let side = |at: f64, wide: f64| {
-            let turn = 0.5 * at / self.tile + 0.25;
-            let edge = 2.0 * (turn - turn.floor() - 0.5).abs() - 0.5; // changes sign at every line
+            let turn = fraction(0.5 * at / self.tile + 0.25);
+            let edge = 2.0 * (turn - 0.5).abs() - 0.5; // changes sign at every line
             2.0 * (edge / (wide / self.tile).max(1e-4)).clamp(-0.5, 0.5)
         };
         let checks = 0.5 + 0.5 * side(place.x, patch.along[0]) * side(place.z, patch.along[1]);
