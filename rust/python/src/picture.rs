@@ -25,7 +25,11 @@ fn rows<const N: usize>(
 }
 
 /// N numbers.
-fn numbers<const N: usize>(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> Result<[f64; N]> {
+pub fn numbers<const N: usize>(
+    value: &Bound<'_, PyAny>,
+    kind: Kind,
+    field: &str,
+) -> Result<[f64; N]> {
     let what = format!("({N},)");
     let (flat, _) = finite_shaped(value, kind, (field, &what), |shape| shape == [N])?;
     Ok(std::array::from_fn(|k| flat[k]))

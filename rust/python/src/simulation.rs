@@ -25,7 +25,7 @@ use crate::errors::{BorderError, Kind, Result, Value};
 use crate::linearisation::{Linearisation, StepDerivatives, named_parameters, of_trajectory};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{self, Options, step_options};
-use crate::picture::{Picture, PictureLook, pixels, shot};
+use crate::picture::{self, Picture, PictureLook, pixels, shot};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::sand::sand_to_dict;
@@ -687,6 +687,7 @@ impl Simulation {
         let py = look.py();
         let given = Named::keywords(py, options)?;
         let look = arguments::object::<PictureLook>(look, Kind::Option, "look", "a PictureLook")?;
+        picture::numbers::<3>(place, Kind::Option, "place")?;
         let (rays, range) = rays(place, directions, given.get("max_range")?)?;
         let pixel = given.read("pixel", arguments::positive)?.unwrap_or(0.001);
         let shot = shot(given.some("sun")?.as_ref(), pixel, range)?;

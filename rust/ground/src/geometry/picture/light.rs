@@ -25,14 +25,13 @@ pub struct Light {
 }
 
 impl Light {
-    /// Light on a surface with a unit normal. `towards`: unit vector to the Sun, none in a shadow;
-    /// `open`: share of the sky's light that reaches the place.
+    /// Light on a surface with a unit normal. `towards`: unit vector to the Sun, none in a shadow.
     #[inline]
     #[must_use]
-    pub fn on(&self, normal: &Vector3<f64>, towards: Option<&Vector3<f64>>, open: f64) -> Colour {
+    pub fn on(&self, normal: &Vector3<f64>, towards: Option<&Vector3<f64>>) -> Colour {
         let sky = mix(&self.bounce, &self.sky, 0.5 + 0.5 * normal.y);
         let facing = towards.map_or(0.0, |sun| normal.dot(sun).max(0.0));
-        std::array::from_fn(|k| open * sky[k] + facing * self.sun[k])
+        std::array::from_fn(|k| sky[k] + facing * self.sun[k])
     }
 
     /// Colour of the sky in a unit direction.
@@ -82,7 +81,7 @@ mod tests {
         let sun = Vector3::y();
         for degrees in [0.0_f64, 30.0, 60.0, 90.0, 120.0] {
             let normal = Vector3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
-            let [lit, dark] = [Some(&sun), None].map(|sun| light().on(&normal, sun, 1.0)[0]);
+            let [lit, dark] = [Some(&sun), None].map(|sun| light().on(&normal, sun)[0]);
             let cosine = degrees.to_radians().cos();
             assert!((lit - dark - 0.6 * cosine.max(0.0)).abs() < 1e-15);
             assert!((dark - (0.2 + 0.1 * cosine)).abs() < 1e-15);

@@ -11,7 +11,7 @@ use crate::sand::ruts::{Rut, RutMap, RutsNear, Window};
 /// Most steps along a ray.
 const STEPS: u32 = 64;
 
-/// Share of the sky's light that reaches the bottom of a rut as deep as it is wide.
+/// Brightness at the bottom of a rut as deep as it is wide, as frames have it.
 const DARKEST: f64 = 0.5;
 
 /// Width of a rut by which its depth is judged, m.
@@ -127,9 +127,9 @@ impl<'a> Relief<'a> {
         false
     }
 
-    /// Share of the sky's light that reaches a depth, m.
+    /// Brightness of pressed sand at a depth, m.
     #[must_use]
-    pub fn open(depth: f64) -> f64 {
+    pub fn brightness(depth: f64) -> f64 {
         1.0 - (1.0 - DARKEST) * (depth / WIDE).min(1.0)
     }
 }

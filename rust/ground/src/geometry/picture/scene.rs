@@ -198,7 +198,8 @@ mod tests {
             let across = (centre - place) - sun * sun.dot(&(centre - place));
             prop_assume!((across.norm() - radius).abs() > 1e-3);
             prop_assert_eq!(scene.is_sunlit(&seen, &sun, 100.0), across.norm() > radius);
-            prop_assert!(!scene.is_sunlit(&Seen { normal: -seen.normal, ..seen }, &sun, 100.0));
+            let below = Seen { normal: -seen.normal, ..seen };
+            prop_assert!(!scene.is_sunlit(&below, &sun, 100.0));
         }
     }
 

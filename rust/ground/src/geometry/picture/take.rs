@@ -83,13 +83,7 @@ fn pixel(scene: &Scene<'_>, look: &Look, ray: &Ray, shot: &Shot) -> Pixel {
         (None, Some(_)) => look.light.sky(&ray.direction),
         (Some(seen), Some(sun)) => {
             let is_sunlit = scene.is_sunlit(&seen, &sun, look.light.haze[1]);
-            let open = match seen.surface {
-                Surface::Ground { depth } if depth > 0.0 => Relief::open(depth),
-                _ => 1.0,
-            };
-            let light = look
-                .light
-                .on(&seen.shading, is_sunlit.then_some(&sun), open);
+            let light = look.light.on(&seen.shading, is_sunlit.then_some(&sun));
             let own = own_colour(scene, look, &seen, (ray, shot));
             let lit = std::array::from_fn(|k| own[k] * light[k]);
             look.light.hazed(&lit, seen.distance)
@@ -105,14 +99,15 @@ fn pixel(scene: &Scene<'_>, look: &Look, ray: &Ray, shot: &Shot) -> Pixel {
 /// The colour of a surface in white light.
 fn own_colour(scene: &Scene<'_>, look: &Look, seen: &Seen, (ray, shot): (&Ray, &Shot)) -> Colour {
     match seen.surface {
-        Surface::Ground { .. } => {
+        Surface::Ground { depth } => {
             let tones = if scene.is_sand() {
                 &look.sand
             } else {
                 &look.firm
             };
             let patch = Patch::new(&ray.direction, &seen.normal, shot.pixel * seen.distance);
-            look.checks.colour(tones, &seen.place, &seen.normal, &patch)
+            let colour = look.checks.colour(tones, &seen.place, &seen.normal, &patch);
+            colour.map(|c| c * Relief::brightness(depth))
         }
         Surface::Rock(sphere) => {
             let shade = Stone::over(&sphere.centre).shade;

@@ -172,9 +172,10 @@ mod tests {
     #[test]
     fn fields_alternate_and_melt_into_their_mean_far_away() {
         let plain = checks(|_| 0.5); // brightness 0.72 + 0.15 + 0.13 everywhere
-        assert!((seen(&plain, 0.0, 0.0, 1e-3) - 0.5).abs() < 1e-12);
-        assert!((seen(&plain, 0.5, 0.0, 1e-3) - 1.0).abs() < 1e-12);
-        assert!((seen(&plain, 0.5, 0.5, 1e-3) - 0.5).abs() < 1e-12);
+        assert!((seen(&plain, 0.25, 0.25, 1e-3) - 0.5).abs() < 1e-12);
+        assert!((seen(&plain, -0.25, 0.25, 1e-3) - 1.0).abs() < 1e-12);
+        assert!((seen(&plain, 0.75, 0.75, 1e-3) - 0.5).abs() < 1e-12);
+        assert!((seen(&plain, 0.0, 0.25, 1e-3) - 0.75).abs() < 1e-12);
         for k in 0..20 {
             let far = seen(&plain, 0.13 * f64::from(k), 0.0, 1e3);
             assert!((far - 0.75).abs() < 1e-3);
