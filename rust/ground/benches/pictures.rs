@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use nalgebra::Vector3;
-use rover_ground::geometry::picture::{Checks, Grain, Light, Look, Scene, Shot, take};
+use rover_ground::geometry::picture::{Checks, Grain, Light, Look, PictureScene, Shot, take};
 use rover_ground::geometry::ray::{Ray, cast};
 use rover_ground::geometry::{HeightField, Plane, Rocks, SphereField, Terrain, Union};
 
@@ -131,7 +131,7 @@ fn main() {
     for (name, terrain) in grounds {
         let eye = Vector3::y() * (terrain.height(0.0, 0.0).unwrap() + 1.0);
         let (rays, look) = (camera(eye), look());
-        let scene = Scene::new(&*terrain, None, None, Vec::new());
+        let scene = PictureScene::new(&*terrain, None, None, Vec::new());
         let shot = |sun| Shot {
             range: 90.0,
             pixel: 0.006,

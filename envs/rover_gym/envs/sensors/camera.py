@@ -9,7 +9,7 @@ import numpy as np
 
 from rover_gym.core import OptionError, RoverModel
 from rover_gym.core.validation import flag, number, refuse, vector, whole
-from rover_gym.envs.sensors.picture import Picture, picture_look
+from rover_gym.envs.sensors.picture import CameraPicture, picture_look
 from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor
 
 #: Most pixels along a side, and the widest views, deg.
@@ -105,7 +105,7 @@ class Camera(Sensor):
         half = 0.5 * math.radians(self.view_deg)
         return 0.5 * self.width / (half if self.fisheye else math.tan(half))
 
-    def take(self, moment: Moment, max_range: float, sun: tuple[float, float, float] | None = None) -> Picture:
+    def take(self, moment: Moment, max_range: float, sun: tuple[float, float, float] | None = None) -> CameraPicture:
         """Takes its picture.
 
         Cameras with the same mount and pixels share it: the rays are cast once.
@@ -134,9 +134,9 @@ class Camera(Sensor):
             without=(self.mount.solid_of(model),),
         )
         n, shape = len(directions), (self.height, self.width)
-        picture = Picture(np.zeros((n, 3), np.float32), np.zeros(n, np.uint8), np.full(n, np.inf))
+        picture = CameraPicture(np.zeros((n, 3), np.float32), np.zeros(n, np.uint8), np.full(n, np.inf))
         picture.colours[looks], picture.kinds[looks], picture.distances[looks] = colours, kinds, distances
-        picture = Picture(*(values.reshape(*shape, *values.shape[1:]) for values in vars(picture).values()))
+        picture = CameraPicture(*(values.reshape(*shape, *values.shape[1:]) for values in vars(picture).values()))
         moment.pictures.append(((view, max_range, sun), picture))
         return picture.within(max_range)
 

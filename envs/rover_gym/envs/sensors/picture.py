@@ -12,7 +12,7 @@ from rover_gym.show.frames import appearance as look
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class CameraPicture:
     """The pixels of a camera, (height, width).
 
     Attributes:
@@ -25,10 +25,12 @@ class Picture:
     kinds: npt.NDArray[np.uint8]
     distances: Array
 
-    def within(self, max_range: float) -> "Picture":
+    def within(self, max_range: float) -> "CameraPicture":
         """The same with nothing beyond a distance, m; its colours stay."""
         seen = self.distances <= max_range
-        return Picture(self.colours, np.where(seen, self.kinds, np.uint8(0)), np.where(seen, self.distances, np.inf))
+        return CameraPicture(
+            self.colours, np.where(seen, self.kinds, np.uint8(0)), np.where(seen, self.distances, np.inf)
+        )
 
 
 def towards_sun(azimuth_deg: float, elevation_deg: float) -> Array:

@@ -2,7 +2,7 @@
 
 use super::rover::RoverSimulation;
 use crate::geometry::SphereField;
-use crate::geometry::picture::{Drawing, Look, Pixel, Relief, Scene, Shot, take};
+use crate::geometry::picture::{Drawing, Look, PictureScene, Pixel, RutRelief, Shot, take};
 use crate::geometry::ray::Ray;
 use crate::multibody::landmarks;
 
@@ -36,8 +36,8 @@ impl RoverSimulation {
         });
         let terrain = &**self.terrain();
         let ruts = self.sand().zip(terrain.soft());
-        let ruts = ruts.and_then(|(sand, soft)| Relief::new(&sand.ruts, soft.cell));
-        let scene = Scene::new(terrain, ruts, shown.balls, placed.collect());
+        let ruts = ruts.and_then(|(sand, soft)| RutRelief::new(&sand.ruts, soft.cell));
+        let scene = PictureScene::new(terrain, ruts, shown.balls, placed.collect());
         take(&scene, look, rays, shot)
     }
 }

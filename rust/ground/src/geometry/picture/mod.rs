@@ -18,10 +18,10 @@ pub mod texture;
 
 pub use drawing::{Drawing, PlacedDrawing};
 pub use light::Light;
-pub use relief::Relief;
-pub use scene::Scene;
+pub use relief::RutRelief;
+pub use scene::PictureScene;
 pub use stone::Stone;
-pub use take::{Kind, Look, Pixel, Shot, take};
+pub use take::{Look, Pixel, PixelKind, Shot, take};
 pub use texture::{Checks, Grain};
 
 /// Red, green and blue, 1 for white.

@@ -19,7 +19,7 @@ const WIDE: f64 = 0.06;
 
 /// The ruts of a machine.
 #[derive(Clone, Debug)]
-pub struct Relief<'a> {
+pub struct RutRelief<'a> {
     ruts: &'a RutMap,
     nothing: Window,
     /// Size of a cell, m.
@@ -37,7 +37,7 @@ pub struct Bottom {
     pub depth: f64,
 }
 
-impl<'a> Relief<'a> {
+impl<'a> RutRelief<'a> {
     /// Of ruts on a grid with cells of this size, m; none where nothing was driven on.
     #[must_use]
     pub fn new(ruts: &'a RutMap, cell: f64) -> Option<Self> {
@@ -150,7 +150,7 @@ mod tests {
         serde_json::from_value(listed).unwrap()
     }
 
-    fn bottom(relief: &Relief<'_>, from: [f64; 3], along: [f64; 3]) -> Option<(Ray, Bottom)> {
+    fn bottom(relief: &RutRelief<'_>, from: [f64; 3], along: [f64; 3]) -> Option<(Ray, Bottom)> {
         let ray = Ray::new(from.into(), along.into()).unwrap();
         let surface = plane::hit(&ray, &Plane::ground(), 9.0).unwrap();
         relief.under(&ray, &surface).map(|bottom| (ray, bottom))
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn a_ray_meets_the_bottom_or_a_wall() {
         let ruts = groove();
-        let relief = Relief::new(&ruts, CELL).unwrap();
+        let relief = RutRelief::new(&ruts, CELL).unwrap();
         let (_, down) = bottom(&relief, [0.1, 1.0, 0.02], [0.0, -1.0, 0.0]).unwrap();
         assert!(
             (down.depth - DEPTH).abs() < 1e-9 && (down.hit.distance - 1.0 - DEPTH).abs() < 1e-9
@@ -171,13 +171,13 @@ mod tests {
         let (_, wall) = bottom(&relief, [0.0, 1.0, -0.905], [0.0, -1.0, 1.0]).unwrap();
         assert!(wall.depth < DEPTH && wall.hit.normal.z < -0.5, "{wall:?}");
         assert!(bottom(&relief, [0.0, 1.0, 0.3], [0.0, -1.0, 0.0]).is_none());
-        assert!(Relief::new(&RutMap::new(1), CELL).is_none());
+        assert!(RutRelief::new(&RutMap::new(1), CELL).is_none());
     }
 
     #[test]
     fn a_wall_shades_as_far_as_the_sun_is_low() {
         let ruts = groove();
-        let relief = Relief::new(&ruts, CELL).unwrap();
+        let relief = RutRelief::new(&ruts, CELL).unwrap();
         let sun = Vector3::new(0.0, 0.5, -1.0).normalize(); // shadows are twice as long as walls high
         for (from_wall, is_dark) in [(0.03, true), (0.085, true), (0.12, false), (0.17, false)] {
             let place = Vector3::new(0.0, -DEPTH, -0.1 + from_wall);

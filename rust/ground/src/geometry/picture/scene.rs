@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::drawing::may_meet;
-use super::{Colour, PlacedDrawing, Relief, Stone};
+use super::{Colour, PlacedDrawing, RutRelief, Stone};
 use crate::geometry::ray::{Hit, Ray};
 use crate::geometry::shape::Sphere;
 use crate::geometry::terrain::{SphereField, Terrain};
@@ -43,9 +43,9 @@ pub struct Seen {
 }
 
 /// All that casts light back.
-pub struct Scene<'a> {
+pub struct PictureScene<'a> {
     terrain: &'a dyn Terrain,
-    ruts: Option<Relief<'a>>,
+    ruts: Option<RutRelief<'a>>,
     balls: Option<&'a SphereField>,
     drawings: Vec<PlacedDrawing<'a>>,
     /// Which of the drawings are seen; all cast shadows.
@@ -54,13 +54,13 @@ pub struct Scene<'a> {
     machine: Option<Sphere>,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> PictureScene<'a> {
     /// A ground with its ruts, grains, and the drawings of a machine; those that are not seen only
     /// cast shadows.
     #[must_use]
     pub fn new(
         terrain: &'a dyn Terrain,
-        ruts: Option<Relief<'a>>,
+        ruts: Option<RutRelief<'a>>,
         balls: Option<&'a SphereField>,
         drawings: Vec<(PlacedDrawing<'a>, bool)>,
     ) -> Self {
@@ -186,7 +186,7 @@ mod tests {
             let centre = Vector3::from(centre) + Vector3::y() * 2.0;
             let sun = (Vector3::from(sun) + Vector3::y() * 1.2).normalize();
             let field = SphereField::new(&[centre.into()], &[radius], Some(Plane::ground())).unwrap();
-            let scene = Scene::new(&field, None, None, Vec::new());
+            let scene = PictureScene::new(&field, None, None, Vec::new());
             let place = Vector3::new(place[0], 0.0, place[1]);
             let seen = Seen {
                 distance: 1.0,
@@ -211,7 +211,8 @@ mod tests {
         let placed = drawing.placed(Vector3::zeros(), Matrix3::identity());
         let down = Ray::new(Vector3::y() * 3.0, -Vector3::y()).unwrap();
         let ground = Plane::ground();
-        let scene = |is_seen| Scene::new(&ground, None, None, vec![(placed.clone(), is_seen)]);
+        let scene =
+            |is_seen| PictureScene::new(&ground, None, None, vec![(placed.clone(), is_seen)]);
         let roof = scene(true).first(&down, 9.0).unwrap();
         assert_eq!(roof.surface, Surface::Machine([0.25; 3]));
         assert!((roof.distance - 2.0).abs() < 1e-12 && roof.normal.y > 0.99);

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::scene::{Scene, Seen, Surface};
+use super::scene::{PictureScene, Seen, Surface};
 use super::texture::Patch;
-use super::{Checks, Colour, Light, Relief, Stone};
+use super::{Checks, Colour, Light, RutRelief, Stone};
 use crate::geometry::ray::Ray;
 
 /// The golden ratio, which spreads the shades of grains evenly.
@@ -13,7 +13,7 @@ const GOLDEN: f64 = 0.618_033_988_7;
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Kind {
+pub enum PixelKind {
     /// Nothing within range: the sky.
     Sky = 0,
     /// Ground, or grains.
@@ -30,7 +30,7 @@ pub struct Pixel {
     /// Light in the pixel; black in a picture without light.
     pub colour: Colour,
     /// What it shows.
-    pub kind: Kind,
+    pub kind: PixelKind,
     /// Along the ray, m; infinite for the sky.
     pub distance: f64,
 }
@@ -65,18 +65,18 @@ pub struct Shot {
 
 /// The pixels of rays in a scene.
 #[must_use]
-pub fn take(scene: &Scene<'_>, look: &Look, rays: &[Ray], shot: &Shot) -> Vec<Pixel> {
+pub fn take(scene: &PictureScene<'_>, look: &Look, rays: &[Ray], shot: &Shot) -> Vec<Pixel> {
     rays.iter()
         .map(|ray| pixel(scene, look, ray, shot))
         .collect()
 }
 
-fn pixel(scene: &Scene<'_>, look: &Look, ray: &Ray, shot: &Shot) -> Pixel {
+fn pixel(scene: &PictureScene<'_>, look: &Look, ray: &Ray, shot: &Shot) -> Pixel {
     let seen = scene.first(ray, shot.range);
-    let kind = seen.map_or(Kind::Sky, |seen| match seen.surface {
-        Surface::Ground { .. } | Surface::Ball(_) => Kind::Ground,
-        Surface::Rock(_) => Kind::Rock,
-        Surface::Machine(_) => Kind::Machine,
+    let kind = seen.map_or(PixelKind::Sky, |seen| match seen.surface {
+        Surface::Ground { .. } | Surface::Ball(_) => PixelKind::Ground,
+        Surface::Rock(_) => PixelKind::Rock,
+        Surface::Machine(_) => PixelKind::Machine,
     });
     let colour = match (seen, shot.sun) {
         (_, None) => [0.0; 3],
@@ -97,7 +97,12 @@ fn pixel(scene: &Scene<'_>, look: &Look, ray: &Ray, shot: &Shot) -> Pixel {
 }
 
 /// The colour of a surface in white light.
-fn own_colour(scene: &Scene<'_>, look: &Look, seen: &Seen, (ray, shot): (&Ray, &Shot)) -> Colour {
+fn own_colour(
+    scene: &PictureScene<'_>,
+    look: &Look,
+    seen: &Seen,
+    (ray, shot): (&Ray, &Shot),
+) -> Colour {
     match seen.surface {
         Surface::Ground { depth } => {
             let tones = if scene.is_sand() {
@@ -107,7 +112,7 @@ fn own_colour(scene: &Scene<'_>, look: &Look, seen: &Seen, (ray, shot): (&Ray, &
             };
             let patch = Patch::new(&ray.direction, &seen.normal, shot.pixel * seen.distance);
             let colour = look.checks.colour(tones, &seen.place, &seen.normal, &patch);
-            colour.map(|c| c * Relief::brightness(depth))
+            colour.map(|c| c * RutRelief::brightness(depth))
         }
         Surface::Rock(sphere) => {
             let shade = Stone::over(&sphere.centre).shade;
