@@ -130,7 +130,7 @@ bench: $(STAMPS)/release ## time a step and tell where the time goes, MuJoCo's b
 	$(COMPARE).rollout
 	$(COMPARE).exploring_bench
 	$(COMPARE).tails
-	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays solver disks)
+	cargo bench --locked $(addprefix --bench ,step accuracy spheres rays pictures solver disks)
 	cargo run --locked --quiet --profile bench -p rover-comparison --example sand_steps
 	-$(COMPARE).instructions
 

@@ -13,13 +13,27 @@ import matplotlib.pyplot as plt
 from PIL import Image
 
 import rover_gym
-from rover_gym.envs.sensors import ColourCamera, DepthCamera, LaserScanner, Mount
+from rover_gym.envs.sensors import ColourCamera, DepthCamera, LaserScanner, Mount, SegmentationCamera
 from rover_gym.show.figures.style import STYLE
 
 PICTURE = Path(__file__).parent / "sensors.png"
 SEED = 4
 VIEW = {"mount": Mount(position=(0.75, 0.2, 0.0), pitch_deg=-14.0), "width": 320, "height": 240, "view_deg": 60.0}
 CAMERA = DepthCamera(max_range=6.0, **VIEW)
+FISHEYE = ColourCamera(
+    name="fisheye",
+    mount=Mount(position=(0.75, 0.2, 0.0), heading_deg=70.0, pitch_deg=-20.0),
+    width=320,
+    height=240,
+    view_deg=190.0,
+    fisheye=True,
+    sun_azimuth_deg=20.0,
+    sun_elevation_deg=14.0,
+    exposure=0.45,
+    vignetting=0.5,
+)
+#: Colours of sky, ground, rocks and rover.
+LABELS = np.array([(230, 230, 230), (213, 94, 0), (86, 180, 233), (0, 0, 0)], dtype=np.uint8)
 SCANNER = LaserScanner(
     mount=Mount(position=(0.0, 1.2, 0.0)),
     rays=1440,
@@ -34,7 +48,7 @@ def main() -> None:
     """Resets among rocks, measures, and draws the four views."""
     env = gym.make(
         "RoverRocks-v0",
-        sensors=[CAMERA, ColourCamera(**VIEW), SCANNER],
+        sensors=[CAMERA, ColourCamera(**VIEW), SegmentationCamera(**VIEW), FISHEYE, SCANNER],
         difficulty=2.0,
         rock_abundance=0.3,
         slope_deg=0.0,
@@ -45,14 +59,18 @@ def main() -> None:
     )
     observation, _ = env.reset(seed=SEED)
     with mpl.rc_context(STYLE):
-        figure, ((scene, colour), (depth, scan)) = plt.subplots(2, 2, figsize=(9.0, 7.0), width_ratios=(1.2, 1.2))
+        figure, ((scene, colour, labels), (fisheye, depth, scan)) = plt.subplots(2, 3, figsize=(13.0, 7.0))
         scene.imshow(env.render())
         scene.set_title("the scene")
         colour.imshow(observation["colour"])
         colour.set_title("colour camera, 320 x 240")
+        labels.imshow(LABELS[observation["segmentation"]])
+        labels.set_title("segmentation camera")
+        fisheye.imshow(observation["fisheye"])
+        fisheye.set_title("fisheye with a view of 190 degrees, the Sun low")
         image = depth.imshow(observation["depth"], cmap="viridis_r", vmin=0.0, vmax=CAMERA.max_range)
-        depth.set_title("depth camera, 320 x 240")
-        for axes in (scene, colour, depth):
+        depth.set_title("depth camera")
+        for axes in (scene, colour, labels, fisheye, depth):
             axes.axis("off")
         figure.colorbar(image, ax=depth, label="depth, m", shrink=0.8)
         draw_scan(scan, observation["scan"], env.unwrapped)

@@ -62,6 +62,7 @@ __all__: list[str] = [
     "Motor",
     "OptionError",
     "PathSearch",
+    "PictureLook",
     "PlanarContacts",
     "PlanarGround",
     "PlanarSimulation",
@@ -1014,6 +1015,39 @@ class Union(Terrain):
     def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
+class PictureLook:
+    """How pictures show a rover and its ground: what is drawn of solids, colours, and light.
+
+    Immutable. Colours are red, green and blue, 1 for white.
+
+    Args:
+        drawings: For solids by name: the corners of triangles in the solid's frame, (n, 9), m, the
+            normals at these corners, (n, 9), and the triangles' colours, (n, 3). Triangles without
+            an area are not drawn.
+        colours: `ground` and `sand`, the two tones of the checkered ground, (2, 3); `rock` and
+            `ball`, (3,).
+        light: `sun`, `sky` and `bounce`, the light of Sun, sky and ground on a white surface that
+            faces them, (3,); `horizon` and `zenith`, colours of the sky, (3,); `bands`, rising
+            elevations, deg, and the share of `zenith` there, (n, 2); `haze`, distances where haze
+            begins and where it hides everything, (2,), m.
+        grain: Brightness of the ground's texture, (n, n) from 0 to 1, n a power of 2.
+        tile: Edge of a field of the checkered ground, m.
+
+    Raises:
+        OptionError: An array has a wrong shape or an entry that is not finite, an entry is missing,
+            `tile` is not positive, or `grain` is not square.
+    """
+    def __new__(
+        cls,
+        drawings: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]],
+        *,
+        colours: Mapping[str, npt.ArrayLike],
+        light: Mapping[str, npt.ArrayLike],
+        grain: npt.ArrayLike,
+        tile: float,
+    ) -> PictureLook: ...
+
+@final
 class StepReport:
     """Summary of the time steps of one call: sums or worst values over the steps."""
     @property
@@ -1856,6 +1890,42 @@ class Simulation(AnySimulation):
         Raises:
             OptionError: As for `Terrain.cast_rays`, or `without` contains a name that is not a
                 solid of the model.
+        """
+    def take_picture(
+        self,
+        look: PictureLook,
+        place: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        *,
+        max_range: float | None = None,
+        pixel: float = 0.001,
+        sun: npt.ArrayLike | None = None,
+        balls: SphereField | None = None,
+        without: str | Sequence[str] = (),
+    ) -> tuple[_Observation, npt.NDArray[np.uint8], _Array]:
+        """Takes a picture of the ground and of the rover in the light of Sun and sky, pixel by pixel.
+
+        Every ray of a pixel that meets a surface casts another towards the Sun. Ruts in sand are
+        shown as a relief.
+
+        Args:
+            look: Colours and light, and what is drawn of the rover.
+            place: Of the camera, world frame, (3,), m.
+            directions: Of the pixels, world frame, (n, 3), of any length.
+            max_range: Largest distance, m; unlimited by default.
+            pixel: Angle between neighbouring pixels, rad, at which textures are smoothed.
+            sun: Direction to the Sun, world frame, (3,); without it the colours are 0.
+            balls: Grains around the rover.
+            without: Names of solids that are not seen, such as the one that carries the camera;
+                they cast shadows.
+
+        Returns:
+            Colours, (n, 3) float32, 1 for white; kinds, (n,) uint8: 0 nothing, 1 ground or grains,
+            2 rocks, 3 the rover; distances along the rays, (n,), m, infinite without a hit.
+
+        Raises:
+            OptionError: As for `cast_rays`, `pixel` is not positive, or the Sun is not above the
+                horizon.
         """
     def momentum(self) -> tuple[_Array, _Array]:
         """Momentum of the rover.

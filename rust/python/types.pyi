@@ -237,6 +237,15 @@ class Union:
     def __new__(parts: _Terrains): ...
     parts: list[Terrain]
 
+class PictureLook:
+    def __new__(
+        drawings: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]],
+        colours: Mapping[str, npt.ArrayLike],
+        light: Mapping[str, npt.ArrayLike],
+        grain: npt.ArrayLike,
+        tile: float,
+    ): ...
+
 class StepReport:
     status: Literal["converged", "not_converged"]
     is_converged: bool
@@ -366,6 +375,14 @@ class Simulation:
     def reading() -> _Array: ...
     def reading_layout() -> dict[str, slice]: ...
     def cast_rays(without: str | Sequence[str]) -> tuple[_Array, _Array]: ...
+    def take_picture(
+        look: PictureLook,
+        place: npt.ArrayLike,
+        pixel: float,
+        sun: npt.ArrayLike | None,
+        balls: SphereField | None,
+        without: str | Sequence[str],
+    ) -> tuple[_Observation, npt.NDArray[np.uint8], _Array]: ...
     def momentum() -> tuple[_Array, _Array]: ...
     def centre_of_mass() -> _Array: ...
     def tags() -> dict[str, _Array]: ...

@@ -24,6 +24,7 @@ from rover_gym.envs.sensors import (
     LaserScanner,
     MotorSensors,
     Mount,
+    SegmentationCamera,
     Sensor,
     SensorObservation,
     WheelEncoders,
@@ -40,7 +41,9 @@ NOISY: list[Sensor] = [
     InertialUnit(accelerometer_noise=2e-3, accelerometer_bias=(-0.05, 0.05), gyroscope_noise=2e-4, gyroscope_walk=1e-4),
     HeadingSensor(noise_deg=0.5, bias_deg=(-2.0, 2.0), rate=5.0, latency=(0.0, 0.2)),
     DepthCamera(width=12, height=8, noise=0.005, dropout=0.05, latency=0.1),
-    ColourCamera(width=6, height=4, noise=0.02, gain=(0.8, 1.2), rate=10.0),
+    ColourCamera(width=6, height=4, noise=0.02, gain=(0.8, 1.2), rate=10.0, sun_elevation_deg=(20.0, 70.0)),
+    ColourCamera(name="fisheye", width=8, height=6, view_deg=180.0, fisheye=True, shot_noise=0.01, exposure=0.4),
+    SegmentationCamera(width=12, height=8),
     LaserScanner(rays=24, noise=0.01, bias=(-0.02, 0.02)),
 ]
 
@@ -261,28 +264,25 @@ def test_a_colour_image_shows_what_a_depth_image_measures_in_the_light_of_the_su
     picture = one(ColourCamera(image="normalised", **view), moment)
     depth = one(DepthCamera(max_range=90.0, **view), moment)
     assert picture.shape == (30, 40, 3)
-    at = np.unravel_index(np.where(depth < 4.5, depth, np.inf).argmin(), depth.shape)  # on the rock
-    direction = ColourCamera(**view).directions[at]
-    normal = np.array([*(depth[at] * direction + [0.0, 5.0, 0.0] - [4.0, 5.8, -1.0])]) / 0.3
-    sky = np.array(look.BOUNCE_LIGHT) + (0.5 + 0.5 * normal[1]) * (np.array(look.SKY_LIGHT) - look.BOUNCE_LIGHT)
-    light = sky + max(0.0, normal @ look.SUN) * np.array(look.SUN_LIGHT)
-    np.testing.assert_allclose(picture[at], np.array(look.ROCK_COLOUR) * light, rtol=1e-6)
+    on_rock = depth < 4.5
+    tint = picture[on_rock] / np.array(look.ROCK_COLOUR)
+    assert (tint.min(axis=0) > 0.8 * np.array(look.BOUNCE_LIGHT)).all()
+    assert (tint.max(axis=0) < 1.12 * (np.array(look.SKY_LIGHT) + look.SUN_LIGHT)).all()
+    assert on_rock.sum() > 5
     share = np.interp(np.degrees(np.arctan(14.5 / 20.0 / np.hypot(1.0, 0.5 / 20.0))), *np.array(look.SKY_BANDS).T)
     blue = np.array(look.SKY_COLOUR) + share * (np.array(look.SKY_COLOUR_2) - look.SKY_COLOUR)
     np.testing.assert_allclose(picture[0, 20], blue, rtol=1e-6)
     np.testing.assert_allclose(picture[15, 0], look.SKY_COLOUR, atol=0.02)  # far ground fades into haze
 
 
-def test_a_colour_image_shows_rover_shadow_and_fields_of_the_ground() -> None:
+def test_a_colour_image_shows_the_rover_and_its_shadow() -> None:
     moment = Moment(at_rest(RoverModel()), 0.0)
     above: dict[str, Any] = {"mount": Mount(position=(0.0, 6.0, 0.0), pitch_deg=-90.0), "image": "normalised"}
     camera: dict[str, Any] = {**above, "width": 161, "height": 161, "view_deg": 60.0}
     with_rover, without = (one(ColourCamera(sees_rover=seen, **camera), moment) for seen in (True, False))
-    lit = np.array(look.SKY_LIGHT) + look.SUN[1] * np.array(look.SUN_LIGHT)
-    found = {tuple(colour) for colour in np.unique(np.round(without.reshape(-1, 3), 6), axis=0)}
-    assert found == {tuple(np.round(np.array(tone) * lit, 6)) for tone in (look.GROUND_COLOUR, look.GROUND_COLOUR_2)}
-    dark = np.array(look.GROUND_COLOUR) * look.SKY_LIGHT
-    shadow = np.isclose(with_rover, dark, atol=1e-6).all(axis=2)
+    sky = np.array(look.SKY_LIGHT)
+    dark = sky / (sky + look.SUN[1] * np.array(look.SUN_LIGHT))
+    shadow = np.isclose(with_rover / without, dark, rtol=1e-5).all(axis=2)
     depth = one(DepthCamera(max_range=20.0, **{k: v for k, v in camera.items() if k != "image"}), moment)
     assert shadow.sum() > 20
     assert (depth[shadow] > 10.9).all()  # the ground, 11 m below
@@ -300,7 +300,8 @@ def test_balls_of_a_pit_have_the_colour_of_sand() -> None:
     moment = Moment(at_rest(RoverModel()), 0.0, Balls())  # type: ignore[arg-type]
     camera = ColourCamera(mount=Mount(pitch_deg=-90.0), width=1, height=1, sees_rover=False, image="normalised")
     lit = np.array(look.SKY_LIGHT) + look.SUN[1] * np.array(look.SUN_LIGHT)
-    np.testing.assert_allclose(one(camera, moment)[0, 0], np.minimum(1.0, np.array(look.SAND_COLOUR) * lit), rtol=1e-9)
+    shown = np.minimum(1.0, 0.84 * np.array(look.SAND_COLOUR) * lit)  # the first has the darkest shade
+    np.testing.assert_allclose(one(camera, moment)[0, 0], shown, rtol=1e-6)
 
 
 def test_a_scan_turns_to_the_left_from_its_beginning() -> None:
@@ -374,6 +375,19 @@ BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: ColourCamera(max_range=0.0), "max_range"),
     (lambda: ColourCamera(gain=(1.2, 0.8)), "gain"),
     (lambda: ColourCamera(height=0), "height"),
+    (lambda: ColourCamera(view_deg=200.0), "view_deg"),
+    (lambda: ColourCamera(view_deg=361.0, fisheye=True), "view_deg"),
+    (lambda: ColourCamera(fisheye=1), "fisheye"),  # type: ignore[arg-type]
+    (lambda: ColourCamera(distortion=(0.1,)), "distortion"),  # type: ignore[arg-type]
+    (lambda: ColourCamera(distortion=(-0.5, 0.0)), "distortion"),
+    (lambda: ColourCamera(sun_azimuth_deg=math.nan), "sun_azimuth_deg"),
+    (lambda: ColourCamera(sun_elevation_deg=0.0), "sun_elevation_deg"),
+    (lambda: ColourCamera(sun_elevation_deg=(10.0, 91.0)), "sun_elevation_deg[1]"),
+    (lambda: ColourCamera(exposure=0.0), "exposure"),
+    (lambda: ColourCamera(vignetting=1.1), "vignetting"),
+    (lambda: ColourCamera(shot_noise=-1.0), "shot_noise"),
+    (lambda: SegmentationCamera(max_range=-1.0), "max_range"),
+    (lambda: SegmentationCamera(image="uint8"), "image"),
     (lambda: gym.make("Rover-v0", sensors=[ColourCamera(mount=Mount(solid="mast"))]), "mount.solid"),
     (lambda: DepthCamera(sees_rover=1), "sees_rover"),  # type: ignore[arg-type]
     (lambda: LaserScanner(elevations_deg=()), "elevations_deg"),

@@ -18,6 +18,7 @@ from recordings import recorded
 from rovers import placed, standing
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
+from rover_gym.envs.sensors import ColourCamera, DepthCamera, Mount, SegmentationCamera
 from rover_gym.record import RecordingError, RoverSampler, read_run
 
 pytest.importorskip("mcap.reader")
@@ -221,6 +222,41 @@ def test_a_run_renders_its_images(tmp_path: Path) -> None:
     assert [round(stamp / 1e6) for stamp, _ in found["/camera"]] == [5, 105, 205]
 
 
+def test_a_run_shows_what_cameras_on_it_see(tmp_path: Path) -> None:
+    """Colours, labels and depths of a camera whose frame looks along z, x to the right, with its calibration."""
+    image = pytest.importorskip("PIL.Image")
+    view: dict[str, Any] = {"width": 32, "height": 24, "mount": Mount(position=(0.5, 1.0, -0.2), pitch_deg=-30.0)}
+    depth = DepthCamera(**view)
+    cameras = [ColourCamera(**view), SegmentationCamera(**view), depth, ColourCamera(name="wide", fisheye=True)]
+    run = read_run(quick_run(tmp_path / "run.h5", n=41))
+    found = read(write_mcap(run, tmp_path / "run.mcap", cameras=cameras, fps=10.0))
+    assert [round(stamp / 1e6) for stamp, _ in found["/colour/image"]] == [5, 105, 205]
+    picture = np.asarray(image.open(io.BytesIO(found["/colour/image"][0][1].data)))
+    assert picture.shape == (24, 32, 3)
+    assert picture.std() > 5.0
+    labels, depths = found["/segmentation/image"][0][1], found["/depth/image"][0][1]
+    assert (labels.encoding, labels.step, depths.encoding, depths.step) == ("mono8", 32, "32FC1", 128)
+    assert set(labels.data) <= {0, 1, 2, 3}
+    ((_, lens),) = found["/colour/calibration"]
+    assert (lens.distortion_model, list(lens.D)) == ("plumb_bob", [0.0] * 5)
+    assert found["/wide/calibration"][0][1].distortion_model == "kannala_brandt"
+    # The ray of a pixel, from its number and the calibration, ends on the ground.
+    metres = np.frombuffer(depths.data, "<f4").reshape(24, 32)
+    frames = [one for _, message in found["/tf"] for one in message.transforms]
+    mounted = next(one for one in frames if one.child_frame_id == "colour")
+    trunk = next(one for one in frames if one.child_frame_id == mounted.parent_frame_id)
+    world = next(one for one in frames if one.child_frame_id == "world")
+    on_ground = np.frombuffer(labels.data, np.uint8).reshape(24, 32) == SegmentationCamera.GROUND
+    assert on_ground.any()
+    for row, column in np.argwhere(on_ground & (metres < depth.max_range))[::20]:
+        z = float(metres[row, column])
+        point = z * np.array([(column - lens.K[2]) / lens.K[0], (row - lens.K[5]) / lens.K[4], 1.0])
+        for frame in (mounted, trunk, world):
+            origin = np.array([frame.translation.x, frame.translation.y, frame.translation.z])
+            point = turned(frame.rotation, point) + origin
+        assert point @ [-0.1, -0.05, 1.0] == pytest.approx(0.0, abs=0.01), "on the plane of GROUND, seen with z up"
+
+
 @pytest.mark.parametrize("end", ["kill", "full"])
 def test_what_was_written_stays_readable(end: str, tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
@@ -263,6 +299,8 @@ def test_a_finished_log_has_an_index(tmp_path: Path) -> None:
         (lambda log: log.points(0.0, np.zeros((3, 2))), "points: must have the shape"),
         (lambda log: log.points(0.0, np.zeros((1, 3)), topic="/tf"), "topic: has messages of type foxglove.Frame"),
         (lambda log: log.image(0.0, PICTURE.astype(float)), "pixels: must be"),
+        (lambda log: log.camera(0.0, ColourCamera(width=3, height=2), PICTURE), "reading: must be of the camera"),
+        (lambda log: log.camera(0.0, ColourCamera(image="normalised"), PICTURE), "camera.image: must be"),
         (lambda log: log.imu(0.0, np.eye(3), np.zeros(3), np.full(3, np.nan)), "acceleration: must be finite"),
     ],
 )
@@ -289,8 +327,10 @@ def test_a_log_has_one_writer_and_one_end(tmp_path: Path) -> None:
 
 def test_the_command_writes_beside_the_run(tmp_path: Path) -> None:
     path = quick_run(tmp_path / "run.h5", n=3)
-    output_of("export", "mcap", path)
-    assert len(read(tmp_path / "run.mcap")["/tf"]) == 3
+    output_of("export", "mcap", path, "--camera")
+    found = read(tmp_path / "run.mcap")
+    assert len(found["/tf"]) == 3 + 1  # the camera's
+    assert found["/colour/calibration"][0][1].width == 320
     assert "--output: would replace the run itself" in error_of("export", "mcap", path, "--output", path)
     assert read_run(path).n_frames == 3
 

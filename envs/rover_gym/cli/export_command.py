@@ -34,11 +34,13 @@ from rover_gym.core.validation import refuse
 from rover_gym.drive.commands.driven import Policy, find_rover_env
 from rover_gym.drive.pd.random_policy import RandomPolicy
 from rover_gym.envs.registration import ENVIRONMENTS
+from rover_gym.envs.sensors import ColourCamera
 from rover_gym.exports.fmu import fmu_library, write_fmu
 from rover_gym.exports.mcap_writer import FPS, write_mcap
 from rover_gym.exports.minari_data import write_dataset
 from rover_gym.exports.onnx_policy import write_onnx
 from rover_gym.record.rover_run import read_run
+from rover_gym.show.replay.overlays import sensor_of
 
 export = group("Runs, policies and rovers in other formats.")
 
@@ -52,6 +54,9 @@ def mcap(
         Path | None, typer.Option(dir_okay=False, help="File to write; beside the run by default.")
     ] = None,
     images: Annotated[bool, typer.Option("--images", help="Also render images (extra render).")] = False,
+    camera: Annotated[
+        bool, typer.Option("--camera", help="Also take the pictures of a camera on the rover, which needs no renderer.")
+    ] = False,
     fps: Annotated[float, typer.Option(help="Images a second.")] = FPS,
 ) -> None:
     """Write a saved run as an MCAP log, which robotics viewers open without ROS."""
@@ -61,7 +66,10 @@ def mcap(
     check_paths({"the run": run}, output=path)
     with progress_bar() as bar:
         task = bar.add_task("rows", total=saved.n_frames, state="")
-        write_mcap(saved, path, images=images, fps=fps, progress=lambda n: bar.update(task, completed=n))
+        cameras = [ColourCamera(mount=sensor_of("depth", saved.model).mount, width=320, height=240)] if camera else []
+        write_mcap(
+            saved, path, images=images, cameras=cameras, fps=fps, progress=lambda n: bar.update(task, completed=n)
+        )
     say_path("MCAP", path)
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from rover_gym.envs.sensors import Camera
     from rover_gym.show.frames.appearance import Colour
 
 
@@ -39,6 +40,9 @@ MAP, WORLD = "map", "world"
 
 #: R_BS: from the axes of a solid as logged (REP 103: x forward, y left, z up) to its own (x forward, y up, z right).
 SOLID_FROM_LOGGED = MAP_FROM_WORLD.T
+
+#: From the axes of a camera as logged (x right, y down, z forward) to its own (x forward, y up, z right).
+CAMERA_FROM_LOGGED = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 JPEG_QUALITY = 90
 
@@ -170,6 +174,34 @@ def image(nanoseconds: int, frame: str, pixels: npt.NDArray[np.uint8]) -> Any:
     picture, data = require("PIL.Image", "logs").fromarray(pixels), io.BytesIO()
     picture.save(data, "JPEG", quality=JPEG_QUALITY)
     found = message("CompressedImage")(frame_id=frame, data=data.getvalue(), format="jpeg")
+    _stamp(found.timestamp, nanoseconds)
+    return found
+
+
+def raw_image(nanoseconds: int, frame: str, pixels: npt.NDArray[Any]) -> Any:
+    """`foxglove.RawImage` of one channel (height, width): labels of uint8, or depths of float32, m."""
+    height, width = pixels.shape
+    encoding = "mono8" if pixels.dtype == np.uint8 else "32FC1"
+    data = pixels.astype(pixels.dtype.newbyteorder("<")).tobytes()
+    step = width * pixels.dtype.itemsize
+    found = message("RawImage")(frame_id=frame, width=width, height=height, encoding=encoding, step=step, data=data)
+    _stamp(found.timestamp, nanoseconds)
+    return found
+
+
+def calibration(nanoseconds: int, frame: str, camera: Camera) -> Any:
+    """`foxglove.CameraCalibration` of a camera; whole pixel numbers are the pixels' centres."""
+    f, x, y = camera.focal_length, 0.5 * (camera.width - 1), 0.5 * (camera.height - 1)
+    found = message("CameraCalibration")(
+        frame_id=frame,
+        width=camera.width,
+        height=camera.height,
+        distortion_model="kannala_brandt" if camera.fisheye else "plumb_bob",
+        D=[*camera.distortion, 0.0, 0.0] + [0.0] * (not camera.fisheye),
+        K=[f, 0.0, x, 0.0, f, y, 0.0, 0.0, 1.0],
+        R=np.eye(3).ravel().tolist(),
+        P=[f, 0.0, x, 0.0, 0.0, f, y, 0.0, 0.0, 0.0, 1.0, 0.0],
+    )
     _stamp(found.timestamp, nanoseconds)
     return found
 

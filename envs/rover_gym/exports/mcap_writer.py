@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,8 @@ import numpy.typing as npt
 from rover_gym.core import RoverModel, Simulation, Terrain
 from rover_gym.core.extras import require
 from rover_gym.core.validation import TERRAINS, array, checked, number, refuse, vector
+from rover_gym.envs.sensors import DepthCamera
+from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.exports import mcap_messages as messages
 from rover_gym.exports.axes import MAP_FROM_WORLD
 from rover_gym.exports.mcap_messages import McapFile
@@ -29,6 +31,7 @@ from rover_gym.show.replay.overlays import SENSORS, hits, sensor_of
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from rover_gym.envs.sensors import Camera
 
 Array = npt.NDArray[np.float64]
 
@@ -64,6 +67,8 @@ class McapWriter:
     | `/wheels` | JSON | by wheel: gap, forces, torques, set-point |
     | `/signals` | JSON | every other channel of the rows |
     | `/laser/points`, `/depth/points` | `foxglove.PointCloud` | of a run with these sensors, by `write_mcap` |
+    | `/NAME/image` | `foxglove.CompressedImage` or `foxglove.RawImage` | see `camera` |
+    | `/NAME/calibration` | `foxglove.CameraCalibration` | once for each camera |
     | `/points`, `/camera` | `foxglove.PointCloud`, `foxglove.CompressedImage` | see `points` and `image` |
 
     Args:
@@ -254,6 +259,37 @@ class McapWriter:
         stamp = self._stamp(time)
         self._file.write(topic, stamp, messages.image(stamp, frame, given))
 
+    def camera(self, time: float, camera: Camera, reading: npt.ArrayLike) -> None:
+        """Writes a picture of a camera, and with its first the camera's calibration and frame, which has its name.
+
+        A colour image is compressed; labels and depths are not.
+
+        Args:
+            time: s.
+            camera: The sensor.
+            reading: What it reads, of the shape and the type that observations have.
+
+        Raises:
+            RecordingError: The camera is on a solid that the model lacks or reads images that are scaled, the reading
+                is not one of its, or the file is closed or cannot be written.
+        """
+        stamp, given, shape = self._stamp(time), np.asarray(reading), (camera.height, camera.width)
+        if camera.image not in (None, "uint8") or (isinstance(camera, DepthCamera) and camera.image is not None):
+            refuse(RecordingError, "camera.image", camera.image, "must be uint8 colours, labels, or depths in m")
+        if given.shape != (shape if camera.image is None else (*shape, 3)) or given.dtype != camera.reading_type:
+            refuse(RecordingError, "reading", (given.shape, str(given.dtype)), f"must be of the camera {camera.name!r}")
+        frame, topic = camera.name, f"/{camera.name}/calibration"
+        if topic not in self._topics:
+            solid = self._frames[camera.mount.solid_of(self._model)]
+            place, turn = camera.mount.pose_on(self._model)
+            own = messages.SOLID_FROM_LOGGED.T
+            at = (solid, frame, own @ place, own @ turn @ messages.CAMERA_FROM_LOGGED)
+            self._file.write("/tf", stamp, messages.transforms(stamp, [at]))
+            self._file.write(topic, stamp, messages.calibration(stamp, frame, camera))
+            self._topics[topic] = 0
+        write = messages.image if given.ndim == 3 else messages.raw_image
+        self._file.write(f"/{camera.name}/image", stamp, write(stamp, frame, given))
+
     def flush(self) -> None:
         """Writes all messages to the disk.
 
@@ -402,12 +438,13 @@ def _text(value: Any) -> str:
 FPS = 10.0
 
 
-@checked(run="RoverRun", path=Path, images=bool, fps=float, progress=callable)
+@checked(run="RoverRun", path=Path, images=bool, cameras=["Camera"], fps=float, progress=callable)
 def write_mcap(
     run: RoverRun,
     path: str | Path,
     *,
     images: bool = False,
+    cameras: Sequence[Camera] = (),
     fps: float = FPS,
     progress: Callable[[int], None] = lambda _rows: None,
 ) -> Path:
@@ -417,6 +454,7 @@ def write_mcap(
         run: The run.
         path: The file to write, with its folder.
         images: Whether to render it, as the environments render their frames (extra `render`).
+        cameras: Cameras of the rover, which see it drive again, without ruts. They need no renderer.
         fps: Images a second.
         progress: Called with the number of rows that are written.
 
@@ -429,7 +467,9 @@ def write_mcap(
     data = run.trajectory.data
     if "v" not in data:
         refuse(RecordingError, "run", sorted(data), "must hold v")
-    pictured = frozenset(film_rows(run.time, fps).tolist()) if images else frozenset()
+    pictured = frozenset(film_rows(run.time, fps).tolist()) if images or cameras else frozenset()
+    for camera in cameras:
+        camera.check(run.model)
     simulation = Simulation(run.model, run.terrain)
     with ExitStack() as stack:
         renderer = None
@@ -443,6 +483,11 @@ def write_mcap(
         writer = stack.enter_context(_whole_log(make))
         scans = {name: (sensor_of(name, run.model), data[name]) for name in SENSORS if name in data}
         rows = {name: values for name, values in data.items() if name not in scans}
+        generators = [np.random.default_rng(k) for k in range(len(cameras))]
+        drawing = [
+            (camera, camera.draw(run.model, generator), generator)
+            for camera, generator in zip(cameras, generators, strict=True)
+        ]
         for i in range(run.n_frames):
             writer.append({name: values[i] for name, values in rows.items()})
             for name, (sensor, readings) in scans.items():
@@ -450,9 +495,15 @@ def write_mcap(
                 writer.points(
                     float(run.time[i]), hits(sensor, run.model, readings[i]), frame=solid, topic=f"/{name}/points"
                 )
-            if renderer is not None and i in pictured:
+            if i in pictured:
+                time = float(run.time[i])
                 simulation.set_state(data["q"][i])
-                writer.image(float(run.time[i]), renderer.render(simulation))
+                if renderer is not None:
+                    writer.image(time, renderer.render(simulation))
+                moment = Moment(simulation, time)
+                for camera, drawn, generator in drawing:
+                    reading, _ = camera.measure(moment, {}, 0.0, drawn, generator)
+                    writer.camera(time, camera, reading.astype(camera.reading_type))
             progress(i + 1)
     return writer.path
 

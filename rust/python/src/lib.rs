@@ -31,6 +31,7 @@ mod model;
 mod motor;
 mod options;
 mod path_search;
+mod picture;
 mod planar;
 mod planar_ground;
 mod planar_machines;
@@ -95,6 +96,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<union::Union>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<stepping::AnySimulation>()?;
+    module.add_class::<picture::PictureLook>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<linearisation::Linearisation>()?;
     module.add_class::<linearisation::StepDerivatives>()?;

@@ -9,7 +9,7 @@ use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{
-    ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation as CoreSimulation,
+    ReadingLayout, ReadingRequest, ReadingScratch, RoverSimulation as CoreSimulation, Shown,
     TrajectoryBatch, state_size, with_sand,
 };
 use rover_task::draw::DrawnGround;
@@ -25,10 +25,12 @@ use crate::errors::{BorderError, Kind, Result, Value};
 use crate::linearisation::{Linearisation, StepDerivatives, named_parameters, of_trajectory};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{self, Options, step_options};
+use crate::picture::{self, Picture, PictureLook, pixels, shot};
 use crate::rays::{Met, met, rays};
 use crate::reading::{place, scan_points, slices};
 use crate::sand::sand_to_dict;
 use crate::shared::{Open, Release, Shared, Watch};
+use crate::sphere_field::SphereField;
 use crate::stepping::{AnySimulation, Problem, problem};
 use crate::{terrain, union};
 
@@ -97,6 +99,19 @@ impl Simulation {
     /// The simulation, for one call.
     pub fn open(&self) -> Result<MutexGuard<'_, CoreSimulation>, BorderError> {
         self.inner.open()
+    }
+
+    /// Names of the model's solids, as given.
+    fn solids(&self, without: Option<&Bound<'_, PyAny>>) -> Result<Vec<String>> {
+        let named = without.map(|given| texts(given, Kind::Option, "without"));
+        let named = named.transpose()?.unwrap_or_default();
+        let frames = self.model.frames();
+        let is_unknown = |name: &&String| !frames.iter().any(|frame| frame.name == **name);
+        if let Some(name) = named.iter().find(is_unknown) {
+            let message = format!("without: the model has no solid {name:?}");
+            return Err(Kind::Option.error("without", message, Value::Text(name.clone())));
+        }
+        Ok(named)
     }
 
     /// The ground as it was given, of which the core keeps less.
@@ -626,16 +641,7 @@ impl Simulation {
     ) -> Result<Met> {
         let (rays, range) = rays(origins, directions, max_range)?;
         let sees_parts = parts.flag(false, Kind::Option, "parts")?;
-        let without = without
-            .map(|given| texts(given, Kind::Option, "without"))
-            .transpose()?;
-        let without = without.unwrap_or_default();
-        for name in &without {
-            if !self.model.frames().iter().any(|frame| frame.name == *name) {
-                let message = format!("without: the model has no solid {name:?}");
-                return Err(Kind::Option.error("without", message, Value::Text(name.clone())));
-            }
-        }
+        let without = self.solids(without)?;
         let is_seen =
             |part: &Part| sees_parts && !without.iter().any(|name| name == part.name(&self.model));
         let seen: Vec<Part> = Part::all(&self.model).filter(is_seen).collect();
@@ -644,6 +650,66 @@ impl Simulation {
         Ok(met(&origins
             .py()
             .release(|| inner.cast(&rays, range, &seen))?))
+    }
+
+    /// Takes a picture of the ground and of the rover in the light of Sun and sky, pixel by pixel.
+    ///
+    /// Every ray of a pixel that meets a surface casts another towards the Sun. Ruts in sand are
+    /// shown as a relief.
+    ///
+    /// Args:
+    ///     look: Colours and light, and what is drawn of the rover.
+    ///     place: Of the camera, world frame, (3,), m.
+    ///     directions: Of the pixels, world frame, (n, 3), of any length.
+    ///     max_range: Largest distance, m; unlimited by default.
+    ///     pixel: Angle between neighbouring pixels, rad, at which textures are smoothed.
+    ///     sun: Direction to the Sun, world frame, (3,); without it the colours are 0.
+    ///     balls: Grains around the rover.
+    ///     without: Names of solids that are not seen, such as the one that carries the camera;
+    ///         they cast shadows.
+    ///
+    /// Returns:
+    ///     Colours, (n, 3) float32, 1 for white; kinds, (n,) uint8: 0 nothing, 1 ground or grains,
+    ///     2 rocks, 3 the rover; distances along the rays, (n,), m, infinite without a hit.
+    ///
+    /// Raises:
+    ///     OptionError: As for `cast_rays`, `pixel` is not positive, or the Sun is not above the
+    ///         horizon.
+    #[pyo3(signature = (look, place, directions, **options),
+        text_signature = "($self, look, place, directions, *, max_range=None, pixel=0.001, sun=None, balls=None, without=())")]
+    fn take_picture(
+        &self,
+        look: &Bound<'_, PyAny>,
+        place: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> Result<Picture> {
+        let py = look.py();
+        let given = Named::keywords(py, options)?;
+        let look = arguments::object::<PictureLook>(look, Kind::Option, "look", "a PictureLook")?;
+        picture::numbers::<3>(place, Kind::Option, "place")?;
+        let (rays, range) = rays(place, directions, given.get("max_range")?)?;
+        let pixel = given.read("pixel", arguments::positive)?.unwrap_or(0.001);
+        let shot = shot(given.some("sun")?.as_ref(), pixel, range)?;
+        let balls = given.get("balls")?;
+        let balls = balls.object::<Bound<'_, SphereField>>(
+            Kind::Option,
+            "balls",
+            "a SphereField or None",
+        )?;
+        let hidden = self.solids(given.some("without")?.as_ref())?;
+        given.finish()?;
+        let look = look.get();
+        let shown = Shown {
+            drawings: &look.drawings,
+            hidden: &hidden,
+            balls: balls.as_ref().map(|balls| &*balls.get().inner),
+        };
+        let held = self.open()?;
+        let inner = &*held;
+        Ok(pixels(&py.release(|| {
+            inner.take_picture(&look.look, &shown, &rays, &shot)
+        })?))
     }
 
     /// Momentum of the rover.

@@ -19,7 +19,8 @@ class DepthCamera(Camera):
 
     A reading is (height, width), m, or an image, if asked for. Each pixel has the depth at its centre along the optical
     axis, the mount's x axis. Rows go from top to bottom, columns from left to right. Depths below `min_range` and lost
-    pixels read 0; pixels without a surface within `max_range` read `max_range`.
+    pixels read 0; pixels without a surface within `max_range` read `max_range`. A fisheye measures distances instead of
+    depths. Sand has its ruts.
 
     The depth error of stereo or structured light grows with the square of the depth z: its standard deviation is `noise
     * z**2` (Khoshelham and Elberink 2012), where `noise` is the standard deviation of the disparity divided by focal
@@ -77,17 +78,15 @@ class DepthCamera(Camera):
         generator: np.random.Generator,
     ) -> tuple[Array, Values]:
         """Takes a depth image."""
-        along = self.directions.reshape(-1, 3)
-        stretch = np.sqrt((along**2).sum(axis=1))
-        farthest = self.max_range * float(stretch.max())
-        depth = moment.distances(self.mount, along, farthest, sees_rover=self.sees_rover) / stretch
+        stretch = np.ones((self.height, self.width)) if self.fisheye else np.sqrt((self.directions**2).sum(axis=2))
+        depth = self.take(moment, self.max_range * float(stretch.max())).distances / stretch
         seen = (depth >= self.min_range) & (depth < self.max_range)
         nearer = depth < self.min_range
         depth[~seen] = self.max_range
         noise = gaussian(generator, self.noise, depth.shape) * depth**2
         measured = np.where(seen, np.clip(drawn["gain"] * depth + noise, 0.0, self.max_range), self.max_range)
         measured[nearer | lost(generator, float(drawn["dropout"]), depth.shape)] = 0.0
-        return self._shown(measured.reshape(self.height, self.width)), memory
+        return self._shown(measured), memory
 
 
 def lost(generator: np.random.Generator, fraction: float, shape: tuple[int, ...]) -> np.ndarray:

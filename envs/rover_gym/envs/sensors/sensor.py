@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -120,6 +120,8 @@ class Moment:
 
     def __init__(self, simulation: Simulation, time: float, grains: GrainSimulation | None = None) -> None:
         self.simulation, self.time, self._grains = simulation, time, grains
+        #: Pictures that cameras have taken of it, see `Camera.take`.
+        self.pictures: list[Any] = []
 
     @property
     def model(self) -> RoverModel:

@@ -211,6 +211,29 @@ def scatter(n: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return np.asarray(x - np.floor(x))
 
 
+#: Pixels along an edge of the ground's texture.
+GRAIN_SIZE = 128
+
+
+def grain() -> npt.NDArray[np.float64]:
+    """The ground's texture, which pages have, too: fine and coarse grain that repeats, (n, n) in steps of 1/255."""
+    along = np.arange(GRAIN_SIZE) / GRAIN_SIZE
+    u, v = np.meshgrid(along, along)
+
+    def smooth(n: int, seed: int) -> npt.NDArray[np.float64]:
+        x, y = u * n, v * n
+        i, k = np.floor(x), np.floor(y)
+        a, b = ((t * t * (3.0 - 2.0 * t)) for t in (x - i, y - k))
+
+        def lattice(column: npt.NDArray[np.float64], row: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+            return scatter((column % n) + 57.0 * (row % n) + 131.0 * seed)
+
+        low, high = (((1.0 - a) * lattice(i, row) + a * lattice(i + 1.0, row)) for row in (k, k + 1.0))
+        return (1.0 - b) * low + b * high
+
+    return np.round(255.0 * (0.3 * smooth(4, 1) + 0.3 * smooth(16, 2) + 0.4 * smooth(64, 3))) / 255.0
+
+
 def stone_mesh(detail: int, seed: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
     """A stone about the unit sphere, with facets and dents: vertices (n, 3) and triangles (m, 3).
 

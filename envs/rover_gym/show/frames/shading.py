@@ -13,7 +13,6 @@ from rover_gym.show.frames.appearance import BOUNCE_LIGHT, HAZE, SKY_COLOUR, SKY
 Array = npt.NDArray[np.float64]
 
 GRAIN = "grain"  # the soil's texture
-SIZE = 128  # pixels along an edge of the texture
 LEVEL = 0.7  # upward part of the normal of a mesh's faces that show tiles
 
 
@@ -93,24 +92,9 @@ class SoilShading:
 
 
 def _grain() -> vtkTexture:
-    """Fine and coarse grain, which repeats: the pages have the same."""
-    along = np.arange(SIZE) / SIZE
-    u, v = np.meshgrid(along, along)
-
-    def smooth(n: int, seed: int) -> Array:
-        x, y = u * n, v * n
-        i, k = np.floor(x), np.floor(y)
-        a, b = ((t * t * (3.0 - 2.0 * t)) for t in (x - i, y - k))
-
-        def lattice(column: Array, row: Array) -> Array:
-            return look.scatter((column % n) + 57.0 * (row % n) + 131.0 * seed)
-
-        low, high = (((1.0 - a) * lattice(i, row) + a * lattice(i + 1.0, row)) for row in (k, k + 1.0))
-        return (1.0 - b) * low + b * high
-
-    values = 0.3 * smooth(4, 1) + 0.3 * smooth(16, 2) + 0.4 * smooth(64, 3)
     image = vtkImageData()
-    image.SetDimensions(SIZE, SIZE, 1)
+    values = look.grain()
+    image.SetDimensions(*values.shape, 1)
     levels = np.round(255.0 * values).astype(np.uint8).reshape(-1, 1)
     image.GetPointData().SetScalars(numpy_to_vtk(np.repeat(levels, 3, axis=1), deep=True))
     texture = vtkTexture()

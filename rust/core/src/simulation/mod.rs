@@ -6,8 +6,9 @@
 //!   [`sealed`] with a checksum;
 //! - [`rover`]: a rover on a terrain, with its [command](rover_command), its
 //!   [controls](rover_controls), its [contacts](rover_contacts), its block (`own_block`,
-//!   `rover_lanes`), its [`reading`], what [rays](rover_rays) meet, and the [`linearisation`] of a
-//!   step by a [`differentiator`], with `steps_in_sand` whose forces are exact;
+//!   `rover_lanes`), its [`reading`], what [rays](rover_rays) meet, its [pictures](rover_picture), and
+//!   the [`linearisation`] of a step by a [`differentiator`], with `steps_in_sand` whose forces are
+//!   exact;
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;
@@ -59,6 +60,7 @@ pub mod rover_contacts;
 pub mod rover_controls;
 pub mod rover_in_grains;
 mod rover_lanes;
+pub mod rover_picture;
 pub mod rover_rays;
 mod rover_sand;
 pub mod scene;
@@ -86,6 +88,7 @@ pub use reading::{ReadingLayout, ReadingRequest, ReadingScratch, seen_from};
 pub use rover::{LastCall, PlacedRover, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use rover_in_grains::{RoverInGrains, TogetherError};
+pub use rover_picture::Shown;
 pub use scene::{
     AcceptedStep, DenseOperator, Scene, SceneKey, SceneScratch, Snapshot, UsualOutcome, UsualStep,
 };

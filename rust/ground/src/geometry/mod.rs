@@ -3,7 +3,7 @@
 //! - [`shape`]: shapes of parts; [`terrain`]: grounds;
 //! - [`broad_phase`]: search for nearby things; [`query`]: distance, points and normal of a pair,
 //!   one module per pair of shapes;
-//! - [`ray`]: what a ray meets first;
+//! - [`ray`]: what a ray meets first; [`picture`]: colour pictures of such rays;
 //! - [`support`]: a ground of any shape under a round body, in the plane or in space.
 //!
 //! # One call
@@ -27,9 +27,10 @@
 //! [`friction_contact::quantity`], [`friction_contact::scalar`], [`crate::spatial`],
 //! [`crate::sand`].
 //!
-//! From [`crate::sand`] only the numbers of a soil, which a terrain carries.
+//! From [`crate::sand`] only the numbers of a soil, which a terrain carries, and ruts.
 
 pub mod broad_phase;
+pub mod picture;
 pub mod query;
 pub mod ray;
 pub mod shape;

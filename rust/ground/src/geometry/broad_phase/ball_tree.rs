@@ -166,12 +166,12 @@ impl BallTree {
         self.search(centre, &reach, |ball| visit(ball.index));
     }
 
-    /// The ball that a ray meets first within `reach` (m).
+    /// The ball that a ray meets first within `reach` (m), with its index in the input.
     #[must_use]
-    pub fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+    pub fn first_hit(&self, ray: &Ray, reach: f64) -> Option<(Hit, u32, Sphere)> {
         let inverse = ray.inverse();
         let whole = self.bounds?.crossing(&ray.origin, &inverse, reach)?;
-        let mut nearest: Option<(f64, &Sphere)> = None;
+        let mut nearest: Option<(f64, &Ball)> = None;
         let mut waiting = [(0_u32, [0.0_f64; 2]); DEPTH];
         let mut n_waiting = 0;
         let (mut at, mut within) = (0_usize, whole);
@@ -215,14 +215,15 @@ impl BallTree {
                 for ball in &self.balls[node.at as usize..][..count] {
                     let reach = nearest.map_or(reach, |(distance, _)| distance);
                     if let Some(distance) = ray::sphere::distance(ray, &ball.sphere, reach) {
-                        nearest = Some((distance, &ball.sphere));
+                        nearest = Some((distance, ball));
                     }
                 }
             }
             loop {
                 if n_waiting == 0 {
-                    return nearest
-                        .map(|(distance, ball)| ray::sphere::hit_at(ray, ball, distance));
+                    return nearest.map(|(distance, Ball { sphere, index })| {
+                        (ray::sphere::hit_at(ray, sphere, distance), *index, *sphere)
+                    });
                 }
                 n_waiting -= 1;
                 let (next, [enter, leave]) = waiting[n_waiting];
@@ -363,7 +364,7 @@ mod tests {
             reach in prop_oneof![1 => 0.0..20.0, 1 => Just(f64::INFINITY)],
         ) {
             let Some(ray) = Ray::new(origin.into(), direction.into()) else { return Ok(()) };
-            let found = BallTree::new(&spheres).first_hit(&ray, reach).map(|hit| hit.distance);
+            let found = BallTree::new(&spheres).first_hit(&ray, reach).map(|(hit, ..)| hit.distance);
             let all = spheres.iter().filter_map(|ball| ray::sphere::distance(&ray, ball, reach));
             prop_assert_eq!(found, all.reduce(f64::min));
         }

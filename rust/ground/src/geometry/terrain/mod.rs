@@ -214,6 +214,18 @@ pub trait Terrain: Send + Sync {
     /// What a ray meets first within `reach` (m), from either side of a surface.
     fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit>;
 
+    /// What a ray meets first, as [`Self::first_hit`], and which sphere it is, if it is one: its
+    /// number in the field that it belongs to.
+    fn first_hit_of(&self, ray: &Ray, reach: f64) -> Option<(Hit, Option<(u32, Sphere)>)> {
+        self.first_hit(ray, reach).map(|hit| (hit, None))
+    }
+
+    /// Unit normal at a place (world, m) on a surface that is curved but for its triangles, for
+    /// shading; none on others.
+    fn smooth_normal(&self, _place: &Vector3<f64>) -> Option<Vector3<f64>> {
+        None
+    }
+
     /// Height y (m) of the visible surface at (x, z); `None` where there is none.
     fn height(&self, x: f64, z: f64) -> Option<f64>;
 

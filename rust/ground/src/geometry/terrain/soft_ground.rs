@@ -147,6 +147,14 @@ impl Terrain for SoftGround {
         self.surface.first_hit(ray, reach)
     }
 
+    fn first_hit_of(&self, ray: &Ray, reach: f64) -> Option<(Hit, Option<(u32, Sphere)>)> {
+        self.surface.first_hit_of(ray, reach)
+    }
+
+    fn smooth_normal(&self, place: &Vector3<f64>) -> Option<Vector3<f64>> {
+        self.surface.smooth_normal(place)
+    }
+
     fn height(&self, x: f64, z: f64) -> Option<f64> {
         self.surface.height(x, z)
     }

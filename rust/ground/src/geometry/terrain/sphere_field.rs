@@ -196,10 +196,16 @@ impl Terrain for SphereField {
     }
 
     fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
+        self.first_hit_of(ray, reach).map(|(hit, _)| hit)
+    }
+
+    fn first_hit_of(&self, ray: &Ray, reach: f64) -> Option<(Hit, Option<(u32, Sphere)>)> {
         let ground = self.ground.as_ref();
         let ground = ground.and_then(|plane| ray::plane::hit(ray, plane, reach));
         let reach = ground.map_or(reach, |hit| hit.distance);
-        self.tree.first_hit(ray, reach).or(ground)
+        let sphere = self.tree.first_hit(ray, reach);
+        let sphere = sphere.map(|(hit, index, sphere)| (hit, Some((index, sphere))));
+        sphere.or(ground.map(|hit| (hit, None)))
     }
 
     /// The highest of ground and spheres.

@@ -303,10 +303,19 @@ impl Terrain for Union {
     }
 
     fn first_hit(&self, ray: &Ray, reach: f64) -> Option<Hit> {
-        self.parts.iter().fold(None, |nearest: Option<Hit>, part| {
-            let reach = nearest.map_or(reach, |hit| hit.distance);
-            part.first_hit(ray, reach).or(nearest)
+        self.first_hit_of(ray, reach).map(|(hit, _)| hit)
+    }
+
+    fn first_hit_of(&self, ray: &Ray, reach: f64) -> Option<(Hit, Option<(u32, Sphere)>)> {
+        let nothing: Option<(Hit, Option<(u32, Sphere)>)> = None;
+        self.parts.iter().fold(nothing, |nearest, part| {
+            let reach = nearest.map_or(reach, |(hit, _)| hit.distance);
+            part.first_hit_of(ray, reach).or(nearest)
         })
+    }
+
+    fn smooth_normal(&self, place: &Vector3<f64>) -> Option<Vector3<f64>> {
+        self.parts.iter().find_map(|part| part.smooth_normal(place))
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {

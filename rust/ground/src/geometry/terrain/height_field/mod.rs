@@ -16,6 +16,7 @@ mod cells;
 mod neighbourhood;
 mod pieces;
 mod planes;
+mod smooth_normal;
 mod terrain;
 mod under_wheel;
 mod wheel;

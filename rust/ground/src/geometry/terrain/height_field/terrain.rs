@@ -162,6 +162,10 @@ impl Terrain for HeightField {
         ray::height_field::hit(ray, self, reach)
     }
 
+    fn smooth_normal(&self, place: &Vector3<f64>) -> Option<Vector3<f64>> {
+        self.smooth_normal_at(place)
+    }
+
     fn height(&self, x: f64, z: f64) -> Option<f64> {
         let ([i, j], [u, v]) = self.cell_at(x, z)?;
         let [i, j] = [narrow(i), narrow(j)];
