@@ -1,7 +1,7 @@
 """The slowest steps, and the parts of a step: `python -m comparison.tails [--row TEXT] [--steps N] [--save]`.
 
 Rovers of `comparison.rollout`'s rows drive for a long time, each alone, and so do rovers among 600 half-buried stones
-on 20 m by 20 m, where they get stuck, and on wide wheels in sand. Torques of up to 60 N m, in sand 8 N m, and set-points
+on 20 m by 20 m, where they get stuck, and on wide wheels in sand. Torques of up to 60 N m, in sand 8, and set-points
 are drawn anew every ten steps of 5 ms, from a seed that is printed. It prints the processor time of a step (mean,
 median, 99%, 99.9%, 99.99%, largest), how many steps were not solved, the largest residual, and what share of the time
 each part of a step takes. The times include about 1 us of Python.
