@@ -7,7 +7,8 @@ import numpy as np
 
 from rover_gym.core import RoverModel, sin_cos
 from rover_gym.drive.commands.regulator import YAW
-from rover_gym.envs.start import Steering, wheel_centres
+from rover_gym.drive.commands.wheel_kinematics import WheelKinematics
+from rover_gym.envs.start import Steering
 
 #: Commanded curvature of a skidding rover relative to that of the path.
 WIDENING = 1.5
@@ -56,13 +57,9 @@ class Turning:
     @classmethod
     def of(cls, model: RoverModel, weight: float) -> "Turning":
         """The constants of a model with its joints at zero and a weight, N."""
-        centres, steering = wheel_centres(model), Steering.of(model)
-        fixed = [float(x) for (x, _), entry in zip(centres, steering.entries, strict=True) if entry < 0]
-        if fixed and steering.joints:
-            x_c = sum(fixed) / len(fixed)
-        else:
-            x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
-        wheels = tuple((float(x - x_c), float(z)) for x, z in centres)
+        kinematics = WheelKinematics(model)
+        steering = kinematics.steering
+        wheels = tuple((float(x), float(z)) for x, z in kinematics.wheels)
         width = sum(abs(z) for _, z in wheels)
         gain, scrub, acceleration = 0.0, 0.0, math.inf
         if not steering.joints and width > TINY:
@@ -73,7 +70,7 @@ class Turning:
             scrub = SCRUB * weight / len(wheels) * sum(abs(x) for x, _ in wheels) / width
         sides = [math.copysign(1.0, z) if abs(z) > TINY else 0.0 for _, z in wheels]
         yaw_gain, scrubs = (tuple(side * force for side in sides) for force in (gain, scrub))
-        return cls(x_c, wheels, steering, yaw_gain, scrubs, acceleration)
+        return cls(kinematics.x_c, wheels, steering, yaw_gain, scrubs, acceleration)
 
     @property
     def skids(self) -> bool:
