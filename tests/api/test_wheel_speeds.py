@@ -9,7 +9,7 @@ from rovers import standing
 
 from rover_gym import Plane, RoverModel, Simulation
 from rover_gym.core import CommandError, ModelError, OptionError, SimulationBatch
-from rover_gym.drive.commands.wheel_kinematics import WheelKinematics
+from rover_gym.drive.commands.wheel_kinematics import WheelKinematics, skid_turn
 from rover_gym.record import Recorder, RoverSampler, describe, read_run
 
 GALLERY = ("rover", "four-steered", "skid-steered", "open-rover", "mars-rover")
@@ -47,29 +47,29 @@ def test_default_gains_hold_every_rover_of_the_gallery_at_its_speed_uphill(name)
         1.0 if motor is None else motor.no_load_speed * r
         for motor, r in zip(model.motors, model.wheel_radii, strict=True)
     )
-    sim.set_wheel_speeds(speed / model.wheel_radii, strict=True)
+    sim.set_wheel_speeds(speed / model.wheel_radii)
     for _ in range(4):
         assert sim.step(100).is_converged
     lacks = speed - sim.v[0]
-    # The servo lacks T a, on the slope T g sin(slope), beside what the wheels slip.
-    assert 0.0 < lacks < 0.02 + 0.02 * speed, lacks
+    # The servo lacks T a, on the slope T g sin(slope), beside what wheels that yield slip.
+    assert 0.0 < lacks < 0.003 + 0.01 * speed, lacks
     assert (np.abs(sim.motor_torques) <= model.wheel_torque_limits + 1e-9).all()
 
 
 @pytest.mark.parametrize("name", [*GALLERY, "mecanum"])
-@pytest.mark.parametrize("twist", [(0.15, 0.0), (0.12, 0.1), (-0.12, 0.1), (0.0, 0.2)])
+@pytest.mark.parametrize("twist", [(0.15, 0.0), (0.15, 0.05), (-0.15, 0.05), (0.0, 0.2)])
 def test_a_twist_means_the_same_on_every_machine(name, twist):
     model = mecanum() if name == "mecanum" else gallery(name)
     sim = standing(model, friction=0.8)
     kinematics = WheelKinematics(model)
     asked = kinematics.drive(sim, *twist)
-    if not (name == "rover" and twist[0] == 0.0):  # its steering limit forbids turning on the spot
+    if name == "rover" and twist[0] == 0.0:  # its steering limit forbids turning on the spot
+        assert asked.yaw_rate == 0.0
+    else:
         np.testing.assert_allclose([asked.forward, asked.yaw_rate], twist, atol=1e-12)
     sim.step(200)
-    forward, left, yaw_rate = twist_of(sim, kinematics.x_c)
-    assert forward == pytest.approx(asked.forward, abs=0.01)
-    assert left == pytest.approx(0.0, abs=0.01)
-    assert yaw_rate == pytest.approx(asked.yaw_rate, abs=0.01 if kinematics.widening == 1.0 else 0.03)
+    expected = [asked.forward, 0.0, asked.yaw_rate]
+    np.testing.assert_allclose(twist_of(sim, kinematics.x_c), expected, atol=0.01)
 
 
 def test_rollers_and_steering_of_all_wheels_go_sideways():
@@ -108,12 +108,16 @@ def test_a_twist_beyond_the_machine_is_reduced_by_the_rule():
     np.testing.assert_array_equal(many.speeds[2], steered.commands(np.linspace(-1.0, 1.0, 7)[2], 0.1).speeds)
 
 
-def test_the_widening_is_that_of_a_rectangle_and_of_a_differential_drive():
-    spread = machine("four", FOUR)
-    x, z = WheelKinematics(spread).wheels[0]
-    assert WheelKinematics(spread).widening == pytest.approx(1.0 + (x / z) ** 2)
-    pair = machine("two", [own for own in FOUR if own[0].startswith("F")])
-    assert WheelKinematics(pair).widening == 1.0
+def test_the_skid_turn_is_that_of_a_rectangle_and_of_a_differential_drive():
+    spread = WheelKinematics(machine("four", FOUR))
+    assert spread.widening == pytest.approx(2.0, abs=1e-6)
+    assert spread.x_c == pytest.approx(0.0, abs=1e-6)
+    long = np.array([[0.6, -0.3], [0.6, 0.3], [-0.6, -0.3], [-0.6, 0.3]])
+    assert skid_turn(long, np.ones(4), np.ones(4, bool)) == pytest.approx((0.0, 5.0), abs=1e-6)
+    assert skid_turn(long[:2], np.ones(2), np.ones(2, bool)) == (0.6, 1.0)
+    # With all of the load on two wheels the machine turns about their axle as if it had no others.
+    point, wide = skid_turn(long, np.array([1.0, 1.0, 1e-9, 1e-9]), np.ones(4, bool))
+    assert (point, wide) == pytest.approx((0.6, 1.0), abs=1e-3)
 
 
 def test_a_wheel_that_is_turned_by_its_mount_rolls_where_it_points():
@@ -180,7 +184,7 @@ def test_rovers_of_a_batch_and_joined_machines_have_their_own_speeds():
 def test_a_recording_holds_the_speeds(tmp_path):
     sim = standing()
     sampler = RoverSampler(sim.model)
-    with Recorder(tmp_path / "run.h5", sampler.channels, describe(sim, "speeds")) as recorder:
+    with Recorder(tmp_path / "run.h5", sampler.channels, describe(sim, "speeds"), terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
         sim.set_wheel_speeds([3.0] * 6)
         sim.step(10)

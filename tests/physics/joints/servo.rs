@@ -119,7 +119,7 @@ fn a_servo_stays_within_the_line_of_its_motor() {
 #[test]
 fn the_default_gain_is_that_of_a_time_step_for_each_machine() {
     let rover = Model::rover();
-    let expected = (0.5 * 30.0 * 0.01 + 960.0 / 6.0 * 0.01) / 5e-3;
+    let expected = (0.5 * 30.0 * 0.01 + 960.0 / 6.0 * 0.01) / 5e-4;
     for wheel in rover.wheels() {
         near(wheel.speed_gain, expected, 1e-9 * expected);
     }

@@ -22,7 +22,7 @@ from rover_gym.core.validation import number
 from rover_gym.drive.commands.driven import given_or_usual
 from rover_gym.drive.commands.regulator import YAW, WheelRegulator
 from rover_gym.drive.commands.turning import SCRUB_RATE, WIDENING, Turning
-from rover_gym.drive.commands.wheel_kinematics import WheelKinematics
+from rover_gym.drive.commands.wheel_kinematics import WheelKinematics, wheel_velocities
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
 
@@ -76,6 +76,7 @@ class CommandController:
         weight = model.mass * math.hypot(*rover.gravity)
         turning = Turning.of(model, weight)
         self._kinematics = WheelKinematics(model)
+        self._wheels = np.array(turning.wheels)
         self._steering = np.array([q + i for i in turning.steering.joints], dtype=np.intp)
         self._skids = turning.skids
         self._widening = WIDENING if turning.skids else 1.0
@@ -97,7 +98,7 @@ class CommandController:
         sideways = math.radians(self.limits.sideways_deg) * command[:, 2:3]
 
         sine, cosine = sin_cos(sideways)
-        ahead, left = self._kinematics.velocities(cosine, sine, curvature, self._widening)
+        ahead, left = wheel_velocities(self._wheels, cosine, sine, self._widening * curvature, curvature)
         set_points = self._kinematics.joint_angles(np.asarray(atan2(left, ahead)))
         set_points = np.clip(set_points, -self._max_steering, self._max_steering)
         # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.

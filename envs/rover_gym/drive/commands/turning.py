@@ -7,8 +7,8 @@ import numpy as np
 
 from rover_gym.core import RoverModel, sin_cos
 from rover_gym.drive.commands.regulator import YAW
-from rover_gym.drive.commands.wheel_kinematics import WheelKinematics
-from rover_gym.envs.start import Steering
+from rover_gym.drive.commands.wheel_kinematics import turning_point
+from rover_gym.envs.start import Steering, wheel_centres
 
 #: Commanded curvature of a skidding rover relative to that of the path.
 WIDENING = 1.5
@@ -57,9 +57,10 @@ class Turning:
     @classmethod
     def of(cls, model: RoverModel, weight: float) -> "Turning":
         """The constants of a model with its joints at zero and a weight, N."""
-        kinematics = WheelKinematics(model)
-        steering = kinematics.steering
-        wheels = tuple((float(x), float(z)) for x, z in kinematics.wheels)
+        centres, steering = wheel_centres(model), Steering.of(model)
+        fixed = np.array(steering.entries) < 0
+        x_c = turning_point(centres, fixed)
+        wheels = tuple((float(x - x_c), float(z)) for x, z in centres)
         width = sum(abs(z) for _, z in wheels)
         gain, scrub, acceleration = 0.0, 0.0, math.inf
         if not steering.joints and width > TINY:
@@ -70,7 +71,7 @@ class Turning:
             scrub = SCRUB * weight / len(wheels) * sum(abs(x) for x, _ in wheels) / width
         sides = [math.copysign(1.0, z) if abs(z) > TINY else 0.0 for _, z in wheels]
         yaw_gain, scrubs = (tuple(side * force for side in sides) for force in (gain, scrub))
-        return cls(kinematics.x_c, wheels, steering, yaw_gain, scrubs, acceleration)
+        return cls(x_c, wheels, steering, yaw_gain, scrubs, acceleration)
 
     @property
     def skids(self) -> bool:

@@ -1,8 +1,8 @@
 """What the wheels of a machine must do for it to move as a twist says: `cmd_vel` for any model.
 
 A twist is the motion of the point in the middle of the wheelbase, or beside the wheels that can neither steer nor move
-sideways: speed forward and to the left, m/s, and yaw rate, rad/s, positive to the left. A wheel at `(x, z)` from that
-point has the velocity
+sideways, or about which the machine skids: speed forward and to the left, m/s, and yaw rate, rad/s, positive to the
+left. A wheel at `(x, z)` from that point has the velocity
 
     ahead    a = forward + W yaw_rate z
     left     l = left + yaw_rate x
@@ -14,18 +14,20 @@ It is steered to `delta = atan2(l, a)`, or to the opposite direction if that is 
 where gamma is the angle of its rollers from the axle: the velocity along the axis of the roller that touches the ground
 is zero. Without rollers the last term is absent. `W` is 1 but for machines that turn by skidding.
 
-A machine that skids turns more slowly than its wheels ask. With equal loads and Coulomb friction the moment about the
-vertical vanishes in a steady turn: with `w = W - 1`,
+A machine that skids turns more slowly than its wheels ask. In a steady turn the sideways force and the moment about the
+vertical of Coulomb friction vanish. With the loads N of the wheels and `w = W - 1`,
 
-    sum over wheels of (w z^2 - x^2) / sqrt((w z)^2 + x^2) = 0
+    sum of N x / s = 0,    sum of N (w z^2 - x^2) / s = 0,    s = sqrt((w z)^2 + x^2)
 
-whatever the coefficient of friction, the speed and the yaw rate. For four wheels at the corners of a rectangle this is
-`W = 1 + x^2 / z^2`. Source: the moment balance of skid steering, Mandow et al. 2007.
+whatever the coefficient of friction, the speed and the yaw rate. The first sum gives the point about which the machine
+turns. For four equal loads at the corners of a rectangle `W = 1 + x^2 / z^2`. A wheel without a motor has z = 0 here.
+The equations are those of a body that slides under dry friction; Mandow et al. 2007 find W by experiment.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -34,9 +36,13 @@ from rover_gym.core import ModelError, OptionError, RoverModel, Simulation, atan
 from rover_gym.core.validation import array, checked, refuse
 from rover_gym.envs.observation import Array
 from rover_gym.envs.start import Steering, wheel_centres
+from rover_gym.models import check_statics
 
 #: Distance below which two lengths count as equal, m.
 TINY = 1e-6
+
+#: Largest W - 1, of a machine that is far longer than wide.
+MOST_WIDENING = 1e3
 
 #: Share by which a steering limit may be exceeded, which is rounding.
 ROUNDING = 1e-9
@@ -75,10 +81,7 @@ class WheelKinematics:
         model: The machine: imported, of the gallery, or your own. Of several that are joined, take each one's model.
 
     Attributes:
-        x_c: Place of the point that the twist moves in the trunk's frame, ahead of its origin, m.
-        wheels: Ahead and to the right of that point, (n_wheels, 2), m.
         steering: The joints that steer.
-        widening: W.
 
     Raises:
         ModelError: There are no wheels.
@@ -97,11 +100,8 @@ class WheelKinematics:
         self._cot = np.array([0.0 if angle is None else 1.0 / math.tan(angle) for angle in rollers])
         self._crabs = bool((steers | ~plain).all())
 
-        centres = wheel_centres(model)
-        self.x_c = turning_point(centres, plain & ~steers)
-        self.wheels = centres - np.array([self.x_c, 0.0])
-        drives = np.asarray(model.wheel_torque_limits) > 0.0
-        self.widening = 1.0 if steers.any() else widening(self.wheels[plain], drives[plain])
+        self._centres = wheel_centres(model)
+        self._plain = plain
 
         self._headings = headings(model)
         limits = [wheel.get("steering_limit", 0.0) for wheel in described]
@@ -110,11 +110,29 @@ class WheelKinematics:
         motors = [math.inf if motor is None else motor.no_load_speed for motor in model.motors]
         self._fastest, self._radii = np.array(motors), np.asarray(model.wheel_radii)
 
-    def velocities(self, forward: Array, left: Array, yaw_rate: Array, widening: float | None = None) -> list[Array]:
-        """Speeds of the wheels ahead and to the left, two of (n, n_wheels), from columns (n, 1)."""
-        wide = self.widening if widening is None else widening
-        x, z = self.wheels.T
-        return [forward + wide * yaw_rate * z, left + yaw_rate * x]
+    @cached_property
+    def x_c(self) -> float:
+        """Place of the point that the twist moves in the trunk's frame, ahead of its origin, m."""
+        return self._turn[0]
+
+    @cached_property
+    def widening(self) -> float:
+        """W: the turn that the wheels are asked for, over the turn that the machine makes."""
+        return self._turn[1]
+
+    @cached_property
+    def _turn(self) -> tuple[float, float]:
+        """`x_c` and `widening`."""
+        if self._steers.any() or not self._plain.any():
+            return turning_point(self._centres, self._plain & ~self._steers), 1.0
+        drives = np.asarray(self._model.wheel_torque_limits) > 0.0
+        own = self._plain
+        return skid_turn(self._centres[own], check_statics(self._model).loads[own], drives[own])
+
+    def velocities(self, forward: Array, left: Array, yaw_rate: Array) -> tuple[Array, Array]:
+        """Speeds of the wheels ahead and to the left, (n, n_wheels) each, from columns (n, 1)."""
+        wheels = self._centres - np.array([self.x_c, 0.0])
+        return wheel_velocities(wheels, forward, left, self.widening * yaw_rate, yaw_rate)
 
     def joint_angles(self, angles: Array) -> Array:
         """The mean angle of each steering joint's wheels, (n, joints), from those of the wheels, (n, n_wheels)."""
@@ -216,7 +234,7 @@ class WheelKinematics:
     def _largest_yaw(self, forward: Array, left: Array, asked: float) -> float:
         """The yaw rate nearest to the one asked for, between it and 0, that the steering limits permit."""
         # A wheel reaches its limit where l = tan(limit) a or l = -tan(limit) a.
-        x, z = self.wheels[self._steers].T
+        x, z = self._centres[self._steers].T - np.array([[self.x_c], [0.0]])
         tangents = np.tan(np.minimum(self._limits[self._steers], math.radians(89.9999)))
         edges = []
         for t in (tangents, -tangents):
@@ -253,23 +271,48 @@ def turning_point(centres: Array, fixed: npt.NDArray[np.bool_]) -> float:
     return 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
 
 
-def widening(wheels: Array, drives: npt.NDArray[np.bool_]) -> float:
-    """W of wheels (n, 2) that skid, the root of the moment balance; those that roll freely resist sideways only."""
-    x, z = wheels[:, 0], np.where(drives, wheels[:, 1], 0.0)
-    if not np.abs(x).max(initial=0.0) > TINY or not np.abs(z).max(initial=0.0) > TINY:
-        return 1.0
+def wheel_velocities(wheels: Array, forward: Array, left: Array, turn: Array, yaw_rate: Array) -> tuple[Array, Array]:
+    """Speeds of wheels (n_wheels, 2) ahead and to the left, (n, n_wheels) each, from columns (n, 1).
+
+    Args:
+        wheels: Places ahead and to the right of the point that the twist moves, m.
+        forward: Speed forward, m/s.
+        left: Speed to the left, m/s.
+        turn: Yaw rate that the wheels are asked for, rad/s.
+        yaw_rate: Yaw rate, rad/s.
+    """
+    x, z = wheels.T
+    return forward + turn * z, left + yaw_rate * x
+
+
+def skid_turn(centres: Array, loads: Array, drives: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Place x of the point that wheels (n, 2) skid about, m, and W. Wheels that roll freely resist sideways only."""
+    x, z = centres[:, 0], np.where(drives, centres[:, 1], 0.0)
+    if np.ptp(x) < TINY or np.abs(z).max(initial=0.0) < TINY:
+        return float(x.mean()), 1.0
+
+    def slips(w: float, point: float) -> Array:
+        """Load over sliding speed of each wheel at a unit yaw rate."""
+        found: Array = loads / np.maximum(np.hypot(w * z, x - point), TINY)
+        return found
+
+    def point_of(w: float) -> float:
+        return root(lambda point: float(-(slips(w, point) * (x - point)).sum()), float(x.min()), float(x.max()))
 
     def moment(w: float) -> float:
-        slip = np.maximum(np.hypot(w * z, x), 1e-12)
-        return float(((w * z * z - x * x) / slip).sum())
+        point = point_of(w)
+        return float((slips(w, point) * (w * z * z - (x - point) ** 2)).sum())
 
-    low, high = 0.0, 1.0
-    while moment(high) < 0.0 and high < 1e3:
-        high *= 2.0
+    w = root(moment, 0.0, MOST_WIDENING)
+    return point_of(w), 1.0 + w
+
+
+def root(rising: Callable[[float], float], low: float, high: float) -> float:
+    """The root of a rising function by bisection, or the end of the interval that is nearest to it."""
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if moment(middle) > 0.0 else (middle, high)
-    return 1.0 + high
+        low, high = (low, middle) if rising(middle) > 0.0 else (middle, high)
+    return 0.5 * (low + high)
 
 
 def headings(model: RoverModel) -> Array:

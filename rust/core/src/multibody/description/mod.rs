@@ -264,7 +264,7 @@ pub struct WheelDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motor: Option<Motor>,
     /// Gain of its speed servo: torque for each rad/s that is missing, N m s/rad. By default a wheel
-    /// that rolls with its share of the machine reaches its speed with a time constant of 5 ms.
+    /// that rolls with its share of the machine reaches its speed with a time constant of 0.5 ms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_gain: Option<f64>,
     /// The solid whose joint steers it.

@@ -8,8 +8,11 @@
 //! ```
 //!
 //! The speed that such a servo lacks is T times the acceleration that its load amounts to, whatever
-//! the size of the machine: on a slope of 10 degrees 9 mm/s, at the friction limit 35 mm/s. T is the
-//! default time step. A shorter one gains nothing, since a speed cannot change within a step.
+//! the size of the machine: on a slope of 10 degrees 0.9 mm/s, at the friction limit 3.4 mm/s.
+//!
+//! T is a tenth of the default time step. On fields of rocks the rovers of the gallery repeat 0.5 to
+//! 12% of their steps, as many as with a time constant of 0.1 ms; with 5 ms it is 0.2 to 13%, but a
+//! rover that skids then turns up to a third less than its wheels ask.
 
 use nalgebra::Vector3;
 
@@ -19,7 +22,7 @@ use super::properties::JointProperties;
 use crate::multibody::description::ModelDescription;
 
 /// T, s.
-const TIME: f64 = 5e-3;
+const TIME: f64 = 5e-4;
 
 /// Sets the gain of every wheel: as stated, or the default.
 pub(super) fn set_speed_gains(
