@@ -212,8 +212,8 @@ class WheelKinematics:
     def _within_limits(self, forward: Array, left: Array, yaw: Array) -> npt.NDArray[np.bool_]:
         """Whether every joint stays within its limit, (n,), for a twist in columns (n, 1)."""
         angles = self.wheel_angles(self.joint_angles(self._angles(*self.velocities(forward, left, yaw))))
-        within: npt.NDArray[np.bool_] = (np.abs(angles) <= self._limits * (1.0 + ROUNDING)).all(axis=1)
-        return within
+        within = np.abs(angles) <= self._limits * (1.0 + ROUNDING)
+        return np.asarray(within.all(axis=1))
 
     def _reachable(self, twist: Mapping[str, Array]) -> tuple[Array, Array, Array]:
         """The twist, reduced until the joints are within their limits; columns (n, 1)."""

@@ -360,7 +360,9 @@ impl<T: Lane> MotorLine<T> {
     fn take_served(&mut self, branch: T) {
         let number = |x: f64| branch.like(x);
         let is_on = |x: f64| branch.ge(number(x)) & branch.le(number(x));
-        let ServoLine { gain, speed, limit, .. } = self.servo;
+        let ServoLine {
+            gain, speed, limit, ..
+        } = self.servo;
         let served = self.servo.lanes();
         // The rates at which the servo alone would reach its limit.
         let reach = limit / T::select(served, gain, number(1.0));
