@@ -117,6 +117,12 @@ pub struct Servo {
     pub limit: f64,
 }
 
+/// Largest gain of a servo, as a multiple of the inertia of its joint over the time step.
+///
+/// A step reaches the speed at any larger gain, too, but the torque k (ω_s − ω) would then consist
+/// of rounding: with 10¹² instead, the energy audit slowed a wheel by 10⁻⁴ of its speed.
+const STIFFEST: f64 = 1e6;
+
 /// The branch on which the torque is the command, or follows the servo.
 const COMMAND: f64 = 2.0;
 
@@ -154,6 +160,8 @@ struct ServoLine<T> {
     /// Whether any lane has a servo.
     is_any: bool,
     /// k, at least the slope of the motor's line, N m s/rad; 0 without a servo.
+    stated: T,
+    /// k, within [`STIFFEST`] in the present step.
     gain: T,
     /// ω_s within the motor's no-load speed, rad/s.
     speed: T,
@@ -177,6 +185,7 @@ impl<T: Lane> MotorLine<T> {
             centre: zero,
             servo: ServoLine {
                 is_any: false,
+                stated: zero,
                 gain: zero,
                 speed: zero,
                 limit: zero,
@@ -258,6 +267,16 @@ impl<T: Lane> MotorLine<T> {
     #[must_use]
     pub fn at_rest(&self) -> T {
         self.at_rest
+    }
+
+    /// Limits the gain of a servo for a step of h (s) and an inertia of its joint (kg m²).
+    #[inline(always)]
+    pub fn limit_gain(&mut self, h: T, inertia: T) {
+        if self.servo.is_any {
+            let most = h.like(STIFFEST) * inertia / h;
+            self.servo.gain = self.servo.stated.min(most.max(self.slope));
+            self.take(self.branch);
+        }
     }
 
     /// Torque of the present branch at a rate (rad/s), N m.
@@ -389,6 +408,7 @@ impl<T: Lane> ServoLine<T> {
         let gain = servo.map_or(0.0, |servo| servo.gain.max(steepest));
         let speed = servo.map_or(0.0, |servo| servo.speed.clamp(-fastest, fastest));
         let limit = servo.map_or(0.0, |own| motor.map_or(own.limit, |m| m.limited(own.limit)));
+        self.stated.set(lane, gain);
         self.gain.set(lane, gain);
         self.speed.set(lane, speed + 0.0);
         self.limit.set(lane, limit);

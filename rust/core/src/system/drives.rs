@@ -209,7 +209,8 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Chooses θ_j for the `inertia` of each joint's velocity (diagonal of M), kg m².
+    /// Chooses θ_j, and limits the gains of servos, for the `inertia` of each joint's velocity
+    /// (diagonal of M), kg m².
     #[inline(always)]
     pub fn set_theta(
         &mut self,
@@ -220,8 +221,10 @@ impl<T: Lane> Drives<T> {
         for ((j, own), joint) in mechanism.joints.iter().enumerate().zip(&mut self.joints) {
             joint.theta = theta;
             if self.is_implicit[j] {
+                let inertia = inertia(own.velocity);
+                joint.line.limit_gain(h, inertia);
                 let feedback = (joint.line.slope() + joint.damping, joint.stiffness);
-                joint.theta = implicit_weight((h, theta), feedback, inertia(own.velocity));
+                joint.theta = implicit_weight((h, theta), feedback, inertia);
             }
         }
     }
