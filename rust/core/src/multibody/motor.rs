@@ -305,6 +305,8 @@ impl<T: Lane> MotorLine<T> {
     /// Takes the branch that holds at a rate, rad/s.
     #[inline(always)]
     pub fn choose(&mut self, rate: T) {
+        // What the last step left must not show in the branch.
+        self.servo.gain = self.servo.stated;
         self.take(self.branch_at(rate));
     }
 
