@@ -108,8 +108,8 @@ impl SimulationBatch {
     /// different numbers of steps.
     ///
     /// Args:
-    ///     torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m; None with
-    ///         `speeds`.
+    ///     torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m; None
+    ///         with `speeds`.
     ///     set_points: Commands for `Simulation.set_steering`, (n_rovers, n_wheels), rad.
     ///     n: Number of steps.
     ///     active: Which rovers move, (n_rovers,); all by default. The others do not change.

@@ -308,8 +308,8 @@ impl Simulation {
 
     /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
     ///
-    /// Each is the command after the limit of the wheel's `Motor`, or the torque of the wheel's servo;
-    /// 0 before the first step. Wheels that share a drive have equal parts of its torque.
+    /// Each is the command after the limit of the wheel's `Motor`, or the torque of its servo; 0
+    /// before the first step. Wheels that share a drive have equal parts of its torque.
     #[getter]
     fn motor_torques(&self) -> Result<Array> {
         Ok(fresh(self.open()?.motor_torques()))

@@ -58,8 +58,8 @@ fn a_wheel_in_the_air_reaches_its_speed_with_the_time_constant() {
     }
 }
 
-/// A stiff servo accelerates with its limit, `ω = τ t / I`, and then holds the speed; also where the
-/// limit is that of a command in the other direction.
+/// A stiff servo accelerates with its limit, `ω = τ t / I`, and then holds the speed; in the other
+/// direction, too.
 #[test]
 fn a_bound_torque_accelerates_at_the_limit_until_the_speed_is_reached() {
     for variant in VARIANTS {

@@ -1,11 +1,11 @@
 //! Steps of a rover with their derivatives, one after another or along a trajectory.
 //!
 //! The state is x = (q, v) in public coordinates, the command u = (wheel torques, or speeds while
-//! servos hold them; steering set-points). On soft ground the state has seven more entries a wheel: what the sand remembers of
-//! it and the energy that it may give back. A step is that of [`RoverSimulation::set_state`]
-//! followed by one step: it does not depend on steps before it. `crate::system::tangent`
-//! differentiates it, eight directions at a time where the machine has such registers; the bits are
-//! the same with four and with one.
+//! servos hold them; steering set-points). On soft ground the state has seven more entries a wheel:
+//! what the sand remembers of it and the energy that it may give back. A step is that of
+//! [`RoverSimulation::set_state`] followed by one step: it does not depend on steps before it.
+//! `crate::system::tangent` differentiates it, eight directions at a time where the machine has
+//! such registers; the bits are the same with four and with one.
 
 use std::ops::Range;
 use std::sync::Arc;

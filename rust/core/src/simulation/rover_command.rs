@@ -13,8 +13,8 @@ pub struct RoverCommand {
     pub actuators: Command,
     /// Driving torque of each wheel, positive forward, N m.
     pub wheel_torque: Vec<f64>,
-    /// Speed of each wheel that its servo is to hold, positive forward, rad/s; none while the wheels
-    /// are driven by torques.
+    /// Speed of each wheel that its servo is to hold, positive forward, rad/s; none while torques
+    /// drive the wheels.
     pub wheel_speed: Option<Vec<f64>>,
     /// Torque about each joint's axis, N m: its drive's where it has one, else additional.
     pub joint_torque: Vec<f64>,
@@ -57,8 +57,8 @@ impl RoverCommand {
         }
     }
 
-    /// Servo of each joint (n_joints) that is to hold the wheels' speeds: gains and torque limits of
-    /// wheels with one joint add up, and the speed is the mean of theirs, weighted by the gains.
+    /// Servo of each joint (n_joints) that is to hold the wheels' speeds: gains and torque limits
+    /// of wheels with one joint add up, and the speed is the mean of theirs, weighted by the gains.
     pub(super) fn servos(&self, model: &Model) -> Vec<Option<Servo>> {
         let mut servos = vec![None; model.n_joints()];
         let speeds = self.wheel_speed.iter().flatten();

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! The branch of a motor or a servo is chosen at ω, so that torque, branch and work are consistent.
-//! A step that leaves a branch is repeated with the next one ([`Drives::revise`]). Torques never rise
-//! with the speed, so the implicit term is dissipative.
+//! A step that leaves a branch is repeated with the next one ([`Drives::revise`]). Torques never
+//! rise with the speed, so the implicit term is dissipative.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::command::Command;

@@ -10,9 +10,9 @@
 //! The speed that such a servo lacks is T times the acceleration that its load amounts to, whatever
 //! the size of the machine: on a slope of 10 degrees 0.9 mm/s, at the friction limit 3.4 mm/s.
 //!
-//! T is a tenth of the default time step. On fields of rocks the rovers of the gallery repeat 0.5 to
-//! 12% of their steps, as many as with a time constant of 0.1 ms; with 5 ms it is 0.2 to 13%, but a
-//! rover that skids then turns up to a third less than its wheels ask.
+//! T is a tenth of the default time step. On fields of rocks the rovers of the gallery repeat 0.6
+//! to 12% of their steps, as many as with 0.1 ms. With 5 ms they repeat 0.2 to 13%, and a rover
+//! that skids turns by a fifth less than its wheels ask.
 
 use nalgebra::Vector3;
 
