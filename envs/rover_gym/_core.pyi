@@ -421,6 +421,9 @@ class RoverModel:
     def wheel_torque_limits(self) -> _Array:
         """Largest torque of each wheel, (n_wheels,), N m."""
     @property
+    def wheel_speed_gains(self) -> _Array:
+        """Gain of each wheel's speed servo, (n_wheels,), N m s/rad; see `Simulation.set_wheel_speeds`."""
+    @property
     def motors(self) -> list[Motor | None]:
         """The motor of each wheel; None for a wheel whose torque follows the command at any speed."""
     @property
@@ -1667,13 +1670,13 @@ class Simulation(AnySimulation):
         """
     @property
     def wheel_torques(self) -> _Array:
-        """Commanded torques, limited by the model, (n_wheels,), N m, positive forward."""
+        """Commanded torques, limited by the model, (n_wheels,), N m, positive forward; 0 under servos."""
     @property
     def motor_torques(self) -> _Array:
         """Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
 
-        Each is the command after the limit of the wheel's `Motor`; 0 before the first step. Wheels
-        that share a drive have equal parts of its torque.
+        Each is the command after the limit of the wheel's `Motor`, or the torque of the wheel's servo;
+        0 before the first step. Wheels that share a drive have equal parts of its torque.
         """
     @property
     def loop_forces(self) -> dict[str, _Array]:
@@ -1691,6 +1694,30 @@ class Simulation(AnySimulation):
 
         Raises:
             CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
+        """
+    @property
+    def wheel_speeds(self) -> _Array | None:
+        """Speeds that the wheels' servos hold, (n_wheels,), rad/s, positive forward.
+
+        None while the wheels are driven by torques.
+        """
+    def set_wheel_speeds(self, speeds: npt.ArrayLike, set_points: npt.ArrayLike | None = None) -> None:
+        """Holds the wheels at speeds by servos, until torques, other speeds or `brake` replace them.
+
+        The torque of a wheel is `RoverModel.wheel_speed_gains` times the missing speed, within the
+        wheel's torque limit and its motor's line. It is implicit in the step and stable at any gain
+        and step. A motor is asked for its no-load speed at most, and its servo is at least as stiff
+        as its line. Wheels that share a drive have the mean of their speeds; a wheel whose torque
+        limit is 0 rolls freely.
+
+        Args:
+            speeds: Speeds, (n_wheels,), rad/s, positive forward.
+            set_points: Angles for `set_steering`, (n_wheels,), rad, to set both or neither; the
+                steering does not change by default.
+
+        Raises:
+            CommandError: A wrong length, an entry that is not finite, or a set-point that
+                `set_steering` refuses. Nothing has changed.
         """
     @property
     def steering(self) -> _Array:
@@ -2504,11 +2531,12 @@ class SimulationBatch:
         """The slice of each quantity in a row of readings; see `Simulation.reading_layout`."""
     def step(
         self,
-        torques: npt.ArrayLike,
+        torques: npt.ArrayLike | None,
         set_points: npt.ArrayLike,
         n: int = 1,
         *,
         active: npt.NDArray[np.bool_] | None = None,
+        speeds: npt.ArrayLike | None = None,
     ) -> tuple[_Array, dict[int, str]]:
         """Sets the commands of all rovers and takes n steps.
 
@@ -2516,10 +2544,13 @@ class SimulationBatch:
         different numbers of steps.
 
         Args:
-            torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
+            torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m; None with
+                `speeds`.
             set_points: Commands for `Simulation.set_steering`, (n_rovers, n_wheels), rad.
             n: Number of steps.
             active: Which rovers move, (n_rovers,); all by default. The others do not change.
+            speeds: Commands for `Simulation.set_wheel_speeds` in place of the torques, (n_rovers,
+                n_wheels), rad/s.
 
         Returns:
             A row of readings for each rover, (n_rovers, size), and a mapping from the index of each
@@ -2528,7 +2559,7 @@ class SimulationBatch:
         Raises:
             CommandError: An array has a wrong shape or an entry that is invalid for a rover. No
                 rover has moved.
-            OptionError: `n` or `active` is invalid.
+            OptionError: `n` or `active` is invalid, or not one of `torques` and `speeds` is given.
         """
     def readings(self) -> _Array:
         """The readings of all rovers now, (n_rovers, size)."""

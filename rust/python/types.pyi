@@ -45,7 +45,7 @@ _ARGUMENTS = {
     "npt.ArrayLike": (
         "axis axle_a axle_b centre centres clear command commands directions domain drives extra force "
         "further goal gravity heights initial kinematic machine machine_rate mass moment mu normal normals "
-        "origins point points poses position pull q qdot radii radius rig scan set_points spin states "
+        "origins point points poses position pull q qdot radii radius rig scan set_points speeds spin states "
         "torque_limits torques traps triangles v velocity vertices wall_velocity walls ways which"
     ),
     "int": "budget count index max_steps n seed size substeps threads",
@@ -152,6 +152,7 @@ class RoverModel:
     wheel_stiffnesses: _Array
     clear_radius: float
     wheel_torque_limits: _Array
+    wheel_speed_gains: _Array
     motors: list[Motor | None]
     wheel_joint_indices: list[int]
     steering_joint_indices: list[int]
@@ -356,6 +357,9 @@ class Simulation:
     loop_forces: dict[str, _Array]
 
     def set_wheel_torques(): ...
+    wheel_speeds: _Array | None
+
+    def set_wheel_speeds(set_points: npt.ArrayLike | None): ...
     steering: _Array
 
     def set_steering(): ...
@@ -465,7 +469,7 @@ class SimulationBatch:
     instruction_set: Literal["AVX-512", "AVX2", "baseline"]
     reading_layout: dict[str, slice]
 
-    def step() -> tuple[_Array, dict[int, str]]: ...
+    def step(torques: npt.ArrayLike | None, speeds: npt.ArrayLike | None) -> tuple[_Array, dict[int, str]]: ...
     def readings() -> _Array: ...
     def replace(): ...
     def simulation() -> Simulation: ...

@@ -11,6 +11,7 @@ mod friction;
 mod limits;
 mod loops;
 mod machines;
+mod servo;
 mod several_trees;
 mod stand;
 mod wrenches;

@@ -49,6 +49,7 @@ pub fn tracked(n: usize) -> ModelDescription {
         torque_limit: 400.0,
         drive_sign: -1.0,
         motor: None,
+        speed_gain: None,
     };
     ModelDescription {
         name: "tracked".into(),

@@ -18,6 +18,7 @@ from .benchmark_sets import (
 from .commands.command import CommandController as CommandController, CommandLimits as CommandLimits
 from .commands.driven import ObservingPolicy as ObservingPolicy, Policy as Policy
 from .commands.features import Features as Features
+from .commands.wheel_kinematics import WheelCommands as WheelCommands, WheelKinematics as WheelKinematics
 from .evaluation import (
     ENDS as ENDS,
     Episode as Episode,

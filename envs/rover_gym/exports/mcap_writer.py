@@ -43,6 +43,7 @@ WHEEL_CHANNELS = {
     "wheel_gaps": ("gap",),
     "wheel_forces": ("normal_force", "rolling_force", "lateral_force"),
     "wheel_torques": ("torque",),
+    "wheel_speed_set_points": ("speed_set_point",),
     "motor_torques": ("motor_torque",),
     "steering_set_points": ("steering_set_point",),
 }

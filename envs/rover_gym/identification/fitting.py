@@ -58,6 +58,8 @@ def cut(run: RoverRun, window: float, time_step: float) -> list[Window]:
     for name in ("q", "v", "wheel_torques", "steering_set_points"):
         if not np.isfinite(data[name]).all():
             refuse(OptionError, f"recording.{name}", float("nan"), "must be finite")
+    if np.isfinite(data.get("wheel_speed_set_points", np.nan)).any():
+        refuse(OptionError, "recording.wheel_speed_set_points", "given", "must not be: torques must drive the wheels")
     exact = np.diff(time) / time_step
     steps = np.rint(exact).astype(np.int64)
     if len(steps) and (np.abs(exact - steps) > 1e-3).any():

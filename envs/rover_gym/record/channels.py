@@ -205,13 +205,15 @@ def rover_channels(model: RoverModel, forces: str, force_columns: str) -> tuple[
     )
     rates = "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)"
     of_trunk = ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z")
-    torques = "commanded driving torques, positive drives forward"
+    torques = "commanded driving torques, positive drives forward; 0 while servos hold the wheels' speeds"
+    speeds = "speeds that the wheels' servos hold, positive drives forward; nan while torques drive them"
     return (
         Channel("q", "m, rad", positions, (model.nq,), tuple(model.dof_names), read="rover.q"),
         Channel("v", "m/s, rad/s", rates, (model.nv,), (*of_trunk, *model.dof_names[6:]), read="rover.v"),
         Channel("wheel_forces", "N", force_columns, (n, 3), wheels, read=forces),
         Channel("wheel_centres", "m", "world: x forward, y up, z to the right", (n, 3), wheels, read="wheel_centres"),
         Channel("wheel_torques", "N m", torques, (n,), wheels, read="rover.wheel_torques"),
+        Channel("wheel_speed_set_points", "rad/s", speeds, (n,), wheels, read="wheel_speed_set_points"),
         Channel(
             "steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels, read="rover.steering"
         ),
@@ -221,6 +223,12 @@ def rover_channels(model: RoverModel, forces: str, force_columns: str) -> tuple[
 def wheel_solids(model: RoverModel) -> list[str]:
     """Names of the solids that carry the wheels."""
     return [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+
+
+def speed_set_points(sim: Simulation) -> npt.NDArray[np.float64]:
+    """(n_wheels,) speeds that servos hold, rad/s; nan while torques drive the wheels."""
+    speeds = sim.wheel_speeds
+    return np.full(len(sim.model.wheel_names), np.nan) if speeds is None else speeds
 
 
 def origins(sim: Simulation, solids: Sequence[str]) -> npt.NDArray[np.float64]:
@@ -304,6 +312,11 @@ class RoverSampler(Sampler):
     def wheel_centres(self) -> npt.NDArray[np.float64]:
         """(n_wheels, 3) m, world."""
         return origins(self.rover, self._solids)
+
+    @property
+    def wheel_speed_set_points(self) -> npt.NDArray[np.float64]:
+        """(n_wheels,) rad/s; nan while torques drive the wheels."""
+        return speed_set_points(self.rover)
 
     def row(self, sim: Simulation, *, residual: float = 0.0, iterations: int = 0) -> dict[str, npt.ArrayLike]:
         """Samples one row of `channels`.
@@ -399,6 +412,7 @@ def describe(
             "q": sim.q,
             "steering": sim.steering,
             "wheel_torques": sim.wheel_torques,
+            **({} if sim.wheel_speeds is None else {"wheel_speeds": sim.wheel_speeds}),
         },
         "seed": seed,
         "solver": sim.settings,

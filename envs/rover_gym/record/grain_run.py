@@ -43,6 +43,7 @@ from rover_gym.record.channels import (
     origins,
     rover_channels,
     sound,
+    speed_set_points,
     wheel_solids,
 )
 from rover_gym.record.rover_run import RoverRun
@@ -203,6 +204,10 @@ class GrainSampler(Sampler):
     def wheel_forces(self) -> Array:
         """(n_wheels, 3) mean force on each wheel since the last row, N."""
         return self._impulses / (max(self.steps, 1) * self.grains.time_step)
+
+    def wheel_speed_set_points(self) -> Array:
+        """(n_wheels,) rad/s; nan while torques drive the wheels."""
+        return np.zeros(0) if self.rover is None else speed_set_points(self.rover)
 
     def wheel_centres(self) -> Array:
         """(n_wheels, 3) m, world."""

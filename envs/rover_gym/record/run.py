@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core.validation import number, refuse
-from rover_gym.record.channels import ITERATIONS, TIME, Channel, RecordingError
+from rover_gym.record.channels import TIME, Channel, RecordingError
 from rover_gym.record.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 LARGEST = 1e9  # m, rad or s: largest value that leaves enough digits in single precision
+
+#: Data sets that earlier files of balls lack.
+LATER = ("solver_iterations", "wheel_speed_set_points")
 LONGEST_TITLE = 200
 
 
@@ -218,8 +221,8 @@ def check_rows(
         path: The file, for the message.
         channels: What the data sets hold.
         bounded: Data sets whose values must be finite and within `LARGEST`.
-        needed: Whether all must be there, `solver_iterations` aside, which earlier files of balls lack; otherwise
-            those that are missing are skipped.
+        needed: Whether all must be there, but those that earlier files of balls lack; otherwise those that are missing
+            are skipped.
 
     Raises:
         RecordingError: A data set is missing, has rows of another shape, or a value out of range.
@@ -228,7 +231,7 @@ def check_rows(
         name, shape = channel.name, channel.shape
         values = trajectory.data.get(name)
         if values is None:
-            if needed and not channel.packed and channel is not ITERATIONS:
+            if needed and not channel.packed and channel.name not in LATER:
                 refuse(RecordingError, f"{path}: {name}", None, "is missing")
             continue
         if values.shape[1:] != shape:

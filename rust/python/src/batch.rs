@@ -4,7 +4,7 @@ use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::scalar::instructions::Instructions;
-use rover_core::simulation::Batch;
+use rover_core::simulation::{Batch, WheelCommands};
 use rover_task::draw::DrawnGround;
 
 use crate::arguments::{self, Given, below, each, flags, refused};
@@ -108,10 +108,13 @@ impl SimulationBatch {
     /// different numbers of steps.
     ///
     /// Args:
-    ///     torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
+    ///     torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m; None
+    ///         with `speeds`.
     ///     set_points: Commands for `Simulation.set_steering`, (n_rovers, n_wheels), rad.
     ///     n: Number of steps.
     ///     active: Which rovers move, (n_rovers,); all by default. The others do not change.
+    ///     speeds: Commands for `Simulation.set_wheel_speeds` in place of the torques, (n_rovers,
+    ///         n_wheels), rad/s.
     ///
     /// Returns:
     ///     A row of readings for each rover, (n_rovers, size), and a mapping from the index of each
@@ -120,22 +123,40 @@ impl SimulationBatch {
     /// Raises:
     ///     CommandError: An array has a wrong shape or an entry that is invalid for a rover. No
     ///         rover has moved.
-    ///     OptionError: `n` or `active` is invalid.
-    #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None),
-        text_signature = "($self, torques, set_points, n=1, *, active=None)")]
+    ///     OptionError: `n` or `active` is invalid, or not one of `torques` and `speeds` is given.
+    #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None, speeds = None),
+        text_signature = "($self, torques, set_points, n=1, *, active=None, speeds=None)")]
+    #[allow(clippy::too_many_arguments)] // named in Python
     fn step<'py>(
         &self,
         py: Python<'py>,
-        torques: &Bound<'_, PyAny>,
+        torques: Option<&Bound<'_, PyAny>>,
         set_points: &Bound<'_, PyAny>,
         n: Given<'_>,
         active: Option<&Bound<'_, PyAny>>,
+        speeds: Option<&Bound<'_, PyAny>>,
     ) -> Result<(Array, Bound<'py, PyDict>)> {
         let mut held = self.0.open()?;
         let inner = &mut held.inner;
         let n_rovers = inner.rovers().len();
         let shape = [n_rovers, inner.rovers()[0].model().wheels().len()];
-        let torques = commands(torques, "torques", shape)?;
+        let (given, is_speed) = match (torques, speeds) {
+            (Some(torques), None) => (commands(torques, "torques", shape)?, false),
+            (None, Some(speeds)) => (commands(speeds, "speeds", shape)?, true),
+            (Some(_), Some(both)) => {
+                let what = "None where torques are given";
+                return Err(refused(both, Kind::Option, "speeds", what));
+            }
+            (None, None) => {
+                let what = "given, or speeds";
+                return Err(refused(py.None().bind(py), Kind::Option, "torques", what));
+            }
+        };
+        let wheels = if is_speed {
+            WheelCommands::Speeds(&given)
+        } else {
+            WheelCommands::Torques(&given)
+        };
         let set_points = commands(set_points, "set_points", shape)?;
         let n = n.count(1, Kind::Option, "n")?;
         let active = active.map(|given| mask(given, n_rovers)).transpose()?;
@@ -143,7 +164,7 @@ impl SimulationBatch {
         let mut rows = vec![0.0; n_rovers * width];
         let (mut watch, active, out) = (Watch::new(), active.as_deref(), &mut rows[..]);
         let done = py.release(|| {
-            inner.step_while(&torques, &set_points, n, active, out, &mut || watch.go_on())
+            inner.step_while(wheels, &set_points, n, active, out, &mut || watch.go_on())
         })?;
         watch.result(done)?;
         let errors = PyDict::new(py);

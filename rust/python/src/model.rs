@@ -518,6 +518,12 @@ impl RoverModel {
         self.inner.wheels().iter().map(|w| w.torque_limit).collect()
     }
 
+    /// Gain of each wheel's speed servo, (n_wheels,), N m s/rad; see `Simulation.set_wheel_speeds`.
+    #[getter]
+    fn wheel_speed_gains(&self) -> Array {
+        self.inner.wheels().iter().map(|w| w.speed_gain).collect()
+    }
+
     /// The motor of each wheel; None for a wheel whose torque follows the command at any speed.
     #[getter]
     fn motors(&self) -> Vec<Option<Motor>> {

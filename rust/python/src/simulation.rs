@@ -315,7 +315,7 @@ impl Simulation {
         Ok((q.into(), qdot.into()))
     }
 
-    /// Commanded torques, limited by the model, (n_wheels,), N m, positive forward.
+    /// Commanded torques, limited by the model, (n_wheels,), N m, positive forward; 0 under servos.
     #[getter]
     fn wheel_torques(&self) -> Result<Array> {
         Ok(fresh(self.open()?.wheel_torques()))
@@ -323,8 +323,8 @@ impl Simulation {
 
     /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
     ///
-    /// Each is the command after the limit of the wheel's `Motor`; 0 before the first step. Wheels
-    /// that share a drive have equal parts of its torque.
+    /// Each is the command after the limit of the wheel's `Motor`, or the torque of its servo; 0
+    /// before the first step. Wheels that share a drive have equal parts of its torque.
     #[getter]
     fn motor_torques(&self) -> Result<Array> {
         Ok(fresh(self.open()?.motor_torques()))
@@ -351,6 +351,44 @@ impl Simulation {
     fn set_wheel_torques(&self, torques: &Bound<'_, PyAny>) -> Result<()> {
         let torques = self.commands(torques, "torques")?;
         Ok(self.open()?.set_wheel_torques(&torques)?)
+    }
+
+    /// Speeds that the wheels' servos hold, (n_wheels,), rad/s, positive forward.
+    ///
+    /// None while the wheels are driven by torques.
+    #[getter]
+    fn wheel_speeds(&self) -> Result<Option<Array>> {
+        Ok(self.open()?.wheel_speeds().map(fresh))
+    }
+
+    /// Holds the wheels at speeds by servos, until torques, other speeds or `brake` replace them.
+    ///
+    /// The torque of a wheel is `RoverModel.wheel_speed_gains` times the missing speed, within the
+    /// wheel's torque limit and its motor's line. It is implicit in the step and stable at any gain
+    /// and step. A motor is asked for its no-load speed at most, and its servo is at least as stiff
+    /// as its line. Wheels that share a drive have the mean of their speeds; a wheel whose torque
+    /// limit is 0 rolls freely.
+    ///
+    /// Args:
+    ///     speeds: Speeds, (n_wheels,), rad/s, positive forward.
+    ///     set_points: Angles for `set_steering`, (n_wheels,), rad, to set both or neither; the
+    ///         steering does not change by default.
+    ///
+    /// Raises:
+    ///     CommandError: A wrong length, an entry that is not finite, or a set-point that
+    ///         `set_steering` refuses. Nothing has changed.
+    #[pyo3(signature = (speeds, set_points = None))]
+    fn set_wheel_speeds(
+        &self,
+        speeds: &Bound<'_, PyAny>,
+        set_points: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        let speeds = self.commands(speeds, "speeds")?;
+        let Some(set_points) = set_points else {
+            return Ok(self.open()?.set_wheel_speeds(&speeds)?);
+        };
+        let set_points = self.commands(set_points, "set_points")?;
+        Ok(self.open()?.set_speed_commands(&speeds, &set_points)?)
     }
 
     /// Steering set-points, (n_wheels,), rad; 0 for wheels without steering or released ones.

@@ -1,16 +1,11 @@
 """Drives rovers by three numbers: speed, curvature and sideways direction; vectorised over rovers.
 
 A command sets the motion of the point in the middle of the wheelbase: speed `v` in a direction `beta` off the trunk's
-x axis, while the trunk turns by `kappa` per metre of path; `beta` and `kappa` are positive to the left. The velocity
-of a wheel at `(x, z)` from that point, divided by `v`, is
-
-    ahead    a = cos(beta) + kappa z
-    left     l = sin(beta) + kappa x
-
-The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and its rim speed is
-`v (a cos(delta) + l sin(delta))`. A wheel that does not steer has delta = 0. With beta = 0 these are `PDPolicy`'s
-formulas. The torques come from the same wheel regulator, `rover_gym.drive.commands.regulator`, with a feedforward of
-the force that holds the rover on a slope.
+x axis, while the trunk turns by `kappa` per metre of path; `beta` and `kappa` are positive to the left. This is the
+twist (cos(beta), sin(beta), kappa) times `v`, and the wheels' angles and rim speeds are those of
+`rover_gym.drive.commands.wheel_kinematics`. With beta = 0 these are `PDPolicy`'s formulas. The torques come from the
+same wheel regulator, `rover_gym.drive.commands.regulator`, with a feedforward of the force that holds the rover on a
+slope.
 """
 
 import math
@@ -27,6 +22,7 @@ from rover_gym.core.validation import number
 from rover_gym.drive.commands.driven import given_or_usual
 from rover_gym.drive.commands.regulator import YAW, WheelRegulator
 from rover_gym.drive.commands.turning import SCRUB_RATE, WIDENING, Turning
+from rover_gym.drive.commands.wheel_kinematics import WheelKinematics, wheel_velocities
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.rover_env import RoverEnv
 
@@ -79,15 +75,14 @@ class CommandController:
         self._pitch = q + 5
         weight = model.mass * math.hypot(*rover.gravity)
         turning = Turning.of(model, weight)
-        self._entries = np.array(turning.steering.entries)
-        self._steered_wheels = turning.steering.wheels
+        self._kinematics = WheelKinematics(model)
+        self._wheels = np.array(turning.wheels)
         self._steering = np.array([q + i for i in turning.steering.joints], dtype=np.intp)
         self._skids = turning.skids
         self._widening = WIDENING if turning.skids else 1.0
         self.steers_sideways = bool(turning.steering.joints) and min(turning.steering.entries) >= 0
         self._yaw_rate = velocity + YAW
         self._yaw_gain, self._scrub = np.array(turning.yaw_gain), np.array(turning.scrub)
-        self._x, self._z = np.array(turning.wheels).T
         self._max_steering = rover.max_steering
         self._n_wheels = len(turning.wheels)
         self._n_actions = rover.task.n_actions
@@ -103,16 +98,13 @@ class CommandController:
         sideways = math.radians(self.limits.sideways_deg) * command[:, 2:3]
 
         sine, cosine = sin_cos(sideways)
-        ahead = cosine + self._widening * curvature * self._z
-        left = sine + curvature * self._x
-        set_points = self._set_points(atan2(left, ahead))
+        ahead, left = wheel_velocities(self._wheels, cosine, sine, self._widening * curvature, curvature)
+        set_points = self._kinematics.joint_angles(np.asarray(atan2(left, ahead)))
+        set_points = np.clip(set_points, -self._max_steering, self._max_steering)
         # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
         off = np.abs(set_points - seen[:, self._steering]).max(axis=1, keepdims=True, initial=0.0)
         speed = speed * np.maximum(0.2, 1.0 - 2.0 * off)
-        # A wheel that does not steer takes the zero that follows the set-points.
-        angles = np.concatenate((set_points, np.zeros((len(seen), 1))), axis=1)[:, self._entries]
-        sine, cosine = sin_cos(angles)
-        wanted = speed * (ahead * cosine + left * sine)
+        wanted = speed * self._kinematics.rim_speeds(ahead, left, self._kinematics.wheel_angles(set_points))
 
         force = self._load * sin_cos(seen[:, self._pitch, None])[0]
         if self._skids:
@@ -121,7 +113,7 @@ class CommandController:
             force = force + self._yaw_gain * missing + self._scrub * np.clip(yaw_rate / SCRUB_RATE, -1.0, 1.0)
         actions = np.empty((len(seen), self._n_actions), dtype=np.float32)
         actions[:, : self._n_wheels] = self._regulator.entries(seen, wanted, force)
-        if self._steered_wheels:
+        if self._kinematics.steering.joints:
             actions[:, self._n_wheels :] = np.clip(set_points / self._max_steering, -1.0, 1.0)
         return actions
 
@@ -155,9 +147,3 @@ class CommandController:
             truncated |= timed_out & active
             active &= ~(terminated | truncated)
         return seen, rewards, terminated, truncated
-
-    def _set_points(self, angles: Array) -> Array:
-        """`(n, joints)` the mean angle of each joint's wheels, rad, within the steering limit; from `(n, n_wheels)`."""
-        means = [angles[:, own].mean(axis=1) for own in self._steered_wheels]
-        stacked = np.stack(means, axis=1) if means else np.zeros((len(angles), 0))
-        return np.clip(stacked, -self._max_steering, self._max_steering)

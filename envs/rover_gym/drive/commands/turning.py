@@ -7,6 +7,7 @@ import numpy as np
 
 from rover_gym.core import RoverModel, sin_cos
 from rover_gym.drive.commands.regulator import YAW
+from rover_gym.drive.commands.wheel_kinematics import turning_point
 from rover_gym.envs.start import Steering, wheel_centres
 
 #: Commanded curvature of a skidding rover relative to that of the path.
@@ -57,11 +58,8 @@ class Turning:
     def of(cls, model: RoverModel, weight: float) -> "Turning":
         """The constants of a model with its joints at zero and a weight, N."""
         centres, steering = wheel_centres(model), Steering.of(model)
-        fixed = [float(x) for (x, _), entry in zip(centres, steering.entries, strict=True) if entry < 0]
-        if fixed and steering.joints:
-            x_c = sum(fixed) / len(fixed)
-        else:
-            x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
+        fixed = np.array(steering.entries) < 0
+        x_c = turning_point(centres, fixed)
         wheels = tuple((float(x - x_c), float(z)) for x, z in centres)
         width = sum(abs(z) for _, z in wheels)
         gain, scrub, acceleration = 0.0, 0.0, math.inf

@@ -87,6 +87,6 @@ pub use model::{
     JointProperties, Loop, LoopGap, MachineSpan, Model, Passive, Tree, Wheel,
 };
 pub use momentum::Momentum;
-pub use motor::{Motor, MotorLine};
+pub use motor::{Motor, MotorLine, Servo};
 pub use poses::Poses;
 pub use state::Configuration;

@@ -1,4 +1,4 @@
-//! Torque–speed line of a wheel motor.
+//! Torque–speed line of a wheel motor, and the servo that may command it.
 //!
 //! ```text
 //! τ = command, within ± stall (1 ∓ ω/ω₀) and ± stall
@@ -9,6 +9,18 @@
 //! beyond ω₀, a regenerating motor brakes along the line, at most with the stall torque; any other
 //! motor spins freely and brakes on command only. With an infinite ω₀ the torque is the command
 //! within ± stall at any speed.
+//!
+//! A servo commands a speed ω_s instead of a torque:
+//!
+//! ```text
+//! τ = k (ω_s − ω),  within ± limit and ± stall (1 ∓ ω/ω₀);  k ≥ stall/ω₀, |ω_s| ≤ ω₀
+//! ```
+//!
+//! With these bounds on gain and speed the torque falls with the rate, and the line limits only the
+//! torque towards ω_s. A branch of the torque is linear in the rate and enters the step implicitly,
+//! so the servo is stable at any gain. A row of the contact problem, like the one of dry friction,
+//! would be as stable, but it would make the problem larger in every step. A branch costs nothing
+//! until the torque reaches or leaves a limit, where the step is taken once more.
 //!
 //! Source: the permanent-magnet DC motor at its supply voltage, e.g. Siciliano et al. 2009,
 //! *Robotics*, ch. 5.
@@ -88,13 +100,30 @@ impl Motor {
     #[must_use]
     pub fn torque(&self, command: f64, rate: f64) -> f64 {
         let mut line = MotorLine::new(Single::Baseline);
-        line.set_lane(0, Some(self), command);
+        line.set_lane(0, Some(self), command, None);
         line.choose(rate);
         line.torque(rate)
     }
 }
 
-/// The branch on which the torque is the command.
+/// A servo that drives a joint towards a speed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Servo {
+    /// ω_s, the rate of the joint that it is to have, rad/s.
+    pub speed: f64,
+    /// k, torque for each rad/s that is missing, N m s/rad; positive.
+    pub gain: f64,
+    /// Largest torque, N m; positive.
+    pub limit: f64,
+}
+
+/// Largest gain of a servo, as a multiple of the inertia of its joint over the time step.
+///
+/// A step reaches the speed at any larger gain, too, but the torque k (ω_s − ω) would then consist
+/// of rounding: with 10¹² instead, the energy audit slowed a wheel by 10⁻⁴ of its speed.
+const STIFFEST: f64 = 1e6;
+
+/// The branch on which the torque is the command, or follows the servo.
 const COMMAND: f64 = 2.0;
 
 /// Drives with their commands and the present branches of their torques in a step, a drive a lane.
@@ -104,6 +133,9 @@ const COMMAND: f64 = 2.0;
 /// the branch on which the motor works. For a single wheel, moving one branch at a time terminates
 /// after at most four steps, since the torque falls with the rate. Jumping directly to the branch
 /// of that rate may alternate forever.
+///
+/// The branches of a servo have the same numbers: its limit, the line, the servo, the line against
+/// it, minus its limit. A line that the servo does not meet is passed over.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorLine<T> {
     /// Command within the stall torque, N m; 0 without a drive.
@@ -117,6 +149,24 @@ pub struct MotorLine<T> {
     branch: T,
     at_rest: T,
     active: T,
+    /// Rate at which the torque of the present branch is `at_rest`, rad/s; 0 but on a servo.
+    centre: T,
+    servo: ServoLine<T>,
+}
+
+/// Servos of the drives, a drive a lane.
+#[derive(Clone, Copy, Debug)]
+struct ServoLine<T> {
+    /// Whether any lane has a servo.
+    is_any: bool,
+    /// k, at least the slope of the motor's line, N m s/rad; 0 without a servo.
+    stated: T,
+    /// k, within [`STIFFEST`] in the present step.
+    gain: T,
+    /// ω_s within the motor's no-load speed, rad/s.
+    speed: T,
+    /// Largest torque, N m.
+    limit: T,
 }
 
 impl<T: Lane> MotorLine<T> {
@@ -132,12 +182,26 @@ impl<T: Lane> MotorLine<T> {
             branch: T::splat(token, COMMAND),
             at_rest: zero,
             active: zero,
+            centre: zero,
+            servo: ServoLine {
+                is_any: false,
+                stated: zero,
+                gain: zero,
+                speed: zero,
+                limit: zero,
+            },
         }
     }
 
-    /// Sets the command of a lane, N m; without a motor it is the torque at any speed.
-    /// [`Self::choose`] follows if there is a motor.
-    pub fn set_lane(&mut self, lane: usize, motor: Option<&Motor>, command: f64) {
+    /// Sets the command of a lane, N m; without a motor it is the torque at any speed. With a servo
+    /// the command is not read. [`Self::choose`] follows if there is a motor or a servo.
+    pub fn set_lane(
+        &mut self,
+        lane: usize,
+        motor: Option<&Motor>,
+        command: f64,
+        servo: Option<&Servo>,
+    ) {
         let limited = motor.map_or(command, |motor| motor.limited(command));
         let stall = motor.map_or(f64::INFINITY, |motor| motor.stall_torque);
         let beyond = |towards: f64| match motor {
@@ -153,11 +217,18 @@ impl<T: Lane> MotorLine<T> {
         self.branch.set(lane, COMMAND);
         self.at_rest.set(lane, limited + 0.0);
         self.active.set(lane, 0.0);
+        self.centre.set(lane, 0.0);
+        self.servo.set_lane(lane, motor, servo);
     }
 
-    /// Adds to the command; [`Self::choose`] follows if there is a motor.
+    /// Adds to the command, or to the speed of a servo; [`Self::choose`] follows if there is a
+    /// motor or a servo.
     #[inline(always)]
     pub fn add_command(&mut self, change: T) {
+        if self.servo.is_any {
+            let served = self.servo.lanes();
+            self.servo.speed = T::select(served, self.servo.speed + change, self.servo.speed);
+        }
         let command = (self.command + change).min(self.stall).max(-self.stall);
         self.command = command;
         self.at_rest = command;
@@ -167,17 +238,20 @@ impl<T: Lane> MotorLine<T> {
         }
     }
 
-    /// Whether any lane has a motor.
+    /// Whether any lane has a motor or a servo.
     #[inline(always)]
     #[must_use]
-    pub fn has_motor(&self) -> bool {
-        self.stall.lt(self.stall.like(f64::INFINITY)).any()
+    pub fn has_branches(&self) -> bool {
+        self.servo.is_any || self.stall.lt(self.stall.like(f64::INFINITY)).any()
     }
 
-    /// Slope of the line whatever the branch, N m s/rad.
+    /// Steepest slope of the torque whatever the branch, N m s/rad.
     #[inline(always)]
     #[must_use]
     pub fn slope(&self) -> T {
+        if self.servo.is_any {
+            return self.slope.max(self.servo.gain);
+        }
         self.slope
     }
 
@@ -195,11 +269,21 @@ impl<T: Lane> MotorLine<T> {
         self.at_rest
     }
 
+    /// Limits the gain of a servo for a step of h (s) and an inertia of its joint (kg m²).
+    #[inline(always)]
+    pub fn limit_gain(&mut self, h: T, inertia: T) {
+        if self.servo.is_any {
+            let most = h.like(STIFFEST) * inertia / h;
+            self.servo.gain = self.servo.stated.min(most.max(self.slope));
+            self.take(self.branch);
+        }
+    }
+
     /// Torque of the present branch at a rate (rad/s), N m.
     #[inline(always)]
     #[must_use]
     pub fn torque(&self, rate: T) -> T {
-        self.at_rest - self.active * rate
+        self.at_rest - self.active * (rate - self.centre)
     }
 
     /// Work (J) that the motor is credited with in a step that turns it by `turned` (rad) at the
@@ -207,16 +291,22 @@ impl<T: Lane> MotorLine<T> {
     ///
     /// A torque–speed line only reduces the power of the command, `(τ − command) ω ≤ 0`. In a step
     /// that reverses the rate, the implicit torque and the mean rate may violate this; the surplus
-    /// is not counted as work.
+    /// is not counted as work. A servo has the work of its torque.
     #[inline(always)]
     #[must_use]
     pub fn work(&self, torque: T, turned: T) -> T {
-        (torque * turned).min(self.command * turned)
+        let commanded = (torque * turned).min(self.command * turned);
+        if self.servo.is_any {
+            return T::select(self.servo.lanes(), torque * turned, commanded);
+        }
+        commanded
     }
 
     /// Takes the branch that holds at a rate, rad/s.
     #[inline(always)]
     pub fn choose(&mut self, rate: T) {
+        // What the last step left must not show in the branch.
+        self.servo.gain = self.servo.stated;
         self.take(self.branch_at(rate));
     }
 
@@ -224,8 +314,19 @@ impl<T: Lane> MotorLine<T> {
     /// which the torque changed.
     #[inline(always)]
     pub fn revise(&mut self, lanes: T::Mask, rate: T) -> T::Mask {
-        let one = rate.like(1.0);
         let wanted = self.branch_at(rate);
+        let changed = self.approach(lanes, wanted);
+        if !self.servo.is_any {
+            return changed;
+        }
+        changed | self.approach(lanes & !changed & self.servo.lanes(), wanted)
+    }
+
+    /// Moves one branch towards a wanted one in the lanes of a mask. Returns those in which the
+    /// torque changed.
+    #[inline(always)]
+    fn approach(&mut self, lanes: T::Mask, wanted: T) -> T::Mask {
+        let one = wanted.like(1.0);
         let wanted = wanted.max(self.branch - one).min(self.branch + one);
         let (before, slope) = (self.at_rest, self.active);
         self.take(T::select(lanes, wanted, self.branch));
@@ -248,7 +349,12 @@ impl<T: Lane> MotorLine<T> {
         let mut branch = T::select(is_above, number(COMMAND + 1.0), number(COMMAND));
         branch = T::select(is_above & upper.lt(-back), number(COMMAND + 2.0), branch);
         branch = T::select(is_below, number(COMMAND - 1.0), branch);
-        T::select(is_below & ahead.lt(lower), number(COMMAND - 2.0), branch)
+        branch = T::select(is_below & ahead.lt(lower), number(COMMAND - 2.0), branch);
+        if self.servo.is_any {
+            let served = self.servo.branch_at(rate, [upper, lower]);
+            branch = T::select(self.servo.lanes(), served, branch);
+        }
+        branch
     }
 
     /// Takes the torque of a branch.
@@ -265,6 +371,70 @@ impl<T: Lane> MotorLine<T> {
         self.branch = branch;
         self.at_rest = at_rest;
         self.active = T::select(upper | lower, self.slope, number(0.0));
+        if self.servo.is_any {
+            self.take_served(branch);
+        }
+    }
+
+    /// Takes the torque of a branch in the lanes with a servo.
+    #[inline(always)]
+    fn take_served(&mut self, branch: T) {
+        let number = |x: f64| branch.like(x);
+        let is_on = |x: f64| branch.ge(number(x)) & branch.le(number(x));
+        let ServoLine {
+            gain, speed, limit, ..
+        } = self.servo;
+        let served = self.servo.lanes();
+        // The rates at which the servo alone would reach its limit.
+        let reach = limit / T::select(served, gain, number(1.0));
+        let drop = |rate: T| self.slope * rate;
+        let cuts_ahead = is_on(COMMAND - 1.0) & (self.stall - drop(speed - reach)).lt(limit);
+        let cuts_back = is_on(COMMAND + 1.0) & (-limit).lt(-self.stall - drop(speed + reach));
+        let is_servo = is_on(COMMAND);
+        let mut at_rest = T::select(branch.lt(number(COMMAND)), limit, -limit);
+        at_rest = T::select(cuts_ahead, self.stall, at_rest);
+        at_rest = T::select(cuts_back, -self.stall, at_rest);
+        at_rest = T::select(is_servo, number(0.0), at_rest);
+        let mut active = T::select(cuts_ahead | cuts_back, self.slope, number(0.0));
+        active = T::select(is_servo, gain, active);
+        self.at_rest = T::select(served, at_rest, self.at_rest);
+        self.active = T::select(served, active, self.active);
+        self.centre = T::select(served & is_servo, speed, number(0.0));
+    }
+}
+
+impl<T: Lane> ServoLine<T> {
+    fn set_lane(&mut self, lane: usize, motor: Option<&Motor>, servo: Option<&Servo>) {
+        let fastest = motor.map_or(f64::INFINITY, |motor| motor.no_load_speed);
+        let steepest = motor.map_or(0.0, Motor::slope);
+        let gain = servo.map_or(0.0, |servo| servo.gain.max(steepest));
+        let speed = servo.map_or(0.0, |servo| servo.speed.clamp(-fastest, fastest));
+        let limit = servo.map_or(0.0, |own| motor.map_or(own.limit, |m| m.limited(own.limit)));
+        self.stated.set(lane, gain);
+        self.gain.set(lane, gain);
+        self.speed.set(lane, speed + 0.0);
+        self.limit.set(lane, limit);
+        self.is_any = self.lanes().any();
+    }
+
+    /// Lanes with a servo.
+    #[inline(always)]
+    fn lanes(&self) -> T::Mask {
+        self.gain.like(0.0).lt(self.gain)
+    }
+
+    /// Number of the branch at a rate where the motor's line is at these torques.
+    #[inline(always)]
+    fn branch_at(&self, rate: T, [upper, lower]: [T; 2]) -> T {
+        let number = |x: f64| rate.like(x);
+        let asked = self.gain * (self.speed - rate);
+        let (upper, lower) = (upper.min(self.limit), lower.max(-self.limit));
+        let mut branch = T::select(upper.lt(asked), number(COMMAND - 1.0), number(COMMAND));
+        let is_at_limit = self.limit.lt(asked) & self.limit.le(upper);
+        branch = T::select(is_at_limit, number(COMMAND - 2.0), branch);
+        branch = T::select(asked.lt(lower), number(COMMAND + 1.0), branch);
+        let is_at_limit = asked.lt(-self.limit) & lower.le(-self.limit);
+        T::select(is_at_limit, number(COMMAND + 2.0), branch)
     }
 }
 

@@ -6,6 +6,7 @@
 use super::error::BatchError;
 use super::reading::{ReadingLayout, ReadingRequest, ReadingScratch};
 use super::rover::RoverSimulation;
+use super::rover_controls::WheelCommands;
 use super::turns::{Done, Turn, Workers};
 use crate::integrator::StepError;
 use crate::multibody::Model;
@@ -125,11 +126,12 @@ impl Batch {
         active: Option<&[bool]>,
         rows: &mut [f64],
     ) -> Result<(), BatchError> {
-        self.step_while(torques, set_points, n, active, rows, &mut || true)
+        let wheels = WheelCommands::Torques(torques);
+        self.step_while(wheels, set_points, n, active, rows, &mut || true)
     }
 
-    /// Takes `n` steps as [`Self::step`] does, but asks `go_on` from time to time; once it returns
-    /// false, each rover stops after a whole step.
+    /// Takes `n` steps as [`Self::step`] does, under torques or speeds of the wheels, but asks
+    /// `go_on` from time to time; once it returns false, each rover stops after a whole step.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -138,7 +140,7 @@ impl Batch {
     /// As [`Self::step`].
     pub fn step_while(
         &mut self,
-        torques: &[f64],
+        wheels: WheelCommands<'_>,
         set_points: &[f64],
         n: usize,
         active: Option<&[bool]>,
@@ -152,7 +154,7 @@ impl Batch {
         }
         let is_active = |index: usize| active.is_none_or(|active| active[index]);
         self.workers.pool()?;
-        give_commands(&mut self.rovers, torques, set_points, is_active)?;
+        give_commands(&mut self.rovers, wheels, set_points, is_active)?;
         let places = rows.chunks_exact_mut(width).zip(&self.targets).enumerate();
         let mut places: Vec<_> = places
             .map(|(index, (row, target))| ReadingPlace {
@@ -229,25 +231,25 @@ impl Turn<ReadingPlace<'_>> for ReadingTurn<'_> {
 /// All commands are checked before any is applied.
 fn give_commands(
     rovers: &mut [RoverSimulation],
-    torques: &[f64],
+    wheels: WheelCommands<'_>,
     set_points: &[f64],
     is_active: impl Fn(usize) -> bool,
 ) -> Result<(), BatchError> {
     let n_wheels = rovers[0].model().wheels().len();
     let n = rovers.len() * n_wheels;
-    assert_eq!(torques.len(), n, "one torque a wheel");
+    assert_eq!(wheels.len(), n, "one command a wheel");
     assert_eq!(set_points.len(), n, "one set-point a wheel");
     let own = |index: usize| index * n_wheels..(index + 1) * n_wheels;
     for (index, rover) in rovers.iter().enumerate() {
         if is_active(index) {
             rover
-                .check_commands(&torques[own(index)], &set_points[own(index)])
+                .check_commands(wheels.of(own(index)), &set_points[own(index)])
                 .map_err(|error| BatchError::Command { index, error })?;
         }
     }
     for (index, rover) in rovers.iter_mut().enumerate() {
         if is_active(index) {
-            rover.take_commands(&torques[own(index)], &set_points[own(index)]);
+            rover.take_commands(wheels.of(own(index)), &set_points[own(index)]);
         }
     }
     Ok(())

@@ -1,11 +1,11 @@
 //! Steps of a rover with their derivatives, one after another or along a trajectory.
 //!
-//! The state is x = (q, v) in public coordinates, the command u = (wheel torques, steering
-//! set-points). On soft ground the state has seven more entries a wheel: what the sand remembers of
-//! it and the energy that it may give back. A step is that of [`RoverSimulation::set_state`]
-//! followed by one step: it does not depend on steps before it. `crate::system::tangent`
-//! differentiates it, eight directions at a time where the machine has such registers; the bits are
-//! the same with four and with one.
+//! The state is x = (q, v) in public coordinates, the command u = (wheel torques, or speeds while
+//! servos hold them; steering set-points). On soft ground the state has seven more entries a wheel:
+//! what the sand remembers of it and the energy that it may give back. A step is that of
+//! [`RoverSimulation::set_state`] followed by one step: it does not depend on steps before it.
+//! `crate::system::tangent` differentiates it, eight directions at a time where the machine has
+//! such registers; the bits are the same with four and with one.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -138,6 +138,11 @@ impl Differentiator {
         self.sim.model().wheels().len()
     }
 
+    /// Whether servos hold the wheels' speeds.
+    pub(super) fn has_servos(&self) -> bool {
+        self.command.wheel_speed.is_some()
+    }
+
     fn nv(&self) -> usize {
         self.sim.model().nv()
     }
@@ -248,12 +253,28 @@ impl Differentiator {
         Ok((end, modes))
     }
 
+    /// What an entry of the command varies, if anything.
+    fn command_direction(&self, entry: usize) -> Option<Direction> {
+        let wheels = self.sim.model().wheels();
+        if let Some(steered) = entry.checked_sub(wheels.len()) {
+            return wheels[steered].steering.map(Direction::SetPoint);
+        }
+        let (wheel, j) = (&wheels[entry], wheels[entry].joint?);
+        let servo = self.sim.command.actuators.drives[j].and_then(|drive| drive.servo);
+        let share = servo.map_or(1.0, |servo| wheel.speed_gain / servo.gain);
+        Some(Direction::Command(j, wheel.drive_sign * share))
+    }
+
     fn change_command(&mut self, entry: usize, change: f64) {
+        let direction = self.command_direction(entry);
         let actuators = &mut self.sim.command.actuators;
-        match command_direction(self.sim.scene.model.as_ref(), entry) {
+        match direction {
             Some(Direction::Command(joint, sign)) => {
                 if let Some(drive) = &mut actuators.drives[joint] {
-                    drive.torque += sign * change;
+                    match &mut drive.servo {
+                        Some(servo) => servo.speed += sign * change,
+                        None => drive.torque += sign * change,
+                    }
                 }
             }
             Some(Direction::SetPoint(joint)) => {
@@ -295,7 +316,6 @@ impl Differentiator {
         numbers: &[usize],
     ) -> Vec<(usize, Direction)> {
         let (nv, n, nx) = (self.nv(), self.n_wheels(), state.len());
-        let model: &Arc<Model> = self.sim.model();
         let mut all = Vec::with_capacity(nx + 2 * n + parameters.len());
         all.extend((0..nv).map(|k| (k, Direction::Configuration([(k, 1.0), (k, 0.0), (k, 0.0)]))));
         for &k in &self.angles {
@@ -308,7 +328,7 @@ impl Differentiator {
         all.extend((0..nv).map(|k| (nv + k, Direction::Velocity(k))));
         let of_sand = (0..nx - 2 * nv).map(|k| Direction::Sand(k / OF_WHEEL, k % OF_WHEEL));
         all.extend((2 * nv..nx).zip(of_sand));
-        let commands = (0..2 * n).filter_map(|i| Some((nx + i, command_direction(model, i)?)));
+        let commands = (0..2 * n).filter_map(|i| Some((nx + i, self.command_direction(i)?)));
         all.extend(commands);
         let soil = self.sim.terrain().soft().map(|layer| &**layer.soil);
         let directions = parameters.iter().map(|own| own.direction(soil, numbers));
@@ -401,15 +421,6 @@ pub fn with_sand(of: &RoverSimulation, states: &[f64]) -> Vec<f64> {
     let rows = states.chunks_exact(2 * of.model().nv());
     rows.flat_map(|row| row.iter().chain(&own).copied())
         .collect()
-}
-
-/// What an entry of the command varies, if anything.
-fn command_direction(model: &Model, entry: usize) -> Option<Direction> {
-    let wheels = model.wheels();
-    match entry.checked_sub(wheels.len()) {
-        None => (wheels[entry].joint).map(|j| Direction::Command(j, wheels[entry].drive_sign)),
-        Some(steered) => wheels[steered].steering.map(Direction::SetPoint),
-    }
 }
 
 /// Steps of a trajectory with their derivatives. Matrices are row-major, one step after another.

@@ -1,6 +1,6 @@
 //! Linearisation of a rover's step: `x⁺ ≈ f(x, u, θ) + A dx + B du + C dθ` with x = (q, v), q the
-//! public coordinates, u = (wheel torques, steering set-points) and θ some [`StepParameter`]s. On
-//! soft ground x has the state of the sand behind.
+//! public coordinates, u = (wheel torques, or speeds while servos hold them; steering set-points)
+//! and θ some [`StepParameter`]s. On soft ground x has the state of the sand behind.
 //!
 //! The step is the one that follows [`RoverSimulation::set_state`], without memory of earlier
 //! impulses. The derivatives are those of [`super::differentiator`]. A check on demand takes two
@@ -97,7 +97,11 @@ impl RoverSimulation {
             b: all.columns(nx, nu).into_owned(),
             c: all.columns(nx + nu, parameters.len()).into_owned(),
             state,
-            command: [self.wheel_torques(), &self.steering()].concat(),
+            command: [
+                self.wheel_speeds().unwrap_or(self.wheel_torques()),
+                &self.steering(),
+            ]
+            .concat(),
             next_state,
             parts: held.step.contacts.iter().map(|c| c.part).collect(),
             margins: held.step.law.margins(),
@@ -118,7 +122,7 @@ fn test(
     let (nx, nu) = (state.len(), 2 * differentiator.n_wheels());
     let (mut holds, mut errors) = (Vec::new(), Vec::new());
     for j in 0..nx + nu {
-        let is_torque = (nx..nx + nu / 2).contains(&j);
+        let is_torque = (nx..nx + nu / 2).contains(&j) && !differentiator.has_servos();
         let step = perturbation * if is_torque { TORQUE } else { 1.0 };
         let (ahead, modes) = differentiator.take(state, (j, step))?;
         let mut is_same = modes.as_ref() == Some(base);

@@ -87,6 +87,7 @@ pub use planar::{PlanarScene, PlanarSimulation};
 pub use reading::{ReadingLayout, ReadingRequest, ReadingScratch, seen_from};
 pub use rover::{LastCall, PlacedRover, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
+pub use rover_controls::WheelCommands;
 pub use rover_in_grains::{RoverInGrains, TogetherError};
 pub use rover_picture::Shown;
 pub use scene::{

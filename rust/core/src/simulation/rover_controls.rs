@@ -1,10 +1,46 @@
-//! Controls of a rover: wheel torques, steering, held joints, brakes.
+//! Controls of a rover: wheel torques and speeds, steering, held joints, brakes.
 
 use super::error::CommandError;
 use super::rover::RoverSimulation;
 use super::rover_command::check;
 use crate::multibody::model::Wheel;
 use crate::system::{Command, HeldJoint, Wrench};
+
+/// Commands of wheels, an entry each, positive forward.
+#[derive(Clone, Copy, Debug)]
+pub enum WheelCommands<'a> {
+    /// For [`RoverSimulation::set_wheel_torques`], N m.
+    Torques(&'a [f64]),
+    /// For [`RoverSimulation::set_wheel_speeds`], rad/s.
+    Speeds(&'a [f64]),
+}
+
+impl<'a> WheelCommands<'a> {
+    /// The commands of some of the wheels.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    #[must_use]
+    pub fn of(self, wheels: std::ops::Range<usize>) -> Self {
+        match self {
+            Self::Torques(all) => Self::Torques(&all[wheels]),
+            Self::Speeds(all) => Self::Speeds(&all[wheels]),
+        }
+    }
+
+    /// Their number.
+    #[must_use]
+    pub fn len(self) -> usize {
+        let (Self::Torques(all) | Self::Speeds(all)) = self;
+        all.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(self) -> bool {
+        self.len() == 0
+    }
+}
 
 impl RoverSimulation {
     /// Commanded driving torque of each wheel, positive forward, within its limit (N m).
@@ -24,11 +60,40 @@ impl RoverSimulation {
     }
 
     fn take_wheel_torques(&mut self, torques: &[f64]) {
+        self.command.wheel_speed = None;
         let wheels = self.scene.model.wheels().iter();
         let own = self.command.wheel_torque.iter_mut();
         for ((own, torque), wheel) in own.zip(torques).zip(wheels) {
             *own = torque.clamp(-wheel.torque_limit, wheel.torque_limit);
         }
+        self.combine_torques();
+    }
+
+    /// Speeds that the wheels' servos hold, positive forward, rad/s; none while the wheels are
+    /// driven by torques.
+    #[must_use]
+    pub fn wheel_speeds(&self) -> Option<&[f64]> {
+        self.command.wheel_speed.as_deref()
+    }
+
+    /// Holds the wheels at speeds (rad/s, positive forward) until other commands replace them.
+    ///
+    /// The torque of a wheel is its gain, [`Wheel::speed_gain`], times the missing speed, taken at
+    /// the end of the step, within its torque limit and its motor's line. It is stable at any gain.
+    /// The speed counts up to the no-load speed, and the gain is at least the slope of the line.
+    /// Wheels that share a joint have the mean of their speeds.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_wheel_speeds(&mut self, speeds: &[f64]) -> Result<(), CommandError> {
+        check("speeds", speeds, self.scene.model.wheels().len())?;
+        self.take_wheel_speeds(speeds);
+        Ok(())
+    }
+
+    fn take_wheel_speeds(&mut self, speeds: &[f64]) {
+        self.command.wheel_torque.fill(0.0);
+        self.command.wheel_speed = Some(speeds.to_vec());
         self.combine_torques();
     }
 
@@ -58,7 +123,13 @@ impl RoverSimulation {
             .torque
             .copy_from_slice(&self.command.joint_torque);
         for drive in self.command.actuators.drives.iter_mut().flatten() {
-            drive.torque = 0.0;
+            (drive.torque, drive.servo) = (0.0, None);
+        }
+        if self.command.wheel_speed.is_some() {
+            let servos = self.command.servos(&self.scene.model);
+            for (drive, servo) in self.command.actuators.drives.iter_mut().zip(servos) {
+                drive.iter_mut().for_each(|drive| drive.servo = servo);
+            }
         }
         let Command { torque, drives, .. } = &mut self.command.actuators;
         for ((torque, drive), joint) in torque.iter_mut().zip(drives).zip(self.scene.model.joints())
@@ -151,23 +222,51 @@ impl RoverSimulation {
         torques: &[f64],
         set_points: &[f64],
     ) -> Result<(), CommandError> {
-        self.check_commands(torques, set_points)?;
-        self.take_commands(torques, set_points);
+        let commands = WheelCommands::Torques(torques);
+        self.check_commands(commands, set_points)?;
+        self.take_commands(commands, set_points);
+        Ok(())
+    }
+
+    /// [`Self::set_wheel_speeds`] and [`Self::set_steering`] in one: both or neither.
+    ///
+    /// # Errors
+    /// As these two; nothing is changed then.
+    pub fn set_speed_commands(
+        &mut self,
+        speeds: &[f64],
+        set_points: &[f64],
+    ) -> Result<(), CommandError> {
+        let commands = WheelCommands::Speeds(speeds);
+        self.check_commands(commands, set_points)?;
+        self.take_commands(commands, set_points);
         Ok(())
     }
 
     /// [`Self::set_commands`] after [`Self::check_commands`].
-    pub(super) fn take_commands(&mut self, torques: &[f64], set_points: &[f64]) {
-        self.take_wheel_torques(torques);
+    pub(super) fn take_commands(&mut self, wheels: WheelCommands<'_>, set_points: &[f64]) {
+        match wheels {
+            WheelCommands::Torques(torques) => self.take_wheel_torques(torques),
+            WheelCommands::Speeds(speeds) => self.take_wheel_speeds(speeds),
+        }
         self.take_steering(set_points);
     }
 
-    /// Checks whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would accept these.
+    /// Checks whether [`Self::set_wheel_torques`] or [`Self::set_wheel_speeds`], and
+    /// [`Self::set_steering`], would accept these.
     ///
     /// # Errors
-    /// As these two.
-    pub fn check_commands(&self, torques: &[f64], set_points: &[f64]) -> Result<(), CommandError> {
-        check("torques", torques, self.scene.model.wheels().len())?;
+    /// As these.
+    pub fn check_commands(
+        &self,
+        wheels: WheelCommands<'_>,
+        set_points: &[f64],
+    ) -> Result<(), CommandError> {
+        let (field, values) = match wheels {
+            WheelCommands::Torques(torques) => ("torques", torques),
+            WheelCommands::Speeds(speeds) => ("speeds", speeds),
+        };
+        check(field, values, self.scene.model.wheels().len())?;
         self.check_steering(set_points)
     }
 
@@ -259,6 +358,7 @@ impl RoverSimulation {
     /// free: [`Self::check_brakes`].
     pub fn brake(&mut self) {
         self.command.wheel_torque.fill(0.0);
+        self.command.wheel_speed = None;
         self.combine_torques();
         for wheel in self.scene.model.wheels() {
             if let Some(j) = wheel.joint {

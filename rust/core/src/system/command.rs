@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::multibody::{Mechanism, Model, Motor, Poses};
+use crate::multibody::{Mechanism, Model, Motor, Poses, Servo};
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// A joint held at a set-point by a PD controller that is implicit in the step:
@@ -25,6 +25,8 @@ pub struct Drive {
     pub torque: f64,
     /// Torque–speed line; without one the torque is the command at any speed.
     pub motor: Option<Motor>,
+    /// Servo that sets the torque in place of `torque`.
+    pub servo: Option<Servo>,
 }
 
 /// A force and a moment from outside on a body, constant in world axes.

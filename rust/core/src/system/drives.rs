@@ -1,16 +1,17 @@
-//! Torques, motors, held joints, springs and dampers of machines side by side.
+//! Torques, motors, servos, held joints, springs and dampers of machines side by side.
 //!
-//! Position control, springs, dampers and the motors' torque–speed lines are implicit with an
-//! exponentially fitted θ_j ([`super::fitted_theta`]):
+//! Position control, springs, dampers, servos and the motors' torque–speed lines are implicit with
+//! an exponentially fitted θ_j ([`super::fitted_theta`]):
 //!
 //! ```text
-//! τ = −K (q + h θ_j v_mean − q_set) − D ω + at_rest − active ω,    ω = v + θ_j (v⁺ − v)
+//! τ = −K (q + h θ_j v_mean − q_set) − D ω + at_rest − active (ω − centre)
+//! ω = v + θ_j (v⁺ − v)
 //! M̂ = M + h θ_j (D + active + h θ K)
 //! ```
 //!
-//! A motor's branch is chosen at ω, so that torque, branch and work are consistent. A step in which
-//! a motor leaves its branch is repeated with the next one ([`Drives::revise`]). Torques never rise
-//! with the speed, so the implicit term is dissipative.
+//! The branch of a motor or a servo is chosen at ω, so that torque, branch and work are consistent.
+//! A step that leaves a branch is repeated with the next one ([`Drives::revise`]). Torques never
+//! rise with the speed, so the implicit term is dissipative.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 use super::command::Command;
@@ -53,7 +54,7 @@ pub struct Drives<T> {
     joints: Vec<Joint<T>>,
     /// Joints that have implicit terms in some lane.
     is_implicit: Vec<bool>,
-    /// Joints that have a motor in some lane.
+    /// Joints that have a motor or a servo in some lane.
     motors: Vec<usize>,
     /// Impulse (N m s) and work (J) of each joint's drive in the step being tried.
     tried: Vec<[T; 2]>,
@@ -92,7 +93,8 @@ impl<T: Lane> Drives<T> {
         {
             let motor = drive.as_ref().and_then(|drive| drive.motor.as_ref());
             let asked = drive.map_or(0.0, |drive| drive.torque);
-            own.line.set_lane(lane, motor, asked);
+            let servo = drive.as_ref().and_then(|drive| drive.servo.as_ref());
+            own.line.set_lane(lane, motor, asked, servo);
             // No negative zeros, as there.
             own.torque.set(lane, *torque + 0.0);
             let (stiffness, damping, set_point) =
@@ -106,7 +108,7 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Adds to the command of a joint's drive, N m.
+    /// Adds to the command of a joint's drive, N m, or to the speed of its servo, rad/s.
     #[inline(always)]
     pub fn add_command(&mut self, joint: usize, change: T) {
         self.joints[joint].line.add_command(change);
@@ -138,7 +140,7 @@ impl<T: Lane> Drives<T> {
         self.motors.clear();
         for (j, (is_implicit, joint)) in (self.is_implicit.iter_mut().zip(&self.joints)).enumerate()
         {
-            if joint.line.has_motor() {
+            if joint.line.has_branches() {
                 self.motors.push(j);
             }
             let slope = joint.line.slope();
@@ -192,7 +194,7 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Whether any joint has a motor.
+    /// Whether any joint has a motor or a servo.
     #[inline]
     #[must_use]
     pub fn has_motors(&self) -> bool {
@@ -207,7 +209,8 @@ impl<T: Lane> Drives<T> {
         }
     }
 
-    /// Chooses θ_j for the `inertia` of each joint's velocity (diagonal of M), kg m².
+    /// Chooses θ_j, and limits the gains of servos, for the `inertia` of each joint's velocity
+    /// (diagonal of M), kg m².
     #[inline(always)]
     pub fn set_theta(
         &mut self,
@@ -218,8 +221,10 @@ impl<T: Lane> Drives<T> {
         for ((j, own), joint) in mechanism.joints.iter().enumerate().zip(&mut self.joints) {
             joint.theta = theta;
             if self.is_implicit[j] {
+                let inertia = inertia(own.velocity);
+                joint.line.limit_gain(h, inertia);
                 let feedback = (joint.line.slope() + joint.damping, joint.stiffness);
-                joint.theta = implicit_weight((h, theta), feedback, inertia(own.velocity));
+                joint.theta = implicit_weight((h, theta), feedback, inertia);
             }
         }
     }

@@ -288,7 +288,7 @@ impl Forces for PlanarSystem<'_> {
                     line: MotorLine::new(Single::Baseline),
                     theta: 0.5,
                 };
-                own.line.set_lane(0, Some(&motor.motor), torque);
+                own.line.set_lane(0, Some(&motor.motor), torque, None);
                 own.line.choose(own.rate(v));
                 motors.push(own);
             }

@@ -414,6 +414,10 @@ fn check_wheels(
         if let Some(motor) = wheel.motor {
             motor.check(|field| at(&format!("motor.{field}")))?;
         }
+        if let Some(gain) = wheel.speed_gain {
+            positive(&at("speed_gain"), gain)?;
+            in_range(&at("speed_gain"), gain, 1e12, "at most 1e12 N m s/rad")?;
+        }
         if let Some(name) = &wheel.steering {
             let steering = find("steering", name)?;
             // Parents precede their children, so the ascent terminates.

@@ -113,6 +113,7 @@ impl TrackDescription {
             torque_limit: self.torque_limit / self.wheels as f64,
             drive_sign: self.drive_sign,
             motor: self.motor,
+            speed_gain: self.speed_gain.map(|gain| gain / self.wheels as f64),
             ..WheelDescription::default()
         };
         (solid, wheel)
@@ -174,6 +175,10 @@ fn check_track(
     material(&at("material"), track.material.as_ref())?;
     if let Some(motor) = track.motor {
         motor.check(|field| at(&format!("motor.{field}")))?;
+    }
+    if let Some(gain) = track.speed_gain {
+        positive(&at("speed_gain"), gain)?;
+        in_range(&at("speed_gain"), gain, 1e12, "at most 1e12 N m s/rad")?;
     }
     Ok(())
 }

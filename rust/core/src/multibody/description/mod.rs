@@ -263,6 +263,10 @@ pub struct WheelDescription {
     /// Torque–speed line of its motor. Without one the torque equals the command at any speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motor: Option<Motor>,
+    /// Gain of its speed servo: torque for each rad/s that is missing, N m s/rad. By default a
+    /// wheel that rolls with its share of the machine has a time constant of 0.5 ms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_gain: Option<f64>,
     /// The solid whose joint steers it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering: Option<String>,

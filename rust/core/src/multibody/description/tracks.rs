@@ -56,6 +56,9 @@ pub struct TrackDescription {
     /// Torque–speed line of its motor, which drives all of its wheels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motor: Option<Motor>,
+    /// Gain of its speed servo, N m s/rad, as a wheel's; each wheel has an equal share.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_gain: Option<f64>,
 }
 
 /// Most wheels of a track.

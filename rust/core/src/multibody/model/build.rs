@@ -9,6 +9,7 @@ use super::links::{inertias_of, mechanism_of};
 use super::machines::machines_of;
 use super::parts::{Collider, ColliderForm, CollisionBox, CollisionSphere, Frame, Wheel};
 use super::properties::{JointProperties, Passive};
+use super::speed_gains::set_speed_gains;
 use super::spinners::mark_spinners;
 use super::tree::{Paths, Tree};
 use super::{Body, Model, fingerprint};
@@ -71,7 +72,8 @@ impl Model {
             let i = solid_of_body[b];
             coupled_apart(i, &description.solids[i])
         })?;
-        let wheels = wheels(&description, &index_of, &frames, &bodies, &joints);
+        let mut wheels = wheels(&description, &index_of, &frames, &bodies, &joints);
+        set_speed_gains(&mut wheels, &description, &bodies, &joints);
         let carriers = (boxes.iter().map(|x| x.body))
             .chain(spheres.iter().map(|x| x.body))
             .chain(colliders.iter().map(|x| x.body));
@@ -506,6 +508,7 @@ fn wheels(
             torque_limit: wheel.torque_limit,
             drive_sign: wheel.drive_sign,
             motor: wheel.motor,
+            speed_gain: 0.0,
             joint: driving(&wheel.solid),
             share: 1.0,
             steering: wheel.steering.as_deref().and_then(joint_of),

@@ -14,6 +14,7 @@ mod links;
 mod machines;
 mod parts;
 mod properties;
+mod speed_gains;
 mod spinners;
 mod tree;
 

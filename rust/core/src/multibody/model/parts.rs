@@ -60,6 +60,8 @@ pub struct Wheel {
     pub drive_sign: f64,
     /// Torque–speed line of its motor, if any.
     pub motor: Option<Motor>,
+    /// Gain of its speed servo, N m s/rad.
+    pub speed_gain: f64,
     /// Index of its own joint ([`Model::joint_index`](super::Model::joint_index)), or of the one
     /// that it follows at the same rate; `None` if it is locked or follows otherwise.
     pub joint: Option<usize>,

@@ -12,7 +12,7 @@ pub(crate) enum Direction {
     Configuration([(usize, f64); 3]),
     /// A velocity.
     Velocity(usize),
-    /// The command of a joint's drive, times a sign.
+    /// The command of a joint's drive, or the speed of its servo, times a factor.
     Command(usize, f64),
     /// The set-point of a held joint.
     SetPoint(usize),
