@@ -49,7 +49,7 @@ fn look() -> Look {
     }
 }
 
-/// About 2600 rocks of 5 to 50 cm on an area of 30 m by 30 m.
+/// About 6900 rocks of 5 to 50 cm on an area of 30 m by 30 m.
 fn rocks(ground: &dyn Terrain) -> SphereField {
     let rocks = Rocks {
         abundance: 0.17,

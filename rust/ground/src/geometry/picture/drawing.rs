@@ -191,7 +191,7 @@ mod tests {
             match (drawn.first_hit(&ray, 9.0), oriented_box::hit(&ray, &solid, 9.0)) {
                 (Some((hit, shading, [axis, side, _])), Some(expected)) => {
                     prop_assert!((hit.distance - expected.distance).abs() < 1e-9);
-                    let outward = R * Vector3::new(0.0, 1.0, 2.0).map(|k| if k == axis { side } else { 0.0 });
+                    let outward = R * Vector3::from_fn(|k, _| if (k as f64 - axis).abs() < 0.5 { side } else { 0.0 });
                     prop_assert!((shading - outward).norm() < 1e-9);
                     prop_assert!((hit.normal.dot(&outward).abs() - 1.0).abs() < 1e-9);
                     let local = R.tr_mul(&(ray.at(hit.distance) - centre)).component_div(&half);

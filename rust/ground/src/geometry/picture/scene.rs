@@ -156,16 +156,12 @@ impl<'a> PictureScene<'a> {
             }
             to_sun.origin = to_sun.at((depth + CLEARANCE) / sun.y.max(1e-3));
         }
-        let is_met = self.terrain.first_hit(&to_sun, range).is_some()
-            || self
-                .balls
-                .is_some_and(|balls| balls.first_hit(&to_sun, range).is_some());
-        !is_met
-            && !(self.meets_machine(&to_sun, range)
-                && self
-                    .drawings
-                    .iter()
-                    .any(|one| one.first_hit(&to_sun, range).is_some()))
+        let is_grain = |balls: &SphereField| balls.first_hit(&to_sun, range).is_some();
+        let is_part = |one: &PlacedDrawing<'_>| one.first_hit(&to_sun, range).is_some();
+        let is_dark = self.terrain.first_hit(&to_sun, range).is_some()
+            || self.balls.is_some_and(is_grain)
+            || (self.meets_machine(&to_sun, range) && self.drawings.iter().any(is_part));
+        !is_dark
     }
 }
 

@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn grain_has_its_values_at_its_pixels_and_its_mean_far_away() {
-        let grain = Grain::new((0..64).map(|k| k as f64 / 63.0).collect(), 8).unwrap();
+        let grain = Grain::new((0..64).map(|k| f64::from(k) / 63.0).collect(), 8).unwrap();
         for (row, column) in [(0, 0), (3, 5), (7, 7)] {
             let at = [column, row].map(|k| (f64::from(k) + 0.5) / 8.0);
             let expected = f64::from(8 * row + column) / 63.0;
