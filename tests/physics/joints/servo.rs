@@ -214,7 +214,7 @@ fn servos_in_lanes_are_those_of_a_rover_alone() {
             }
         }
     }
-    assert!(retaken > 40 && fallbacks < 20, "{retaken} {fallbacks}");
+    assert!(retaken > 20 && fallbacks < 20, "{retaken} {fallbacks}");
     let mut batch = Batch::new(rovers, Vec::new(), Some(1)).unwrap();
     let mut rows = vec![0.0; 9 * batch.layout().size()];
     let all = speeds.concat();
@@ -226,12 +226,12 @@ fn servos_in_lanes_are_those_of_a_rover_alone() {
     }
 }
 
-/// The derivatives by velocities and speeds are those of real steps.
+/// The derivatives by state and speeds are those of real steps.
 #[test]
 fn the_tangent_of_a_servo_equals_differences() {
-    let mut model = Model::rover().description().clone();
-    model.wheels[2].torque_limit = 5.0;
-    // Uphill each wheel needs some 20 N m.
+    let mut model = ModelDescription::named("four-steered").unwrap();
+    model.wheels[2].torque_limit = 1.0;
+    // Uphill each wheel needs some 2 N m.
     let options = StepOptions {
         gravity: Vector3::new(-1.3, -9.7, 0.0),
         ..StepOptions::default()
@@ -239,22 +239,21 @@ fn the_tangent_of_a_servo_equals_differences() {
     let model = Model::from_description(model).unwrap();
     let (start, v) = (standing(&model), vec![0.0; model.nv()]);
     let mut run = moving(model, flat(), options, start, v);
-    run.set_wheel_speeds(&[4.0; 6]).unwrap();
+    run.set_wheel_speeds(&[4.0; 4]).unwrap();
     run.step(100).unwrap();
-    near(run.motor_torques()[2], 5.0, 1e-9);
+    near(run.motor_torques()[2], 1.0, 1e-9);
     let found = run.linearise(&[], Some(1e-6)).unwrap();
     let check = found.check.unwrap();
     let nx = found.state.len();
-    let errors = &check.errors[nx..nx + 6];
-    assert!(
-        check.holds[nx..nx + 6].iter().all(|holds| *holds),
-        "{errors:?}"
-    );
-    assert!(check.holds[nx / 2..nx].iter().all(|holds| *holds));
-    assert_eq!(bits(&found.command[..6]), bits(&[4.0; 6]));
+    let broken: Vec<_> = (0..nx + 4)
+        .filter(|&k| !check.holds[k])
+        .map(|k| (k, check.errors[k]))
+        .collect();
+    assert!(broken.is_empty(), "{broken:?}");
+    assert_eq!(bits(&found.command[..4]), bits(&[4.0; 4]));
     // The wheel at its limit does not answer.
-    let answers: Vec<bool> = (0..6).map(|k| found.b.column(k).amax() > 1e-3).collect();
-    assert_eq!(answers, [true, true, false, true, true, true]);
+    let answers: Vec<bool> = (0..4).map(|k| found.b.column(k).amax() > 1e-3).collect();
+    assert_eq!(answers, [true, true, false, true]);
 }
 
 /// A snapshot holds the speeds; torques and brakes replace them.
