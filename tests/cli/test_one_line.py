@@ -301,13 +301,13 @@ def test_help_cut_words_at_80_columns(path: tuple[str, ...]) -> None:
 
 
 def test_a_command_that_prints_a_table_takes_json() -> None:
-    """The others print paths of files or serve a page."""
+    """The others print paths of files, or serve a page or a node."""
     without = {
         path
         for path, command in COMMANDS.items()
         if path != ("sand", "convert") and "--json" not in {o for p in command.params for o in p.opts}
     }
-    assert {path[0] for path in without} <= {"plot", "replay", "live", "export", "dataset"}
+    assert {path[0] for path in without} <= {"plot", "replay", "live", "export", "dataset", "ros"}
 
 
 @pytest.mark.parametrize(

@@ -130,6 +130,15 @@ env = rover_gym.parallel_env(2)
 env.reset(seed=0)
 env.step({agent: env.action_space(agent).sample() for agent in env.agents})
 """,
+    "ros": """
+from rover_gym.ros import DrivenRover, NodeOptions, RosNode, open_transport
+from rover_gym.show.live import LiveRover
+
+node = RosNode(DrivenRover(LiveRover()), open_transport("cyclonedds", "rover", "/"), options=NodeOptions(pace=0.0))
+for _ in range(20):
+    node.step()
+node.close()
+""",
     "planning": """
 rover("drive", "--difficulty", "1", "--policy", "planner", "--time-limit", "0.5")
 """,

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import RoverModel, Simulation, Terrain
+from rover_gym.core import OptionError, RoverModel, Simulation, Terrain
 from rover_gym.core.extras import require
 from rover_gym.core.validation import TERRAINS, array, checked, number, refuse, vector
-from rover_gym.envs.sensors import DepthCamera
+from rover_gym.envs.sensors import Camera, DepthCamera
 from rover_gym.envs.sensors.sensor import Moment
 from rover_gym.exports import mcap_messages as messages
 from rover_gym.exports.axes import MAP_FROM_WORLD
@@ -31,7 +31,6 @@ from rover_gym.show.replay.overlays import SENSORS, hits, sensor_of
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from rover_gym.envs.sensors import Camera
 
 Array = npt.NDArray[np.float64]
 
@@ -461,7 +460,7 @@ def write_mcap(
 
     Raises:
         RecordingError: The run lacks `q` or `v`, the file is in use, or it cannot be written.
-        OptionError: `fps` is not a positive number.
+        OptionError: `fps` is not a positive number, or `cameras` are none.
         OSError: The file cannot be created, or no OpenGL library works.
         MissingExtraError: An extra is not installed.
     """
@@ -469,6 +468,8 @@ def write_mcap(
     if "v" not in data:
         refuse(RecordingError, "run", sorted(data), "must hold v")
     pictured = frozenset(film_rows(run.time, fps).tolist()) if images or cameras else frozenset()
+    if not isinstance(cameras, (list, tuple)) or not all(isinstance(camera, Camera) for camera in cameras):
+        refuse(OptionError, "cameras", cameras, "must be a list of cameras")
     for camera in cameras:
         camera.check(run.model)
     simulation = Simulation(run.model, run.terrain)

@@ -26,7 +26,7 @@ class CameraPicture:
     distances: Array
 
     def within(self, max_range: float) -> "CameraPicture":
-        """The same with nothing beyond a distance, m; its colours stay."""
+        """The same picture with nothing beyond a distance, m; colours stay."""
         seen = self.distances <= max_range
         return CameraPicture(
             self.colours, np.where(seen, self.kinds, np.uint8(0)), np.where(seen, self.distances, np.inf)

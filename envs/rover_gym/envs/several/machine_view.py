@@ -3,11 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from rover_gym.core import Machine, RoverModel, Simulation, Terrain
+from rover_gym.core import Machine, PictureLook, RoverModel, Simulation, Terrain
 from rover_gym.envs.observation import Array
+from rover_gym.envs.sensors.picture import picture_look
 from rover_gym.envs.start import scan_points
 
 #: Parts of a reading that depend on contacts, and entries of each wheel.
@@ -92,8 +95,25 @@ class MachineView:
             parts: Without effect: the others are always seen, and of the own solids all but those in `without`.
             without: Own solids that are not seen.
         """
-        unseen = [f"{self.machine.name}/{name}" for name in ([without] if isinstance(without, str) else without)]
-        return self.joined.cast_rays(origins, directions, max_range, parts=True, without=unseen)
+        return self.joined.cast_rays(origins, directions, max_range, parts=True, without=self._own(without))
+
+    def take_picture(
+        self, look: PictureLook, *view: Array, without: Sequence[str] = (), **options: Any
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint8], Array]:
+        """Takes a picture of the ground and the machines, as `Simulation.take_picture`.
+
+        Args:
+            look: How this machine looks; the others are seen with theirs. One without a rover hides this machine.
+            view: Place and directions.
+            without: Own solids that are not seen.
+            options: The other arguments.
+        """
+        unseen = self.machine.solids if look is picture_look(None) else self._own(without)
+        return self.joined.take_picture(picture_look(self.joined.model), *view, without=unseen, **options)
+
+    def _own(self, names: str | Sequence[str]) -> list[str]:
+        """Names of own solids in the joined model."""
+        return [f"{self.machine.name}/{name}" for name in ([names] if isinstance(names, str) else names)]
 
     def heights(self, offsets: Array) -> Array:
         """Heights of ground and other machines at the points of a height scan, over the trunk's origin, (n,), m.

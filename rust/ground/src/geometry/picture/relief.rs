@@ -38,7 +38,7 @@ pub struct Bottom {
 }
 
 impl<'a> RutRelief<'a> {
-    /// Of ruts on a grid with cells of this size, m; none where nothing was driven on.
+    /// The relief of ruts on a grid with cells of this size, m; none where nothing was driven on.
     #[must_use]
     pub fn new(ruts: &'a RutMap, cell: f64) -> Option<Self> {
         let depths = ruts.cells().into_iter().map(|(.., depth)| depth);
@@ -178,7 +178,8 @@ mod tests {
     fn a_wall_shades_as_far_as_the_sun_is_low() {
         let ruts = groove();
         let relief = RutRelief::new(&ruts, CELL).unwrap();
-        let sun = Vector3::new(0.0, 0.5, -1.0).normalize(); // shadows are twice as long as walls high
+        // Shadows are twice as long as walls are high.
+        let sun = Vector3::new(0.0, 0.5, -1.0).normalize();
         for (from_wall, is_dark) in [(0.03, true), (0.085, true), (0.12, false), (0.17, false)] {
             let place = Vector3::new(0.0, -DEPTH, -0.1 + from_wall);
             let to_sun = Ray {

@@ -38,7 +38,7 @@ pub struct Seen {
     pub normal: Vector3<f64>,
     /// Unit normal of the shading, on the same side.
     pub shading: Vector3<f64>,
-    /// What it is.
+    /// The surface that the ray met.
     pub surface: Surface,
 }
 

@@ -29,7 +29,7 @@ pub enum PixelKind {
 pub struct Pixel {
     /// Light in the pixel; black in a picture without light.
     pub colour: Colour,
-    /// What it shows.
+    /// The kind of thing in the pixel.
     pub kind: PixelKind,
     /// Along the ray, m; infinite for the sky.
     pub distance: f64,
@@ -38,7 +38,7 @@ pub struct Pixel {
 /// Colours of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// Its light.
+    /// Light of the scene.
     pub light: Light,
     /// The ground's checks.
     pub checks: Checks,

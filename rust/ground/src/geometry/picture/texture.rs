@@ -1,7 +1,7 @@
 //! The ground's checks and grain, without aliasing.
 //!
 //! A pixel shows a patch of the ground. Edges between checks are as wide as the patch, and grain is
-//! read from an image pyramid at the patch's size (Williams 1983, *Pyramidal parametrics*).
+//! read from an image pyramid at the patch's size (Williams 1983).
 
 use nalgebra::Vector3;
 
@@ -99,7 +99,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Of a pixel that is `wide` across the ray, m, where the ray meets a surface.
+    /// The patch of a pixel that is `wide` across the ray, m, where the ray meets a surface.
     #[must_use]
     pub fn new(direction: &Vector3<f64>, normal: &Vector3<f64>, wide: f64) -> Self {
         let long = wide / direction.dot(normal).abs().max(1e-3);
