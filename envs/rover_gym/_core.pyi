@@ -1641,8 +1641,8 @@ class Simulation(AnySimulation):
     def motor_torques(self) -> _Array:
         """Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
 
-        Each is the command after the limit of the wheel's `Motor`, or the torque of the wheel's servo;
-        0 before the first step. Wheels that share a drive have equal parts of its torque.
+        Each is the command after the limit of the wheel's `Motor`, or the torque of its servo; 0
+        before the first step. Wheels that share a drive have equal parts of its torque.
         """
     @property
     def loop_forces(self) -> dict[str, _Array]:
@@ -2474,8 +2474,8 @@ class SimulationBatch:
         different numbers of steps.
 
         Args:
-            torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m; None with
-                `speeds`.
+            torques: Commands for `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m; None
+                with `speeds`.
             set_points: Commands for `Simulation.set_steering`, (n_rovers, n_wheels), rad.
             n: Number of steps.
             active: Which rovers move, (n_rovers,); all by default. The others do not change.
