@@ -15,7 +15,7 @@ pub struct RoverCommand {
     pub wheel_torque: Vec<f64>,
     /// Speed of each wheel that its servo is to hold, positive forward, rad/s; none while torques
     /// drive the wheels.
-    pub wheel_speed: Option<Vec<f64>>,
+    pub wheel_speed: Option<Box<[f64]>>,
     /// Torque about each joint's axis, N m: its drive's where it has one, else additional.
     pub joint_torque: Vec<f64>,
 }

@@ -15,7 +15,7 @@ pub enum WheelCommands<'a> {
     Speeds(&'a [f64]),
 }
 
-impl<'a> WheelCommands<'a> {
+impl WheelCommands<'_> {
     /// The commands of some of the wheels.
     ///
     /// # Panics
@@ -93,7 +93,7 @@ impl RoverSimulation {
 
     fn take_wheel_speeds(&mut self, speeds: &[f64]) {
         self.command.wheel_torque.fill(0.0);
-        self.command.wheel_speed = Some(speeds.to_vec());
+        self.command.wheel_speed = Some(speeds.into());
         self.combine_torques();
     }
 
@@ -128,7 +128,9 @@ impl RoverSimulation {
         if self.command.wheel_speed.is_some() {
             let servos = self.command.servos(&self.scene.model);
             for (drive, servo) in self.command.actuators.drives.iter_mut().zip(servos) {
-                drive.iter_mut().for_each(|drive| drive.servo = servo);
+                if let Some(drive) = drive {
+                    drive.servo = servo;
+                }
             }
         }
         let Command { torque, drives, .. } = &mut self.command.actuators;
