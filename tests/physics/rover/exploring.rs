@@ -98,7 +98,7 @@ fn on_yielding_cylinders() -> Drive {
 }
 
 /// The story: the damper of a wheel whose load shrinks holds its deflection above what the force
-/// says, and this part was taken for an overlap. On a plane four of five steps were projected, which
+/// says, and this part was taken for an overlap. On a plane four of five steps were projected. It
 /// took a third of the time and lifted the rover by micrometres.
 #[test]
 fn no_step_is_projected_where_damped_wheels_lose_and_gain_load() {
@@ -137,27 +137,4 @@ fn cylinders_that_yield_need_few_systems_among_rocks_and_never_the_general_step(
         iterations < 9 * steps,
         "{iterations} systems in {steps} steps"
     );
-}
-
-#[test]
-fn rigid_cylinders_keep_to_a_plane_for_any_number_of_steps_while_they_steer() {
-    let scene = Scene::of("plane, rigid cylinders").unwrap();
-    let mut drive = first_drive(scene, 60.0);
-    let (mut iterations, mut steps) = (0, 0);
-    for command in (0..drive.n_commands()).cycle().take(300) {
-        drive.give(command);
-        let report = drive.simulation.step(STEPS_A_COMMAND).unwrap();
-        assert!(report.is_converged());
-        (iterations, steps) = (iterations + report.iterations, steps + report.steps);
-    }
-    // The twelve ends of the cylinders depend on each other. If their gaps drift by rounding, a
-    // step takes some 60 systems after a second.
-    assert!(
-        iterations < 12 * steps,
-        "{iterations} systems in {steps} steps"
-    );
-    let contacts = drive.simulation.contacts();
-    let gaps = contacts.iter().map(|contact| contact.contact.gap.abs());
-    let widest = gaps.fold(0.0, f64::max);
-    assert!(widest < 1e-13, "{widest:e} m");
 }

@@ -118,7 +118,8 @@ class Camera(Sensor):
         view = (self.mount, self.lens, self.sees_rover)
         for (kept_view, reach, light), picture in moment.pictures:
             if kept_view == view and ((reach, light) == (max_range, sun) or (sun is None and reach >= max_range)):
-                return picture.within(max_range)
+                kept: CameraPicture = picture.within(max_range)
+                return kept
         place, rotation = moment.frame(self.mount)
         directions = self.directions.reshape(-1, 3)
         looks = np.isfinite(directions[:, 0])

@@ -26,7 +26,7 @@ class CameraPicture:
     distances: Array
 
     def within(self, max_range: float) -> "CameraPicture":
-        """The same picture with nothing beyond a distance, m; colours stay."""
+        """This picture with nothing beyond a distance, m; colours stay."""
         seen = self.distances <= max_range
         return CameraPicture(
             self.colours, np.where(seen, self.kinds, np.uint8(0)), np.where(seen, self.distances, np.inf)
@@ -51,7 +51,7 @@ def picture_look(model: RoverModel | None) -> PictureLook:
         colours = np.tile(part.colour, (len(corners), 1))
         drawings.setdefault(part.solid, []).append((corners.reshape(-1, 9), normals.reshape(-1, 9), colours))
     return PictureLook(
-        {solid: tuple(map(np.concatenate, zip(*parts, strict=True))) for solid, parts in drawings.items()},
+        {solid: (_joined(parts, 0), _joined(parts, 1), _joined(parts, 2)) for solid, parts in drawings.items()},
         colours={
             "ground": (look.GROUND_COLOUR, look.GROUND_COLOUR_2),
             "sand": look.SAND_GROUND,
@@ -70,6 +70,11 @@ def picture_look(model: RoverModel | None) -> PictureLook:
         grain=look.grain(),
         tile=look.TILE,
     )
+
+
+def _joined(parts: list[tuple[Array, Array, Array]], k: int) -> Array:
+    joined: Array = np.concatenate([part[k] for part in parts])
+    return joined
 
 
 def _normals(vertices: Array, triangles: npt.NDArray[np.int32]) -> Array:

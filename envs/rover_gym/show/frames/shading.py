@@ -94,7 +94,8 @@ class SoilShading:
 def _grain() -> vtkTexture:
     image = vtkImageData()
     values = look.grain()
-    image.SetDimensions(*values.shape, 1)
+    rows, columns = values.shape
+    image.SetDimensions(columns, rows, 1)
     levels = np.round(255.0 * values).astype(np.uint8).reshape(-1, 1)
     image.GetPointData().SetScalars(numpy_to_vtk(np.repeat(levels, 3, axis=1), deep=True))
     texture = vtkTexture()

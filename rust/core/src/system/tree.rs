@@ -22,7 +22,7 @@ use crate::contact::{
 use crate::geometry::Terrain;
 use crate::integrator::{Dynamics, MechanicalSystem, StepOptions, StepStart, UnilateralContact};
 use crate::law::compliance::Compliance;
-use crate::law::newton_impact::{closing_speed, rebound};
+use crate::law::newton_impact::rebound;
 use crate::multibody::{LaneConfiguration, Model};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::sand::SandState;
@@ -231,13 +231,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             let most = options.time_step * self.model.joints()[joint].passive.friction;
             return -most * self.parts.friction_entry(joint);
         }
-        let shift = rebound(self.restitution(options, contact), u_N_before);
-        let is_wheel = usize::from(contact.key.part) < self.model.wheels().len();
-        if is_wheel && matches!(contact.key.opposite, Opposite::Ground(_)) {
-            shift + closing_speed(contact.gap, options.time_step)
-        } else {
-            shift
-        }
+        rebound(self.restitution(options, contact), u_N_before)
     }
 
     fn yields(&self) -> bool {

@@ -52,43 +52,9 @@ pub fn rebound_at_gap(restitution: f64, u_N_before: f64, gap: f64, (h, slow): (f
     }
 }
 
-/// Gap, m, from which on a closed contact has not drifted by rounding; a step takes a share of what
-/// is up to half of it back.
-const DRIFT: f64 = 1e-11;
-const TAKEN_BACK: f64 = 0.25;
-
-/// Normal velocity, m/s, that takes a rigid contact back from a gap (m) of no more than rounding:
-/// added to the normal free velocity, it makes the problem's `u_N` mean `u_N⁺ + gap/(4 h)`; h in s.
-/// It is continuous, 0 from [`DRIFT`] on, and below 3e-10 m/s at 5 ms.
-///
-/// The ends of wide wheels on a plane depend on each other. Where their gaps drift by rounding, no
-/// motion keeps all of them closed, and a solver has to find which of them lift, at a speed of
-/// rounding.
-#[inline(always)]
-#[must_use]
-pub fn closing_speed<T: Lane>(gap: T, h: T) -> T {
-    let (zero, depth) = (gap.like(0.0), gap.abs());
-    let drift = depth.min(gap.like(DRIFT) - depth).max(zero);
-    let speed = gap.like(TAKEN_BACK) * drift / h;
-    T::select(gap.lt(zero), -speed, speed)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_contact_closes_a_gap_of_rounding_from_either_side_in_a_few_steps() {
-        let h = 0.005;
-        for start in [9e-12_f64, -9e-12] {
-            // A contact bears a load: u_N = −closing_speed.
-            let closed = (0..60).fold(start, |gap, _| gap - h * closing_speed(gap, h));
-            assert!(closed.abs() < 1e-4 * start.abs(), "{start} {closed}");
-        }
-        for gap in [0.0, DRIFT, -DRIFT, 1.0, -1.0, f64::INFINITY] {
-            assert!(closing_speed(gap, h).abs() <= 0.0, "{gap}");
-        }
-    }
 
     #[test]
     fn a_pair_bounces_only_where_it_meets_fast_and_within_the_step() {

@@ -293,13 +293,6 @@ impl<T: Lane> ContactSlots<T> {
         &self.used[..self.n_of_shapes]
     }
 
-    /// Slots of wheels in use, ascending; they precede all others.
-    #[inline(always)]
-    pub(crate) fn used_by_wheels(&self) -> &[usize] {
-        let n = self.used.partition_point(|slot| *slot < self.first_spare);
-        &self.used[..n]
-    }
-
     /// Slots of joints in use, ascending; they follow all others.
     #[inline(always)]
     pub(crate) fn used_by_joints(&self) -> &[usize] {

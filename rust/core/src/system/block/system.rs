@@ -15,7 +15,7 @@ use crate::integrator::grouped::Grouped;
 use crate::integrator::systems::{MemoryOf, Systems};
 use crate::integrator::{StepOptions, StepReport};
 use crate::law::compliance::{Compliance, Yielding};
-use crate::law::newton_impact::{closing_speed, rebound};
+use crate::law::newton_impact::rebound;
 use crate::multibody::LaneConfiguration;
 use crate::scalar::{Lane, Vec3, inlined};
 use crate::solver::batch::problem::{ContactProblem, Triple};
@@ -98,29 +98,16 @@ impl<T: Lane> LaneSystem<T> {
     /// Adds `e u_N⁻`, times a sign, to the normal velocities of the rigid contacts.
     #[inline(always)]
     fn rebound(&self, sign: T, laws: &[Yielding<T>], u: &mut [Triple<T>]) {
+        let zero = sign.like(0.0);
         for &slot in self.contacts.used() {
             let before = self.rows.u_before[slot][0];
-            u[slot][0] += sign * only_rigid(laws, slot, rebound(self.restitution[slot], before));
+            let mut shift = sign * rebound(self.restitution[slot], before);
+            if !laws.is_empty() {
+                shift = T::select(laws[slot].is_soft(), zero, shift);
+            }
+            u[slot][0] += shift;
         }
     }
-
-    /// Adds what takes rigid wheels back to the ground from which they drifted, times a sign.
-    #[inline(always)]
-    fn close_drift(&self, (sign, h): (T, T), laws: &[Yielding<T>], u: &mut [Triple<T>]) {
-        for &slot in self.contacts.used_by_wheels() {
-            let closing = closing_speed(self.contacts.gap(slot), h);
-            u[slot][0] += sign * only_rigid(laws, slot, closing);
-        }
-    }
-}
-
-/// The shift of a slot that does not yield, and 0 otherwise.
-#[inline(always)]
-fn only_rigid<T: Lane>(laws: &[Yielding<T>], slot: usize, shift: T) -> T {
-    let law = laws.get(slot);
-    law.map_or(shift, |law| {
-        T::select(law.is_soft(), shift.like(0.0), shift)
-    })
 }
 
 impl<T: Lane> Systems for LaneSystem<T> {
@@ -281,7 +268,6 @@ impl<T: Lane> Systems for LaneSystem<T> {
         if options.is_elastic() {
             self.rebound(sign, laws, u);
         }
-        self.close_drift((sign, h), laws, u);
         self.hold_joints(-(sign * h), u);
     }
 
