@@ -3,7 +3,7 @@
 //! - [`scene`]: what can be seen, and what lies in whose shadow;
 //! - [`drawing`]: the coloured triangles of a solid; [`stone`]: rocks; [`relief`]: ruts;
 //! - [`light`]: Sun, sky and haze; [`texture`]: the checkered, grainy ground;
-//! - [`take`]: the pixels.
+//! - [`mod@take`]: the pixels.
 //!
 //! Colours are red, green and blue, 1 for white. A matt surface of colour c and unit normal n shows
 //! `c ⊙ (sky(n) + [sunlit] max(0, n · s) sun)` (Lambert 1760), faded into haze with its distance.
