@@ -67,6 +67,8 @@ MAX_BACKLASH_DEG = 90.0
 #: Longest delay of a command, control periods.
 MAX_DELAY = 100
 
+DELAYS = f"0 to {MAX_DELAY} control periods, or a distribution of them"
+
 #: Most goals of a course.
 MAX_WAYPOINTS = 100
 
@@ -453,7 +455,7 @@ class RoverArguments(TypedDict, total=False):
         Quantity,
         Argument(
             0,
-            Special(f"0 to {MAX_DELAY} control periods, or a distribution of them", check_delay),
+            Special(DELAYS, check_delay),
             "from an action to the motors",
         ),
     ]

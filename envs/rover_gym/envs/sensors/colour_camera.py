@@ -34,8 +34,8 @@ class ColourCamera(Camera):
     matt surface of normal n shows its colour times the light of sky and ground and, outside shadows, that of the Sun
     times max(0, n·s) (Lambert 1760). Place and pixels are those of `Camera`.
 
-    A pixel of brightness b, 1 for white, reads b plus noise of the variance `noise`² + `shot_noise`² b: that of the
-    electronics and that of the photons, which grows with the light (EMVA 1288).
+    A pixel of brightness b, 1 for white, reads b plus noise of the variance d² + s² b, with d = `noise` and s =
+    `shot_noise`: that of the electronics and that of the photons, which grows with the light (EMVA 1288).
 
     Args:
         max_range: How far it sees, m; by default as far as the haze lets it.

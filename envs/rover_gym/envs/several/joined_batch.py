@@ -151,7 +151,7 @@ class JoinedBatch:
         }
         self._suites = [made[task.model] for task in team.tasks]
         self.action_spaces = [gym.spaces.Box(-1.0, 1.0, (task.n_actions,), np.float32) for task in team.tasks]
-        self.observation_spaces = [self._space(k) for k in range(team.n)]
+        self.observation_spaces = [self._space(k) for k in range(team.n_rovers)]
 
     @property
     def has_sensors(self) -> bool:
@@ -197,7 +197,7 @@ class JoinedBatch:
             MachineReader(team.alone(k, drawn), machine, task.scan, self._layout)
             for k, (machine, task) in enumerate(zip(self._machines, team.tasks, strict=True))
         ]
-        scene = RunningScene(drawn, random, readers, np.ones(team.n, np.bool_))
+        scene = RunningScene(drawn, random, readers, np.ones(team.n_rovers, np.bool_))
         self._begin_episodes(scene)
         self._core.replace(s, drawn.simulation)
         self._torques[s] = self._set_points[s] = 0.0
@@ -275,7 +275,7 @@ class JoinedBatch:
         for s in np.flatnonzero(moving).tolist():
             self._command(s, given[s])
         periods, rows = self._take_steps(moving)
-        results: list[list[RoverPeriod | None]] = [[None] * self.team.n for _ in range(self.n)]
+        results: list[list[RoverPeriod | None]] = [[None] * self.team.n_rovers for _ in range(self.n)]
         for s, period in periods.items():
             self.scene(s).steps += 1
             for k, (asked, action) in enumerate(zip(actions[s], given[s], strict=True)):
@@ -322,7 +322,7 @@ class JoinedBatch:
         near, slips = self._near(simulation), self._contacts.slip_ratios(simulation)
         forces = self._contacts.ground_forces(simulation)
         truncated = self.max_episode_steps is not None and scene.steps >= self.max_episode_steps
-        results: list[RoverPeriod | None] = [None] * self.team.n
+        results: list[RoverPeriod | None] = [None] * self.team.n_rovers
         for k, action in enumerate(actions):
             if action is None:
                 continue

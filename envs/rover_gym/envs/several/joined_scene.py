@@ -144,7 +144,7 @@ class Team:
         self._layout = self._make_layout(arguments)
 
     @property
-    def n(self) -> int:
+    def n_rovers(self) -> int:
         """Number of rovers."""
         return len(self.agents)
 
@@ -154,9 +154,9 @@ class Team:
 
     def _check_number(self) -> None:
         most = (MAX_WAYPOINTS + 1) // (1 + self.given["waypoints"])
-        if self.n > most:
+        if self.n_rovers > most:
             reason = f"must be at most {most} with {self.given['waypoints']} goals each"
-            refuse(OptionError, "rovers", self.n, reason)
+            refuse(OptionError, "rovers", self.n_rovers, reason)
 
     def _check_domain(self) -> None:
         for name, (own, _) in self.tasks[0].domain.further.items():
@@ -172,8 +172,8 @@ class Team:
         return [(0.0, place) for place in z]
 
     def _check_starts(self, starts: object) -> list[Point]:
-        if not isinstance(starts, (list, tuple, np.ndarray)) or len(starts) != self.n:
-            refuse(OptionError, "starts", starts, f"must be a list of {self.n} places (x, z), one a rover")
+        if not isinstance(starts, (list, tuple, np.ndarray)) or len(starts) != self.n_rovers:
+            refuse(OptionError, "starts", starts, f"must be a list of {self.n_rovers} places (x, z), one a rover")
         places = [vector(f"starts[{k}]", place, 2) for k, place in enumerate(starts)]
         return [(x, z) for x, z in places]
 
@@ -184,7 +184,7 @@ class Team:
         """The task whose course visits all starts and goals, so that rocks and hills leave room at each of them."""
         kept = {name: arguments[name] for name in GROUND_ARGUMENTS if name in arguments}
         widest = max(self.tasks, key=lambda task: task.model.clear_radius)
-        n_goals = self.n * (1 + self.given["waypoints"]) - 1
+        n_goals = self.n_rovers * (1 + self.given["waypoints"]) - 1
         course = {"waypoints": n_goals, "goal_distance": 1.0, "model": widest.model}
         return make_task(check_arguments("parallel_env", {**kept, **course}))
 
@@ -227,12 +227,12 @@ class Team:
             except TerrainError as error:
                 last = error
         assert last is not None  # noqa: S101 - there was an attempt
-        refused = TerrainError(f"no room for {self.n} rovers in {PLACING_ATTEMPTS} scenes; the last: {last}")
+        refused = TerrainError(f"no room for {self.n_rovers} rovers in {PLACING_ATTEMPTS} scenes; the last: {last}")
         refused.field, refused.value = last.field, last.value
         raise refused from last
 
     def _draw_once(self, random: np.random.Generator, options: TeamOptions) -> JoinedScene:
-        starts = [self._draw_start(k, random, options.rovers[k]) for k in range(self.n)]
+        starts = [self._draw_start(k, random, options.rovers[k]) for k in range(self.n_rovers)]
         self._check_goals_apart(starts, options)
         layout = self._lay_out(starts, random, options.shared)
         rovers = []
@@ -262,7 +262,7 @@ class Team:
 
     def _check_goals_apart(self, starts: Sequence[Start], options: TeamOptions) -> None:
         """Checks that rovers have room at their last goals at the same time, unless goals are given."""
-        drawn = [k for k in range(self.n) if "goal" not in options.rovers[k]]
+        drawn = [k for k in range(self.n_rovers) if "goal" not in options.rovers[k]]
         for i, k in combinations(drawn, 2):
             (a, b), (c, d) = starts[i].goals[-1], starts[k].goals[-1]
             if math.hypot(c - a, d - b) < self.radii[i] + self.radii[k]:

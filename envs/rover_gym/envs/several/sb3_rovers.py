@@ -80,7 +80,7 @@ class RoversVecEnv(VecEnv):
             refuse(OptionError, "rovers", rovers, "must all have equal spaces, as they share a policy")
         self._actions: Array = np.zeros((0, 0))
         self._last: dict[int, RoverPeriod] = {}
-        super().__init__(self.batch.n * team.n, spaces[0], actions[0])
+        super().__init__(self.batch.n * team.n_rovers, spaces[0], actions[0])
 
     def reset(self) -> VecEnvObs:
         """Starts all scenes with the seeds and options set for this reset.
@@ -88,9 +88,9 @@ class RoversVecEnv(VecEnv):
         Raises:
             TerrainError: The rovers of a scene have no room; scenes before it have been reset.
         """
-        checked = [self.team.check_options(given) for given in self._options[:: self.team.n]]
+        checked = [self.team.check_options(given) for given in self._options[:: self.team.n_rovers]]
         for s, options in enumerate(checked):
-            self.batch.reset(s, self._seeds[s * self.team.n], options)
+            self.batch.reset(s, self._seeds[s * self.team.n_rovers], options)
         self._reset_seeds()
         self._reset_options()
         self._last.clear()
@@ -116,7 +116,7 @@ class RoversVecEnv(VecEnv):
             OptionError: A function of `reward_terms` fails; the period has been taken.
             TerrainError: The rovers of a next scene have no room.
         """
-        n = self.team.n
+        n = self.team.n_rovers
         rows = self._actions.reshape(self.batch.n, n, -1)
         live = [self.batch.scene(s).live for s in range(self.batch.n)]
         periods = self.batch.step([[rows[s, k] if live[s][k] else None for k in range(n)] for s in range(self.batch.n)])
@@ -142,7 +142,7 @@ class RoversVecEnv(VecEnv):
 
     def _seen(self, i: int) -> Any:
         """What row i observes: zeros where its episode has ended."""
-        s, k = divmod(i, self.team.n)
+        s, k = divmod(i, self.team.n_rovers)
         return self.batch.observation(s, k) if self.batch.scene(s).live[k] else self._nothing()
 
     def _nothing(self) -> Any:
@@ -160,8 +160,8 @@ class RoversVecEnv(VecEnv):
 
     def _tell_resets(self, scenes: Sequence[int]) -> None:
         for s in scenes:
-            for k in range(self.team.n):
-                self.reset_infos[s * self.team.n + k] = self.batch.info(s, k)
+            for k in range(self.team.n_rovers):
+                self.reset_infos[s * self.team.n_rovers + k] = self.batch.info(s, k)
 
     def close(self) -> None:
         """Does nothing: there is nothing to free."""
