@@ -23,9 +23,13 @@ class SegmentationCamera(Camera):
         max_range: How far it sees, m; by default as far as the haze lets a colour camera see.
     """
 
+    #: Label of the sky.
     SKY: ClassVar[int] = 0
+    #: Label of ground and grains.
     GROUND: ClassVar[int] = 1
+    #: Label of a rock.
     ROCK: ClassVar[int] = 2
+    #: Label of a rover.
     ROVER: ClassVar[int] = 3
 
     name: str = "segmentation"
