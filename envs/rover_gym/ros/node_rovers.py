@@ -174,6 +174,7 @@ class RecordedRover:
         CommandError: It has no velocities, or fewer than two rows.
     """
 
+    #: A recording moves without a command.
     drives_itself = True
 
     def __init__(self, run: RoverRun) -> None:
