@@ -111,6 +111,15 @@ ModelName = Annotated[
     ),
 ]
 
+#: Difficulty, goal and world of a rover that is driven live.
+LiveDifficulty = Annotated[
+    float | None, typer.Option(help="Difficulty of rocks and hills, from 0 to 2. Default: 0.5. It implies rocks.")
+]
+LiveGoalDistance = Annotated[float, typer.Option(help="Distance of the goal from the start, m.")]
+LiveFriction = Annotated[float, typer.Option(help="Friction coefficient.")]
+LiveGravity = Annotated[float, typer.Option(help="Gravity, m/s².")]
+LiveSeed = Annotated[int, typer.Option(min=0, help="Seed of ground, start and goal.")]
+
 TerrainName = Annotated[
     str | None,
     typer.Option(

@@ -13,6 +13,11 @@ from rover_gym.cli.options import (
     BUILT_IN,
     DRIVERS_HELP,
     FRICTION,
+    LiveDifficulty,
+    LiveFriction,
+    LiveGoalDistance,
+    LiveGravity,
+    LiveSeed,
     MapFile,
     ModelName,
     TerrainName,
@@ -56,11 +61,8 @@ def ros(
     ] = None,
     terrain: TerrainName = None,
     model: ModelName = BUILT_IN,
-    difficulty: Annotated[
-        float | None,
-        typer.Option(help="Difficulty of rocks and hills, from 0 to 2. Default: 0.5. It implies rocks."),
-    ] = None,
-    goal_distance: Annotated[float, typer.Option(help="Distance of the goal from the start, m.")] = 8.0,
+    difficulty: LiveDifficulty = None,
+    goal_distance: LiveGoalDistance = 8.0,
     policy: Annotated[
         str,
         typer.Option(
@@ -68,9 +70,9 @@ def ros(
             autocompletion=complete_policy,
         ),
     ] = BY_HAND,
-    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = FRICTION,
-    gravity: Annotated[float, typer.Option(help="Gravity, m/s².")] = 9.81,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of ground, start and goal.")] = 0,
+    friction: LiveFriction = FRICTION,
+    gravity: LiveGravity = 9.81,
+    seed: LiveSeed = 0,
     rate: Annotated[
         float | None, typer.Option(help="Steps and messages per simulated second, Hz. Default: 50; with a policy, 20.")
     ] = None,
