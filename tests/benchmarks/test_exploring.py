@@ -1,7 +1,5 @@
 """The recorded drives of random policies, and how the bench adds its figures up."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from comparison import exploring_bench as bench
@@ -30,16 +28,6 @@ def test_a_drive_starts_free_of_the_ground_and_gets_to_its_end(ground: str) -> N
     trace = run(Variant("rover-gym", "", OurRunner, "", ""), played, 0.005)
     assert not trace.failure
     assert len(trace.positions) == round(played.duration / played.sample) + 1
-
-
-def test_callgrinds_files_are_added_up_by_part(tmp_path: Path) -> None:
-    parts = ["Kinematics", "Solve", "Kinematics", "Solve", "Solve"]
-    for number, count in enumerate((100, 1000, 300, 2000, 500), 1):
-        (tmp_path / f"out.{number}").write_text(f"events: Ir\nsummary: {count}\n", encoding="utf-8")
-    found = bench.by_part(2, parts, tmp_path)
-    assert found["Kinematics"] == 200.0
-    assert found["Solve"] == 1750.0
-    assert sum(found.values()) == 1950.0
 
 
 def test_shares_of_a_histogram_fall_into_the_bins_of_their_titles() -> None:
