@@ -69,7 +69,7 @@ proptest! {
         prop_assert!((least - low.gap).abs() < 1e-12);
         prop_assert_eq!(count, 3 * wheel.n_circles());
         let field = SphereField::new(&[], &[], Some(plane)).unwrap();
-        prop_assert!((wheel_gap(&shape(&wheel), &base, &field) - low.gap).abs() < 1e-12);
+        prop_assert!((wheel_gap(&shape(&wheel), None, &base, &field) - low.gap).abs() < 1e-12);
     }
 
     #[test]
@@ -120,7 +120,7 @@ proptest! {
         wheel.core.centre.y += height + size[0] - largest(&wheel).min(0.0);
         let expected = largest(&wheel);
         prop_assume!(expected > -0.3 * size[0]);
-        let gap = wheel_gap(&shape(&wheel), &Vector3::zeros(), &roof);
+        let gap = wheel_gap(&shape(&wheel), None, &Vector3::zeros(), &roof);
         prop_assert!((gap - expected).abs() < 1e-6, "{gap} {expected}");
     }
 }
@@ -142,7 +142,7 @@ proptest! {
         let points = surface(&wheel, 720, 24);
         let lift = points.iter().map(|(x, _)| over(x)).fold(f64::NEG_INFINITY, f64::max);
         wheel.core.centre.y += lift - depth;
-        let gap = wheel_gap(&shape(&wheel), &Vector3::zeros(), &field);
+        let gap = wheel_gap(&shape(&wheel), None, &Vector3::zeros(), &field);
         // Between two points a vertex may stand out by their distance times its slope.
         let coarse = 0.01 * dx;
         prop_assert!(gap < coarse, "{gap}");
@@ -151,7 +151,7 @@ proptest! {
             prop_assert!(gap < -0.05 * depth + coarse, "{gap} {depth}");
         }
         wheel.core.centre.y += depth + coarse + 0.01;
-        prop_assert!(wheel_gap(&shape(&wheel), &Vector3::zeros(), &field) > 0.0);
+        prop_assert!(wheel_gap(&shape(&wheel), None, &Vector3::zeros(), &field) > 0.0);
     }
 }
 
@@ -197,7 +197,7 @@ fn a_tread_over_a_summit_touches_at_the_summit() {
     for along in [-0.06, 0.0, 0.03] {
         for gap in [0.01, 0.0, -1e-4] {
             let wheel = roller([0.0, 0.5 + 0.2 + gap, along], [0.0; 3], [0.2, 0.15, 0.0]);
-            let own = wheel_gap(&shape(&wheel), &Vector3::zeros(), &pyramid);
+            let own = wheel_gap(&shape(&wheel), None, &Vector3::zeros(), &pyramid);
             assert!((own - gap).abs() < 1e-12, "{along} {gap}: {own}");
         }
     }
@@ -239,7 +239,7 @@ fn the_gap_does_not_jump_as_a_wheel_leans_through_the_upright() {
         for ground in &grounds {
             let gap = |lean: f64| {
                 let wheel = roller([0.0, 0.3, 0.01], [lean, 0.0, 0.0], [0.3, 0.1, share]);
-                wheel_gap(&shape(&wheel), &Vector3::zeros(), &**ground)
+                wheel_gap(&shape(&wheel), None, &Vector3::zeros(), &**ground)
             };
             let leans = (-400..=400).map(|k| f64::from(k) * 1e-3);
             let gaps: Vec<f64> = leans.map(gap).collect();

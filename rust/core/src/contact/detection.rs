@@ -7,7 +7,7 @@ use super::body_motion::{BodyMotion, Still};
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, ON_SURFACE, Opposite};
 use super::part::{Part, wheel_shape};
-use super::ways_out::{OverSurfaces, TOUCH, WaysOut};
+use super::ways_out::{OverSurfaces, TOUCH, WaysOut, shallow};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{
     SurfacePoint, box_sphere, disc_triangle, dispatch, is_lowest, roller_sphere, sphere_sphere,
@@ -16,6 +16,7 @@ use crate::geometry::{
     Coverage, Disc, Neighbourhood, PlacedShape, Primitive, Roller, Roundness, Sphere, SupportMap,
     Terrain,
 };
+use crate::law::compliance::Tread;
 use crate::multibody::{Kinematics, Model};
 
 /// On a sphere: the nearest point.
@@ -262,7 +263,12 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
         ..Neighbourhood::new(&placed.shape, base, gate.reach)
     };
     let first = gate.out.len();
-    let shallow = OverSurfaces::shallow(&placed.shape);
+    let over = OverSurfaces {
+        shape: &placed.shape,
+        terrain,
+        base,
+        shallow: shallow(bound, part.own_tread(model)),
+    };
     gate.ways.clear();
     let may_overlap = terrain.may_overlap();
     terrain.visit_around(&around, &mut |id, primitive| match primitive {
@@ -285,21 +291,15 @@ fn candidates<S: BodyMotion>(part: Part, terrain: &dyn Terrain, gate: &mut Gate<
             });
         }
         piece => {
-            let (piece, reach) = ((terrain, id, piece), gate.reach.max(TOUCH));
-            visit_on_surface(&placed.shape, piece, base, reach, |point| {
-                gate.ways.add(id, point, shallow);
+            let reach = gate.reach.max(TOUCH);
+            visit_on_surface(&over, (id, piece), reach, |point| {
+                gate.ways.add(id, point, over.shallow);
                 gate.offer(&placed, &on_surface(point), id);
             });
         }
     });
     if gate.ways.are_doubtful() {
-        let shape = &placed.shape;
-        let part = OverSurfaces {
-            shape,
-            terrain,
-            base,
-        };
-        gate.keep_ways_out(first, &part);
+        gate.keep_ways_out(first, &over);
     }
     if may_overlap && gate.out.len() - first > 1 {
         drop_copies(gate.out, first, SAME * bound);
@@ -336,19 +336,18 @@ const SAME: f64 = 1e-5;
 /// or a rock.
 #[inline]
 pub(crate) fn visit_on_surface(
-    shape: &PlacedShape<'_>,
-    (terrain, id, piece): (&dyn Terrain, u32, &Primitive),
-    base: &Vector3<f64>,
+    part: &OverSurfaces<'_>,
+    (id, piece): (u32, &Primitive),
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
-    let shallow = OverSurfaces::shallow(shape);
     let still = Vector3::zeros();
-    let part = OverSurfaces {
+    let OverSurfaces {
         shape,
         terrain,
         base,
-    };
+        shallow,
+    } = *part;
     let is_covered = |point: &SurfacePoint| {
         terrain.may_overlap() && {
             let place = base + point.point - point.n * point.gap;
@@ -500,28 +499,34 @@ pub fn wheel_contact(
     );
     let mut best = SurfacePoint::of_normal(NEAREST, shape.centre(), &Vector3::y(), f64::INFINITY);
     let mut primitive = 0;
-    visit_nearer(
-        &shape,
-        kinematics.origin(body),
+    let over = OverSurfaces {
+        shape: &shape,
         terrain,
-        &mut |id, point| {
-            (best, primitive) = (*point, id);
-        },
-    );
+        base: kinematics.origin(body),
+        shallow: shallow(shape.bound(), part.own_tread(model)),
+    };
+    visit_nearer(&over, &mut |id, point| {
+        (best, primitive) = (*point, id);
+    });
     Placed { part, body, shape }.contact(&best, primitive)
 }
 
-/// The gap of [`wheel_contact`], m, of a disc whose coordinates have their origin at `base` (m,
-/// world).
+/// The gap of [`wheel_contact`], m, of a rigid disc whose coordinates have their origin at `base`
+/// (m, world).
 #[must_use]
 pub fn disc_gap(disc: &Disc, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
-    wheel_gap(&PlacedShape::Disc(*disc), base, terrain)
+    wheel_gap(&PlacedShape::Disc(*disc), None, base, terrain)
 }
 
 /// Gap between a wheel's shape, with or without a width, and a terrain, m, as [`wheel_contact`]
-/// finds it; `base` as for [`disc_gap`].
+/// finds it; `tread`: of a wheel that yields, `base` as for [`disc_gap`].
 #[must_use]
-pub fn wheel_gap(shape: &PlacedShape<'_>, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
+pub fn wheel_gap(
+    shape: &PlacedShape<'_>,
+    tread: Option<&Tread>,
+    base: &Vector3<f64>,
+    terrain: &dyn Terrain,
+) -> f64 {
     // Only a surface, and no sphere or plane that may be nearer.
     if terrain.has_surface() && !terrain.can_be_passed() && terrain.ground().is_none() {
         let (centre, radius) = (base + shape.centre(), shape.bound());
@@ -533,25 +538,31 @@ pub fn wheel_gap(shape: &PlacedShape<'_>, base: &Vector3<f64>, terrain: &dyn Ter
         }
     }
     let mut gap = f64::INFINITY;
-    visit_nearer(shape, base, terrain, &mut |_, point| {
+    let over = OverSurfaces {
+        shape,
+        terrain,
+        base,
+        shallow: shallow(shape.bound(), tread),
+    };
+    visit_nearer(&over, &mut |_, point| {
         gap = point.gap;
     });
     gap
 }
 
 /// Visits points of the ground near a wheel, each nearer than those before; the last one is the
-/// nearest. `base` as for [`disc_gap`].
+/// nearest.
 #[inline]
-fn visit_nearer(
-    shape: &PlacedShape<'_>,
-    base: &Vector3<f64>,
-    terrain: &dyn Terrain,
-    visit: &mut impl FnMut(u32, &SurfacePoint),
-) {
+fn visit_nearer(over: &OverSurfaces<'_>, visit: &mut impl FnMut(u32, &SurfacePoint)) {
+    let OverSurfaces {
+        shape,
+        terrain,
+        base,
+        shallow,
+    } = *over;
     let radius = shape.bound();
     let mut gap = f64::INFINITY;
     let mut ways = WaysOut::default();
-    let shallow = OverSurfaces::shallow(shape);
     let is_surface = terrain.has_surface();
     let is_soft = terrain.soft().is_some();
     let mut ahead = radius;
@@ -578,8 +589,7 @@ fn visit_nearer(
                 take(id, &dispatch::point_on_sphere(shape, sphere, base));
             }
             piece => {
-                let piece = (terrain, id, piece);
-                visit_on_surface(shape, piece, base, f64::INFINITY, |point| {
+                visit_on_surface(over, (id, piece), f64::INFINITY, |point| {
                     if is_lowest(point.feature) {
                         ways.add(id, point, shallow);
                         if point.gap >= -shallow {
@@ -595,17 +605,12 @@ fn visit_nearer(
         } else {
             terrain.visit_around(&Neighbourhood::new(shape, base, ahead), &mut look);
         }
-        let part = OverSurfaces {
-            shape,
-            terrain,
-            base,
-        };
-        if let Some((id, point)) = ways.deepest(&part) {
+        if let Some((id, point)) = ways.deepest(over) {
             take(id, &on_surface(&point));
         }
         if gap <= ahead {
             if is_surface && !is_soft && gap > CLOSE * radius {
-                look_all_around(shape, base, terrain, gap, visit);
+                look_all_around(over, gap, visit);
             }
             return;
         }
@@ -625,12 +630,16 @@ fn visit_nearer(
 /// not over.
 #[cold]
 fn look_all_around(
-    shape: &PlacedShape<'_>,
-    base: &Vector3<f64>,
-    terrain: &dyn Terrain,
+    over: &OverSurfaces<'_>,
     mut gap: f64,
     visit: &mut impl FnMut(u32, &SurfacePoint),
 ) {
+    let OverSurfaces {
+        shape,
+        terrain,
+        base,
+        ..
+    } = *over;
     let within = shape.bound() + gap;
     terrain.visit_near(&(base + shape.centre()), within, &mut |id, piece| {
         let mut take = |point: &SurfacePoint| {
@@ -647,7 +656,7 @@ fn look_all_around(
                     take(&low);
                 }
             }
-            piece => visit_on_surface(shape, (terrain, id, piece), base, f64::INFINITY, take),
+            piece => visit_on_surface(over, (id, piece), f64::INFINITY, take),
         }
     });
 }

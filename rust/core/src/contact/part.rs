@@ -138,6 +138,15 @@ impl Part {
         Some((wheel.tread?, (wheel.body, wheel.axle.into(), wheel.radius)))
     }
 
+    /// Tread of a wheel that yields.
+    #[inline]
+    pub(crate) fn own_tread(self, model: &Model) -> Option<&Tread> {
+        match self {
+            Self::Wheel(i) => model.wheels()[i].tread.as_ref(),
+            _ => None,
+        }
+    }
+
     /// Name of its material; empty for a joint.
     #[must_use]
     pub fn material(self, model: &Model) -> &str {

@@ -20,12 +20,19 @@ use nalgebra::Vector3;
 
 use crate::geometry::query::{SurfacePoint, convex};
 use crate::geometry::{PlacedShape, Primitive, SupportMap, Terrain};
+use crate::law::compliance::Tread;
 
 /// Most points that are compared, those of the smallest overlaps.
 const MOST: usize = 24;
 
-/// Depth, in bounding radii of the shape, up to which every point counts.
-pub(crate) const SHALLOW: f64 = 1e-3;
+/// Depth, in bounding radii of the shape, up to which every point counts: ground that is thinner, as
+/// near a sharp ridge, is pierced and still pushes.
+const SHALLOW: f64 = 1e-3;
+
+/// Of a wheel that yields, by how many of its deflections at rest more, and at most in bounding
+/// radii. What it yields by is no overlap to be explained.
+const DEFLECTIONS: f64 = 3.0;
+const MOST_YIELDING: f64 = 0.01;
 
 /// Largest gap at which a part touches a surface, m: a point of a part that is no further above the
 /// ground may count as in it by rounding, and what the part touches there is the way out.
@@ -61,6 +68,16 @@ pub(crate) struct OverSurfaces<'a> {
     pub terrain: &'a dyn Terrain,
     /// Where the shape's coordinates have their origin, world, m.
     pub base: &'a Vector3<f64>,
+    /// Depth up to which every point counts ([`shallow`]), m.
+    pub shallow: f64,
+}
+
+/// Depth up to which every point of a part counts, by its bounding radius (m), m; `tread`: of a
+/// wheel that yields.
+#[inline]
+pub(crate) fn shallow(bound: f64, tread: Option<&Tread>) -> f64 {
+    let yielding = tread.map_or(0.0, |tread| DEFLECTIONS * tread.usual_deflection());
+    SHALLOW * bound + yielding.min(MOST_YIELDING * bound)
 }
 
 impl OverSurfaces<'_> {
@@ -120,7 +137,7 @@ impl OverSurfaces<'_> {
     /// than the overlap, leaves the ground there. What remains is continuous in the pose.
     #[inline]
     pub fn excess(&self, (id, piece): (u32, &Primitive), point: &SurfacePoint) -> f64 {
-        if point.gap >= -Self::shallow(self.shape) {
+        if point.gap >= -self.shallow {
             return 0.0;
         }
         self.excess_of_deep((id, piece), point)
@@ -131,11 +148,14 @@ impl OverSurfaces<'_> {
         let behind = self.behind(piece, point);
         let overlaps_at =
             |rise: f64| self.overlaps_after(piece, point, &(Vector3::y() * rise), || behind);
-        let shallow = Self::shallow(self.shape);
         if !overlaps_at(0.0) {
             // The place just behind a tip is in the ground. It pierces a disc no deeper than that.
             let is_tip = matches!(piece.1, Primitive::Vertex(_));
-            return if is_tip { -point.gap - shallow } else { 0.0 };
+            return if is_tip {
+                -point.gap - self.shallow
+            } else {
+                0.0
+            };
         }
         if overlaps_at(-point.gap) {
             return 0.0;
@@ -149,14 +169,7 @@ impl OverSurfaces<'_> {
                 high = middle;
             }
         }
-        -point.gap - high.max(shallow)
-    }
-
-    /// Depth up to which every point behind a piece's plane counts, m: ground that is thinner, as
-    /// near a sharp ridge, is pierced and still pushes.
-    #[inline]
-    pub fn shallow(shape: &PlacedShape<'_>) -> f64 {
-        SHALLOW * shape.bound()
+        -point.gap - high.max(self.shallow)
     }
 }
 
@@ -204,7 +217,7 @@ impl WaysOut {
         (self.n, self.has_deep) = (0, false);
     }
 
-    /// Adds a point at a piece of a surface; `shallow` (m) of [`OverSurfaces::shallow`].
+    /// Adds a point at a piece of a surface; `shallow`: of [`OverSurfaces`], m.
     #[inline]
     pub fn add(&mut self, id: u32, point: &SurfacePoint, shallow: f64) {
         if point.gap < TOUCH {
@@ -243,7 +256,7 @@ impl WaysOut {
 
     /// Whether a point at a piece counts, once the others are sifted.
     pub fn counts(&self, part: &OverSurfaces<'_>, id: u32, point: &SurfacePoint) -> bool {
-        if point.gap >= -OverSurfaces::shallow(part.shape) {
+        if point.gap >= -part.shallow {
             return true;
         }
         let piece = part.terrain.primitive(id);

@@ -38,7 +38,8 @@ impl WheelGaps {
         }
         for (gap, wheel) in gaps.iter_mut().zip(model.wheels()) {
             let shape = wheel_shape(wheel, kinematics);
-            *gap = wheel_gap(&shape, kinematics.origin(wheel.body), terrain);
+            let base = kinematics.origin(wheel.body);
+            *gap = wheel_gap(&shape, wheel.tread.as_ref(), base, terrain);
         }
     }
 }

@@ -52,6 +52,14 @@ pub struct Tread {
 }
 
 impl Tread {
+    /// The deflection at which half the length of the contact is the relaxation length, m: that of a
+    /// wheel at rest, unless its description states another length.
+    #[inline]
+    #[must_use]
+    pub fn usual_deflection(&self) -> f64 {
+        0.5 * self.relaxation_length * self.relaxation_length / self.radius
+    }
+
     /// The contact of a wheel that travels at a speed V (m/s) over its tread; `lean`: squared
     /// cosine of the angle between its axle and the contact's normal.
     ///

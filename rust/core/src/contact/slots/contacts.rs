@@ -763,10 +763,9 @@ impl<T: Lane> ContactSlots<T> {
             for slot in &mut self.slots[wheel.slots.clone()] {
                 slot.plane = own;
             }
-            // Where a wheel sinks in, a piece counts by how deep each circle is.
-            if input.needs_pieces || (wheel.n_circles() > 1 && wheel.is_soft) {
+            if input.needs_pieces {
                 rest = rest | ground.on_surface();
-            } else if !wheel.is_wide() {
+            } else if n_circles == 1 {
                 on_pieces = rest & T::mask(self.token, input.going);
                 rest = rest & !on_pieces;
             }
@@ -778,6 +777,12 @@ impl<T: Lane> ContactSlots<T> {
             let stand = self.stands((w, circle), plane, input, (s, centre), reach);
             self.slots[first + circle].active = stand.admitted;
             rest = rest | stand.lies;
+            // Which of them count is told there.
+            if n_circles > 1 && ground.has_surfaces() {
+                rest = rest
+                    | (ground.on_surface()
+                        & stand.gap.lt(reach.like(-self.parts.wheels[w].shallow)));
+            }
         }
         if on_pieces.any() {
             rest = rest | self.look_at_pieces((w, on_pieces), ground, input, (s, centre), reach);

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 use super::machine::SharedMachine;
 use crate::contact::Part;
+use crate::contact::ways_out::shallow;
 use crate::geometry::query::section::Section;
 use crate::multibody::JointAxis;
 use crate::multibody::joint::{Joint, JointModel, Revolute};
@@ -39,8 +40,8 @@ pub(crate) struct ContactWheel {
     axle: Axle,
     pub spoke: [f64; 3],
     pub section: Section,
-    /// Whether the wheel yields where it touches.
-    pub is_soft: bool,
+    /// Depth in a surface up to which all its points count, m.
+    pub shallow: f64,
     /// Sine and cosine of the angle of its rollers from the axle, if it has any.
     pub rollers: Option<[f64; 2]>,
     /// Friction across over that along, if they differ.
@@ -128,7 +129,7 @@ impl Parts {
                         half: wheel.half,
                         rounding: wheel.rounding,
                     },
-                    is_soft: wheel.tread.is_some(),
+                    shallow: shallow(wheel.bound(), wheel.tread.as_ref()),
                     rollers: wheel.rollers,
                     across: wheel.across,
                     bound: wheel.bound(),

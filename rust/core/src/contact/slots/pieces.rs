@@ -1,4 +1,5 @@
-//! The pieces of a surface that a thin wheel may touch for the next steps, lane by lane.
+//! The pieces of a surface that a wheel with one circle, a thin disc or a torus, may touch for the
+//! next steps, lane by lane.
 //!
 //! They are searched when the wheel has moved further than the last search looked ahead. In between
 //! all lanes compare their wheels with them at once: a face touches if the lowest point of the rim
@@ -36,15 +37,16 @@ const SIDES: [[f64; 2]; 3] = [[1.0, 0.0], [0.88, 0.475], [0.88, -0.475]];
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
 
-/// A wheel in every lane.
+/// A disc in every lane, swept by a ball.
 #[derive(Clone, Copy)]
 pub(crate) struct LaneDisc<T> {
     /// World, m.
     pub centre: Vec3<T>,
     /// Unit.
     pub axle: Vec3<T>,
-    /// m.
+    /// Of the disc and of the ball, m.
     pub radius: f64,
+    pub rounding: f64,
     /// How near it must come to the ground to touch it, m.
     pub reach: T,
 }
@@ -141,7 +143,7 @@ impl<T: Lane> Pieces<T> {
         lanes: T::Mask,
         rim: &LaneDisc<T>,
     ) -> T::Mask {
-        let turned = (rim.axle - self.axle).norm() * rim.reach.like(1.5 * rim.radius);
+        let turned = (rim.axle - self.axle).norm() * rim.reach.like(1.5 * rim.outer());
         let moved = (rim.centre - self.from).norm() + turned;
         let is_known = moved.le(self.moves) & rim.reach.le(self.reach);
         let mut unknown = (lanes & !is_known).bits();
@@ -163,7 +165,7 @@ impl<T: Lane> Pieces<T> {
                 && let Some(terrain) = terrain
                 && rim_points
                     .iter()
-                    .any(|x| is_deep(&**terrain, x.get(lane), DEEP * rim.radius))
+                    .any(|x| is_deep(&**terrain, x.get(lane), DEEP * rim.outer()))
             {
                 others |= 1 << lane;
             }
@@ -184,7 +186,7 @@ impl<T: Lane> Pieces<T> {
         AHEAD.iter().any(|&ahead| {
             let mut found = [None; MAX_FACES + MAX_EDGES + MAX_TIPS];
             let mut n = 0;
-            let moves = terrain.visit_ahead(&disc, [reach, ahead], &mut |piece| {
+            let moves = terrain.visit_ahead((&disc, rim.rounding), [reach, ahead], &mut |piece| {
                 if let Some(place) = found.get_mut(n) {
                     *place = Some(*piece);
                 }
@@ -249,6 +251,7 @@ impl<T: Lane> Pieces<T> {
     pub fn may_touch_others(&self, rim: &LaneDisc<T>) -> T::Mask {
         let like = rim.reach;
         let (radius, rounding) = (like.like(rim.radius), like.like(ROUNDING));
+        let near = rim.reach + rounding + rounding.like(rim.rounding);
         let (overlap, beyond) = (like.like(OVERLAP), like.like(LEAN));
         let zero = like.like(0.0);
         let mut touched = zero.lt(zero);
@@ -266,8 +269,8 @@ impl<T: Lane> Pieces<T> {
             );
             let over = beyond * edge.length + rounding;
             touched = touched
-                | (first.0.le(rim.reach + rounding)
-                    & second.0.le(rim.reach + rounding)
+                | (first.0.le(near)
+                    & second.0.le(near)
                     & first.1.lt(overlap)
                     & (-overlap).lt(second.1)
                     & (-over).le(first.2.max(second.2))
@@ -275,16 +278,21 @@ impl<T: Lane> Pieces<T> {
         }
         for tip in &self.tips.pieces[..self.tips.most] {
             let from = rim.centre - *tip;
-            let within = radius + rim.reach + rounding;
-            let beside = from.dot(rim.axle).abs();
-            touched =
-                touched | (beside.le(rim.reach + rounding) & from.dot(from).le(within * within));
+            let beside = from.dot(rim.axle);
+            let abreast = (from.dot(from) - beside * beside).max(zero).sqrt();
+            let beyond = (abreast - radius).max(zero);
+            touched = touched | (beside * beside + beyond * beyond).le(near * near);
         }
         touched
     }
 }
 
 impl<T: Lane> LaneDisc<T> {
+    /// Outer radius, m.
+    fn outer(&self) -> f64 {
+        self.radius + self.rounding
+    }
+
     /// The lowest point of the rim and one to either side, world, m.
     #[inline(always)]
     fn low_points(&self) -> [Vec3<T>; 3] {
@@ -296,7 +304,7 @@ impl<T: Lane> LaneDisc<T> {
         SIDES.map(
             #[inline(always)]
             |[a, b]| {
-                let [a, b] = [a, b].map(|x| like.like(x * self.radius));
+                let [a, b] = [a, b].map(|x| like.like(x * self.outer()));
                 self.centre - up * a + along * b
             },
         )

@@ -1,9 +1,8 @@
-//! Contacts of thin wheels with the faces of a surface, all lanes at once: [`super::pieces`].
+//! Contacts of thin discs and tori with the faces of a surface, all lanes at once: [`super::pieces`].
 
 use super::contacts::{ContactSlots, DetectionInput};
 use super::ground::BlockGround;
 use super::pieces::{LaneDisc, LanePlane};
-use crate::contact::ways_out::SHALLOW;
 use crate::geometry::query::disc_plane::{rolling, to_lowest};
 use crate::scalar::{Lane, LaneMask, Vec3};
 
@@ -21,11 +20,13 @@ impl<T: Lane> ContactSlots<T> {
     ) -> T::Mask {
         let wheel = &self.parts.wheels[w];
         let origin = input.middle.origin_of(wheel.tree);
-        let (radius, first) = (wheel.section.radius, wheel.slots.start);
+        let (radius, rounding) = (wheel.section.radius, wheel.section.rounding);
+        let first = wheel.slots.start;
         let rim = LaneDisc {
             centre: origin + centre,
             axle: s,
             radius,
+            rounding,
             reach,
         };
         let pieces = ground.find_pieces(w, lanes, &rim);
@@ -33,7 +34,7 @@ impl<T: Lane> ContactSlots<T> {
             return lanes;
         };
         let mut rest = (lanes & !known) | (known & pieces.may_touch_others(&rim));
-        let shallow = reach.like(-SHALLOW * radius);
+        let shallow = reach.like(-wheel.shallow);
         for face in pieces.faces() {
             let plane = (face.plane.normal, face.plane.height(origin));
             let stand = self.stands((w, 0), plane, input, (s, centre), reach);
@@ -42,7 +43,11 @@ impl<T: Lane> ContactSlots<T> {
                 continue;
             }
             let (t, _) = rolling(face.plane.normal, s);
-            let low = origin + (centre + to_lowest(t, s, reach.like(radius)));
+            let mut low = centre + to_lowest(t, s, reach.like(radius));
+            if rounding > 0.0 {
+                low -= face.plane.normal * reach.like(rounding);
+            }
+            let low = origin + low;
             let over = near & face.admits(low);
             rest = rest | (over & stand.gap.lt(shallow));
             rest = rest | self.enter_on_plane(first, over & stand.admitted, &face.plane);

@@ -1,9 +1,9 @@
-//! What a disc may touch of a height field while it rolls on for a while.
+//! What a disc, or a torus about it, may touch of a height field while it rolls on for a while.
 //!
-//! The point of a disc over a plane of normal n is its lowest, and moves by no more than the disc
-//! does. So a face is left out if that point is further off its walls than the disc will move, or
-//! if the disc is further from its plane; an edge, if at either of its faces' normals the lowest
-//! point stays on that face's side.
+//! The point of a disc over a plane of normal n is its lowest, that of a torus lies by its rounding
+//! along −n from there, and both move by no more than the disc does. So a face is left out if that
+//! point is further off its walls than the disc will move, or if the wheel is further from its
+//! plane; an edge, if at either of its faces' normals the lowest point stays on that face's side.
 
 use nalgebra::Vector3;
 
@@ -37,13 +37,15 @@ const DEPTH: f64 = 0.02;
 /// The region of a search.
 struct Search<'a> {
     disc: &'a Disc,
+    rounding: f64,
     reach: f64,
     ahead: f64,
-    /// How far from its lowest point over a face the face may be, m.
+    /// How far from the wheel's lowest point over it a face may be, and a cell from the disc's plane, m.
     off: f64,
+    aside: f64,
 }
 
-/// The lowest point of a disc over a plane through a place.
+/// The lowest point of a wheel over a plane through a place.
 struct Lowest {
     /// From that place, m.
     point: Vector3<f64>,
@@ -56,11 +58,11 @@ impl HeightField {
     /// [`Terrain::visit_ahead`]; the disc's centre is in world coordinates.
     pub(super) fn visit_pieces_ahead(
         &self,
-        disc: &Disc,
+        (disc, rounding): (&Disc, f64),
         [reach, ahead]: [f64; 2],
         visit: &mut dyn FnMut(&Primitive),
     ) -> Option<f64> {
-        let (c, s, R) = (&disc.centre, &disc.axle, disc.radius);
+        let (c, s, R) = (&disc.centre, &disc.axle, disc.radius + rounding);
         let cell = self.spacing[0].min(self.spacing[1]);
         let ahead = ahead.min(LONGEST * cell);
         let tilt = s.y.abs() + ahead / R;
@@ -78,21 +80,24 @@ impl HeightField {
         // The lowest point over any plane of this slope is within an angle of the disc's lowest.
         let steep = (slope / (1.0 + slope)).sqrt();
         let upright = ((1.0 - steep * steep) * (1.0 - tilt * tilt)).sqrt() - steep * tilt;
+        let off = OFF * (reach + DEPTH * R) + ROUNDING;
+        let aside = off + rounding * (2.0 * (1.0 - upright)).sqrt();
         let length = (steep * steep + upright * upright).sqrt();
         let [sine, cosine] = [steep, upright].map(|x| x / length);
         let up = (Vector3::y() - s * s.y).normalize();
         let along = up.cross(s);
-        let off = OFF * (reach + DEPTH * R) + ROUNDING;
         let half = |axis: usize| {
             let swing = along[axis].abs() * sine + up[axis].abs() * (1.0 - cosine);
-            R * swing + 2.0 * ahead + off
+            R * swing + 2.0 * ahead + aside
         };
         let [columns, rows] = self.cells_within(&(c - up * R), [half(0), half(2)])?;
         let search = Search {
             disc,
+            rounding,
             reach,
             ahead,
             off,
+            aside,
         };
         for j in rows[0]..=rows[1] {
             for i in columns[0]..=columns[1] {
@@ -122,14 +127,16 @@ impl HeightField {
     ) {
         let Search {
             disc,
+            rounding,
             reach,
             ahead,
             off,
+            aside,
         } = *search;
         let place = cell.map(narrow);
         let from = disc.centre - self.point(place);
         let [a, b, c, d] = self.cell_heights(cell).map(f64::from);
-        if self.beside(disc, &from, [0.0, b - a, c - a, d - a]) > ahead + off {
+        if self.beside(disc, &from, [0.0, b - a, c - a, d - a]) > ahead + aside {
             return;
         }
         let patch = self.patch(cell);
@@ -161,8 +168,8 @@ impl HeightField {
                 visit(&Primitive::Edge(edge));
             }
         }
-        let is_near = disc.axle.dot(&from).abs() <= reach + ahead + ROUNDING
-            && from.norm() <= disc.radius + reach + ahead + ROUNDING;
+        let within = rounding + reach + ahead + ROUNDING;
+        let is_near = disc.axle.dot(&from).abs() <= within && from.norm() <= disc.radius + within;
         if is_near && let Some(vertex) = patch.vertex() {
             visit(&Primitive::Vertex(vertex));
         }
@@ -194,8 +201,8 @@ impl Search<'_> {
         let w = n - disc.axle * across;
         let length = w.norm();
         Lowest {
-            point: from - w * (disc.radius / length),
-            gap: n.dot(from) - disc.radius * length,
+            point: from - w * (disc.radius / length) - n * self.rounding,
+            gap: n.dot(from) - disc.radius * length - self.rounding,
             is_steady: across.abs() <= STEADY,
         }
     }
@@ -236,7 +243,7 @@ impl Search<'_> {
 mod tests {
     use super::*;
     use crate::geometry::query::dispatch;
-    use crate::geometry::{Neighbourhood, PlacedShape, SupportMap};
+    use crate::geometry::{Neighbourhood, PlacedShape, Roller, SupportMap};
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 
@@ -254,6 +261,7 @@ mod tests {
             turn in prop::array::uniform3(-1.0..1.0_f64),
             reach in 0.0..2e-3_f64,
             ahead in prop::sample::select(vec![0.0, 0.01, 0.05]),
+            rounding in prop::sample::select(vec![0.0, 0.02, 0.1]),
         ) {
             #[allow(clippy::cast_possible_truncation)] // a map is single
             let heights = heights.iter().map(|h: &f64| (h * 0.5 * steepness * spacing) as f32);
@@ -264,11 +272,15 @@ mod tests {
                 centre: Vector3::zeros(),
                 axle: R.column(2).into(),
                 spoke: R.column(0).into(),
-                radius: 0.2,
+                radius: 0.2 - rounding,
+            };
+            let wheel = |disc: &Disc| match rounding {
+                0.0 => PlacedShape::Disc(*disc),
+                _ => PlacedShape::Roller(Roller { core: *disc, half: 0.0, rounding }),
             };
             // Lowered onto the ground.
             let gap = |disc: &Disc| {
-                let low = PlacedShape::Disc(*disc).support(&-Vector3::y());
+                let low = wheel(disc).support(&-Vector3::y());
                 field.height(low.x, low.z).map_or(0.0, |height| low.y - height)
             };
             disc.centre.y = 0.5;
@@ -277,20 +289,20 @@ mod tests {
             }
             let mut ahead_of = Vec::new();
             let take = &mut |piece: &Primitive| ahead_of.push(*piece);
-            let Some(ahead) = field.visit_pieces_ahead(&disc, [reach, ahead], take) else {
+            let Some(ahead) = field.visit_pieces_ahead((&disc, rounding), [reach, ahead], take) else {
                 return Ok(());
             };
             let shift = Vector3::from(motion);
             let share = 0.5 * ahead / shift.norm().max(1.0);
             let mut later = disc;
             later.centre += shift * share;
-            let turn = Rotation3::new(Vector3::from(turn).normalize() * (0.2 * ahead / disc.radius));
+            let turn = Rotation3::new(Vector3::from(turn).normalize() * ahead);
             (later.axle, later.spoke) = (turn * disc.axle, turn * disc.spoke);
             // Down to the ground again, as far as that is within the motion.
             let down = gap(&later).clamp(0.0, 0.2 * ahead);
             later.centre.y -= down;
             let base = Vector3::zeros();
-            let shape = PlacedShape::Disc(later);
+            let shape = wheel(&later);
             let part = Neighbourhood::new(&shape, &base, reach);
             field.visit_near(&part.centre, part.radius(), &mut |_, piece| {
                 let mut touches = false;

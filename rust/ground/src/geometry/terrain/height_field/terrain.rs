@@ -28,7 +28,7 @@ impl Terrain for HeightField {
 
     fn visit_ahead(
         &self,
-        disc: &Disc,
+        disc: (&Disc, f64),
         reach: [f64; 2],
         visit: &mut dyn FnMut(&Primitive),
     ) -> Option<f64> {

@@ -54,9 +54,10 @@ pub(super) struct SweptWheel<'a> {
 struct Circle<T: Lane> {
     /// Lowest points of the circle over each plane, from the cell's corner, m.
     lows: [Vec3<T>; 4],
-    /// Heights of its centre and of these points, in units of the normals' lengths, m.
+    /// Heights over each plane, in units of the normals' lengths, m: of the circle's centre, and of
+    /// that centre over the lowest point.
     heights: [T; 4],
-    gaps: [T; 4],
+    drops: [T; 4],
     /// Cells where the circle is out of reach, for each plane.
     is_beyond: [T::Mask; 4],
 }
@@ -174,7 +175,7 @@ impl SweptWheel<'_> {
         let mut circle = Circle {
             lows: [from; 4],
             heights: [zero; 4],
-            gaps: [zero; 4],
+            drops: [zero; 4],
             is_beyond: [never; 4],
         };
         for k in 0..4 {
@@ -188,7 +189,7 @@ impl SweptWheel<'_> {
             let length = rest.max(zero).sqrt();
             circle.lows[k] = from - (m - s * along) * (radius / length);
             circle.heights[k] = height;
-            circle.gaps[k] = height - radius * length;
+            circle.drops[k] = radius * length;
         }
         circle
     }
@@ -199,8 +200,8 @@ impl SweptWheel<'_> {
         self.part.reach + self.rounding
     }
 
-    /// Where the lowest point of a circle over the plane of a face, moved by up to the rounding,
-    /// may be over the face, or other points may be near it.
+    /// Where the lowest point of a circle over the plane of a face, moved by the rounding along the
+    /// face's normal, may be over the face, or other points may be near it.
     #[inline(always)]
     fn is_over<T: Lane>(
         &self,
@@ -209,12 +210,19 @@ impl SweptWheel<'_> {
         half: usize,
         [dx, dz]: [f64; 2],
     ) -> T::Mask {
-        let (low, gap) = (circle.lows[half], circle.gaps[half]);
-        let like = gap;
+        let (mut low, height, drop) = (circle.lows[half], circle.heights[half], circle.drops[half]);
+        let like = height;
         let (x, z) = (like.like(dx), like.like(dz));
         let (per_x, per_z) = (like.like(1.0 / dx), like.like(1.0 / dz));
+        let mut gap = height - drop;
+        if self.rounding > 0.0 {
+            let length = planes.squares[half].sqrt();
+            let rounding = like.like(self.rounding);
+            low = low - planes.normals[half] * (rounding / length);
+            gap -= rounding * length;
+        }
         // At least the gap.
-        let off = like.like(OFF) * gap.abs() + like.like(self.rounding + ROUNDING);
+        let off = like.like(OFF) * gap.abs() + like.like(ROUNDING);
         let is_beside = low.x.lt(-off) | (x + off).lt(low.x) | low.z.lt(-off) | (z + off).lt(low.z);
         let ahead = low.x * per_x - low.z * per_z;
         let beyond = off * per_x + off * per_z;
@@ -224,8 +232,7 @@ impl SweptWheel<'_> {
             beyond.lt(ahead)
         };
         // The second and third point of the rim are higher by one and a half radii.
-        let height = circle.heights[half];
-        let others = height + like.like(0.5) * (height - gap);
+        let others = height + like.like(0.5) * drop;
         let bound = like.like(0.5) * (like.like(1.0) + planes.squares[half]);
         let is_upright = (like.like(self.reach() + ROUNDING) * bound).lt(others);
         !circle.is_beyond[half] & !((is_beside | is_in_other) & is_upright)
