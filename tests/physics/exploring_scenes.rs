@@ -33,7 +33,7 @@ pub enum Ground {
 pub enum Wheels {
     /// As they are.
     BuiltIn,
-    /// Thin discs that touch at 0.20 m.
+    /// Thin discs that touch at 0.20 m and yield, as those below.
     Discs,
     /// Cylinders of that radius, 0.15 m wide.
     Cylinders,
@@ -90,18 +90,19 @@ impl Wheels {
             return model;
         }
         let model = model.with_contact_radius(LARGE).unwrap();
-        if self == Self::Discs {
-            return model;
-        }
-        let mut wide = model.description().clone();
+        let mut own = model.description().clone();
         let rounding = if self == Self::Tori { 0.5 * WIDTH } else { 0.0 };
-        for wheel in &mut wide.wheels {
-            (wheel.width, wheel.rounding) = (Some(WIDTH), Some(rounding));
+        for wheel in &mut own.wheels {
+            if self != Self::Discs {
+                (wheel.width, wheel.rounding) = (Some(WIDTH), Some(rounding));
+            }
             if self == Self::RigidCylinders {
                 wheel.stiffness = Some(0.0);
+            } else {
+                wheel.deflection = Some(DEFLECTION);
             }
         }
-        Model::from_description(wide).unwrap()
+        Model::from_description(own).unwrap()
     }
 }
 
@@ -143,6 +144,9 @@ const LARGE: f64 = 0.20;
 
 /// Width of wide wheels, m.
 const WIDTH: f64 = 0.15;
+
+/// Deflection of large wheels that yield, in radii: that of the package's rover, 0.33 mm.
+const DEFLECTION: f64 = 1.65e-3;
 
 /// How much higher large wheels begin among rocks, m.
 const LIFT: f64 = 0.15;

@@ -31,7 +31,7 @@ const SHALLOW: f64 = 1e-3;
 
 /// Of a wheel that yields, by how many of its deflections at rest more, and at most in bounding
 /// radii. What it yields by is no overlap to be explained.
-const DEFLECTIONS: f64 = 3.0;
+const DEFLECTIONS: f64 = 6.0;
 const MOST_YIELDING: f64 = 0.01;
 
 /// Largest gap at which a part touches a surface, m: a point of a part that is no further above the

@@ -18,8 +18,8 @@ use super::{HeightField, index, narrow};
 use crate::geometry::shape::{Disc, Roller, SupportMap};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
 #[cfg(target_arch = "x86_64")]
-use friction_contact::scalar::{Eights, Fours, inlined};
-use friction_contact::scalar::{Instructions, Lane, LaneMask, Single};
+use friction_contact::scalar::{Eights, Fours};
+use friction_contact::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, inlined};
 
 /// How deep a wheel may be in the ground, in bounding radii, so that faces as far beside it are all
 /// that matter.
@@ -35,6 +35,59 @@ struct Region {
     /// Lowest height, and distance from the wheel's centre, m.
     floor: f64,
     radius: f64,
+}
+
+/// Cosine of the angle between the axle and the level up to which cells are compared with the
+/// cylinder around the wheel.
+const LEVEL: f64 = 0.5;
+
+/// The infinite cylinder about the axle with all that the wheel may touch.
+struct Tube {
+    /// Square of its radius, m².
+    square: f64,
+    /// Of a cell's middle from the wheel's centre, along x and z: its place across the axle, level;
+    /// and its height over the axle by the axle's tilt, m.
+    across: [f64; 2],
+    rise: [f64; 2],
+    /// Half of what these places span in a cell, m.
+    halves: [f64; 2],
+    /// Cosine of the axle's tilt.
+    cosine: f64,
+}
+
+impl Tube {
+    /// None if the axle is not level enough.
+    fn about(wheel: &SweptWheel<'_>, [dx, dz]: [f64; 2]) -> Option<Self> {
+        let s = &wheel.disc.axle;
+        let cosine = (s.x * s.x + s.z * s.z).sqrt();
+        if cosine < LEVEL {
+            return None;
+        }
+        let radius = wheel.disc.radius + wheel.reach() + ROUNDING;
+        let across = [s.z / cosine, -s.x / cosine];
+        let rise = [s.y * s.x / cosine, s.y * s.z / cosine];
+        let half = |[x, z]: [f64; 2]| 0.5 * (x.abs() * dx + z.abs() * dz);
+        Some(Self {
+            square: radius * radius,
+            across,
+            rise,
+            halves: [half(across), half(rise)],
+            cosine,
+        })
+    }
+
+    /// Cells that it may meet, from the places of their middles and the depths of their highest
+    /// points below the wheel's centre, m.
+    #[inline(always)]
+    fn meets<T: Lane>(&self, [x, z]: [T; 2], drop: T) -> T::Mask {
+        let number = |value: f64| x.like(value);
+        let place = |[a, b]: [f64; 2]| x * number(a) + z * number(b);
+        let zero = number(0.0);
+        let aside = (place(self.across).abs() - number(self.halves[0])).max(zero);
+        let down = number(self.cosine) * drop + place(self.rise) - number(self.halves[1]);
+        let down = down.max(zero);
+        (aside * aside + down * down).le(number(self.square))
+    }
 }
 
 /// Cells with pieces that may be touched, each kind a bit.
@@ -97,7 +150,7 @@ impl HeightField {
             n: 0,
             cells: [([0; 2], 0); MOST_CELLS],
         };
-        if self.search_strip(wheel, &region, &mut found) {
+        if self.search(wheel, &region, &mut found) {
             for (cell, kinds) in &found.cells[..found.n] {
                 self.visit_kinds(*cell, *kinds, visit);
             }
@@ -107,7 +160,25 @@ impl HeightField {
     }
 
     /// Searches the strip along the wheel. Whether it suffices.
-    fn search_strip(&self, wheel: &SweptWheel<'_>, region: &Region, found: &mut Found) -> bool {
+    fn search(&self, wheel: &SweptWheel<'_>, region: &Region, found: &mut Found) -> bool {
+        match Instructions::of_this_machine() {
+            Instructions::Baseline => {
+                self.search_strip::<f64>(Single::Baseline, wheel, region, found)
+            }
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(token) => self.search_strip::<Fours>(token, wheel, region, found),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(token) => self.search_strip::<Eights>(token, wheel, region, found),
+        }
+    }
+
+    fn search_strip<T: Lane>(
+        &self,
+        token: T::Token,
+        wheel: &SweptWheel<'_>,
+        region: &Region,
+        found: &mut Found,
+    ) -> bool {
         let (c, axle, radius) = (&wheel.part.centre, &wheel.disc.axle, region.radius);
         let [dx, dz] = self.spacing;
         // Half the width of what the wheel crosses, by the cells' middles along the axle, for all
@@ -120,25 +191,35 @@ impl HeightField {
         let smaller = (radius - depth) * (radius - depth);
         let middle = (c.x - self.origin[0]) / dx - 0.5;
         let per_column = axle.x * dx;
+        let tube = Tube::about(wheel, self.spacing);
         let (mut cells, mut has_room, mut may_be_deep) = (Cells::new(), true, false);
-        for j in region.rows[0]..=region.rows[1] {
-            let z = self.origin[1] + (j as f64 + 0.5) * dz - c.z;
-            let range = across(region.columns, middle, [per_column, axle.z * z], wide);
-            let Some(range) = range else {
-                continue;
-            };
-            self.visit_row((j, range), c, region, |i, square| {
-                let beside = per_column * (i as f64 - middle) + axle.z * z;
-                may_be_deep |= square <= smaller
-                    && beside.abs() <= crossed
-                    && !self.is_under([i, j], wheel, depth);
-                cells.add(self, [i, j], c);
-                if cells.n == CELLS {
-                    has_room &= self.take(wheel, &mut cells, |cell| found.add(cell));
-                }
-            });
-        }
-        has_room &= self.take(wheel, &mut cells, |cell| found.add(cell));
+        inlined!(T::vectorize, token, {
+            for j in region.rows[0]..=region.rows[1] {
+                let z = self.origin[1] + (j as f64 + 0.5) * dz - c.z;
+                let range = across(region.columns, middle, [per_column, axle.z * z], wide);
+                let Some(range) = range else {
+                    continue;
+                };
+                self.visit_row::<T>(
+                    token,
+                    (j, range),
+                    region,
+                    (c, tube.as_ref()),
+                    |i, square| {
+                        let beside = per_column * (i as f64 - middle) + axle.z * z;
+                        may_be_deep |= square <= smaller
+                            && beside.abs() <= crossed
+                            && !self.is_under([i, j], wheel, depth);
+                        cells.add(self, [i, j], c);
+                        if cells.n == CELLS {
+                            has_room &=
+                                self.take::<T>(token, wheel, &mut cells, |cell| found.add(cell));
+                        }
+                    },
+                );
+            }
+            has_room &= self.take::<T>(token, wheel, &mut cells, |cell| found.add(cell));
+        });
         has_room && !(may_be_deep && self.may_look_away(wheel, region))
     }
 
@@ -159,55 +240,71 @@ impl HeightField {
         region: &Region,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        let c = &wheel.part.centre;
+        let (c, token) = (&wheel.part.centre, Single::Baseline);
         let mut cells = Cells::new();
         let mut visit = |(cell, kinds): ([usize; 2], u32)| {
             self.visit_kinds(cell, kinds, visit);
             true
         };
         for j in region.rows[0]..=region.rows[1] {
-            self.visit_row((j, region.columns), c, region, |i, _| {
+            self.visit_row::<f64>(token, (j, region.columns), region, (c, None), |i, _| {
                 cells.add(self, [i, j], c);
                 if cells.n == CELLS {
-                    self.take(wheel, &mut cells, &mut visit);
+                    self.take::<f64>(token, wheel, &mut cells, &mut visit);
                 }
             });
         }
-        self.take(wheel, &mut cells, &mut visit);
+        self.take::<f64>(token, wheel, &mut cells, &mut visit);
     }
 
-    /// Visits the columns of a row's cells in a region, and the square of the distance of a place
-    /// from all that is over the cell and at most as high as its highest point, m².
+    /// Visits the columns of a row's cells in a region and a tube, and the square of the distance
+    /// of a place from all that is over the cell and at most as high as its highest point, m².
     #[inline(always)]
-    fn visit_row(
+    fn visit_row<T: Lane>(
         &self,
+        token: T::Token,
         (j, [begin, end]): (usize, [usize; 2]),
-        place: &Vector3<f64>,
         region: &Region,
+        (place, tube): (&Vector3<f64>, Option<&Tube>),
         mut visit: impl FnMut(usize, f64),
     ) {
-        let beyond = |axis: usize, k: usize, x: f64| {
-            let low = self.origin[axis] + k as f64 * self.spacing[axis] - x;
-            low.max(-low - self.spacing[axis]).max(0.0)
-        };
-        let (z, most) = (beyond(1, j, place.z), region.radius * region.radius);
-        if z * z > most {
+        let [dx, dz] = self.spacing;
+        let number = |x: f64| T::splat(token, x);
+        let zero = number(0.0);
+        let low = self.origin[1] + j as f64 * dz - place.z;
+        let z = low.max(-low - dz).max(0.0);
+        let (rest, middle) = (
+            region.radius * region.radius - z * z,
+            number(low + 0.5 * dz),
+        );
+        if rest < 0.0 {
             return;
         }
-        let row = |j: usize| &self.heights[j * self.columns + begin..][..end - begin + 2];
-        let mut corners = row(j)
-            .iter()
-            .zip(row(j + 1))
-            .map(|(near, far)| near.max(*far));
-        let mut last = corners.next().unwrap_or(f32::NAN);
-        for (i, next) in (begin..).zip(corners) {
-            let highest = f64::from(last.max(next));
-            last = next;
-            let (x, drop) = (beyond(0, i, place.x), (place.y - highest).max(0.0));
-            let square = x * x + z * z + drop * drop;
+        for i in (begin..=end).step_by(T::LANES) {
+            let n = (end + 1 - i).min(T::LANES);
+            let row = |j: usize| &self.heights[j * self.columns + i..][..n + 1];
+            let (near, far) = (row(j), row(j + 1));
             // A cell without heights has no highest.
-            if highest >= region.floor && square <= most {
-                visit(i, square);
+            let (mut highest, mut lows) = ([f64::NAN; MAX_LANES], [0.0; MAX_LANES]);
+            for k in 0..n {
+                let two = [near, far].map(|row| row[k].max(row[k + 1]));
+                highest[k] = f64::from(two[0].max(two[1]));
+                lows[k] = self.origin[0] + (i + k) as f64 * dx - place.x;
+            }
+            let highest = T::load(token, &highest[..T::LANES]);
+            let low = T::load(token, &lows[..T::LANES]);
+            let x = low.max(-low - number(dx)).max(zero);
+            let drop = (number(place.y) - highest).max(zero);
+            let square = x * x + drop * drop;
+            let mut near = number(region.floor).le(highest) & square.le(number(rest));
+            if let Some(tube) = tube {
+                near = near & tube.meets([low + number(0.5 * dx), middle], drop);
+            }
+            let mut bits = near.bits();
+            while bits != 0 {
+                let k = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                visit(i + k, square.get(k) + z * z);
             }
         }
     }
@@ -228,13 +325,15 @@ impl HeightField {
 
     /// Empties `cells` and takes those with pieces that the wheel may touch, in order. Whether it
     /// took all of them.
-    fn take(
+    #[inline(always)]
+    fn take<T: Lane>(
         &self,
+        token: T::Token,
         wheel: &SweptWheel<'_>,
         cells: &mut Cells,
         mut take: impl FnMut(([usize; 2], u32)) -> bool,
     ) -> bool {
-        let near = self.compare(wheel, cells);
+        let near = self.compare::<T>(token, wheel, cells);
         let n = std::mem::take(&mut cells.n);
         let mut any = near.iter().fold(0, |any, near| any | near) & ((1 << n) - 1);
         let mut all = true;
@@ -256,34 +355,21 @@ impl HeightField {
     }
 
     /// Which pieces of cells a wheel may touch: for each kind a bit for each cell.
-    fn compare(&self, wheel: &SweptWheel<'_>, cells: &Cells) -> [u32; KINDS] {
-        match Instructions::of_this_machine() {
-            Instructions::Baseline => self.compare_with::<f64>(Single::Baseline, wheel, cells),
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(token) => self.compare_with::<Fours>(token, wheel, cells),
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512(token) => self.compare_with::<Eights>(token, wheel, cells),
-        }
-    }
-
-    fn compare_with<T: Lane>(
+    #[inline(always)]
+    fn compare<T: Lane>(
         &self,
         token: T::Token,
         wheel: &SweptWheel<'_>,
         cells: &Cells,
     ) -> [u32; KINDS] {
-        inlined!(T::vectorize, token, {
-            let mut near = [0; KINDS];
-            let mut at = 0;
-            while at < cells.n {
-                let own = wheel.compare::<T>(token, self.spacing, (cells, at));
-                for kind in 0..KINDS {
-                    near[kind] |= own[kind].bits() << at;
-                }
-                at += T::LANES;
+        let mut near = [0; KINDS];
+        for at in (0..cells.n).step_by(T::LANES) {
+            let own = wheel.compare::<T>(token, self.spacing, (cells, at));
+            for kind in 0..KINDS {
+                near[kind] |= own[kind].bits() << at;
             }
-            near
-        })
+        }
+        near
     }
 }
 
