@@ -27,6 +27,9 @@ const MAX_TIPS: usize = 6;
 /// Twice as far finds more pieces, which every step examines, and searches half as often.
 const AHEAD: [f64; 2] = [0.08, 0.0];
 
+/// How far before a wheel that rolls on a search is made, as a share of how far it may move.
+const FORTH: f64 = 0.8;
+
 /// How deep the rim may be in the ground, in radii, for its contacts to be those of the kept
 /// pieces: a search finds no more than that beside it.
 const DEEP: f64 = 0.02;
@@ -173,17 +176,40 @@ impl<T: Lane> Pieces<T> {
         lanes & !T::mask(rim.reach.token(), others)
     }
 
-    /// Searches the ground of one lane. False where there are too many pieces, or it is too steep.
+    /// Searches the ground of one lane, about a place to which the wheel rolls on if that may do.
+    /// False where there are too many pieces, or it is too steep.
     #[cold]
     fn search(&mut self, lane: usize, terrain: &dyn Terrain, rim: &LaneDisc<T>) -> bool {
+        let centre = Vector3::from(rim.centre.get(lane));
+        let way = centre - Vector3::from(self.from.get(lane));
+        let (length, moves) = (way.norm(), self.moves.get(lane));
+        // One that has turned, or jumped, does not roll on.
+        let rolls_on = moves > 0.0 && length > 0.5 * moves && length < 2.0 * moves;
+        let ahead = centre + way * (FORTH * moves / length);
+        (rolls_on && self.search_about(lane, terrain, rim, ahead))
+            || self.search_about(lane, terrain, rim, centre)
+    }
+
+    /// Searches the ground of one lane about a place from which its wheel is not too far.
+    fn search_about(
+        &mut self,
+        lane: usize,
+        terrain: &dyn Terrain,
+        rim: &LaneDisc<T>,
+        place: Vector3<f64>,
+    ) -> bool {
         let disc = Disc {
-            centre: rim.centre.get(lane).into(),
+            centre: place,
             axle: rim.axle.get(lane).into(),
             spoke: Vector3::zeros(),
             radius: rim.radius,
         };
+        let off = (place - Vector3::from(rim.centre.get(lane))).norm();
         let reach = rim.reach.get(lane) + 2.0 * ROUNDING;
         AHEAD.iter().any(|&ahead| {
+            if off > ahead {
+                return false;
+            }
             let mut found = [None; MAX_FACES + MAX_EDGES + MAX_TIPS];
             let mut n = 0;
             let moves = terrain.visit_ahead((&disc, rim.rounding), [reach, ahead], &mut |piece| {
@@ -192,7 +218,9 @@ impl<T: Lane> Pieces<T> {
                 }
                 n += 1;
             });
-            let Some(moves) = moves else { return false };
+            let Some(moves) = moves.filter(|moves| off <= moves - ROUNDING) else {
+                return false;
+            };
             let fits = (found.get(..n)).is_some_and(|found| self.keep(lane, found));
             if fits {
                 self.from.set(lane, disc.centre.into());
