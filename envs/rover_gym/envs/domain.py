@@ -5,7 +5,7 @@ generator and before the scene, because the rover must be known to place it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,9 @@ OF_MODEL = ("mass_centre_offset", "wheel_radius_scale", *OF_MOTORS)
 
 #: Properties of the way from an action to the motors.
 OF_COMMANDS = ("command_delay", "torque_dead_zone", "steering_backlash_deg")
+
+#: Groups of properties of the ground, which several rovers share.
+OF_GROUND = ("soil_scale", "material_friction")
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,12 @@ class DomainDistribution:
         }
 
     @property
+    def of_rover(self) -> "DomainDistribution":
+        """The distribution without the properties of the ground."""
+        own = {name: one for name, one in self.further.items() if name.partition(".")[0] not in OF_GROUND}
+        return replace(self, further=own)
+
+    @property
     def is_of_core(self) -> bool:
         """Whether the core can draw everything."""
         return not self.further and all(isinstance(own, Uniform) for own in self.core.values())
@@ -164,7 +173,7 @@ def domain_distribution(given: Mapping[str, Any], rover: RoverModel, soils: tupl
         for name, neutral in NEUTRAL.items()
         if given[name].support != (neutral, neutral)
     }
-    for group in ("soil_scale", "material_friction"):
+    for group in OF_GROUND:
         further |= {f"{group}.{name}": (own, ()) for name, own in (given[group] or {}).items()}
     _check_motors(rover, further)
     _check_soils(soils, further)

@@ -98,7 +98,7 @@ class Task:
         model = domain.model_of(self.model)
         if domain.mass_scale != 1.0:
             model = model.replace(mass_scale=domain.mass_scale)
-        options = self._options(model, domain) | {"friction": domain.friction}
+        options = self.options_of(model, domain) | {"friction": domain.friction}
         if domain.gravity_scale != 1.0:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
@@ -111,12 +111,12 @@ class Task:
             ranges: Those that the core draws.
         """
         model = domain.model_of(self.model)
-        simulation = Simulation(model, Plane(), **self._options(model, domain))
+        simulation = Simulation(model, Plane(), **self.options_of(model, domain))
         scenes = dict(self.scenes, sand=_sand(domain.soils_of(self.soils)))
         return EpisodeDistribution(self.rules, simulation, domain=ranges, **scenes)
 
-    def _options(self, model: RoverModel, domain: Domain) -> dict[str, Any]:
-        """Keyword arguments of `Simulation` with the frictions of materials."""
+    def options_of(self, model: RoverModel, domain: Domain) -> dict[str, Any]:
+        """Keyword arguments of `Simulation` for a model, with the frictions of materials."""
         materials = domain.materials_of(model, self.simulation_options["restitution"])
         return dict(self.simulation_options, **({"materials": materials} if materials else {}))
 
