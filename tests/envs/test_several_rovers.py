@@ -60,7 +60,7 @@ def facing(gap: float, **arguments) -> RoverParallelEnv:
         {"slope_deg": 5.0, "height_scan": True},
         {"waypoints": 3, "goal_distance": 0.6, "goal_tolerance": 0.3, "battery": 4000.0},
         {"model": "skid-steered", "goal_distance": 1.0},
-        {"command_delay": 2, "torque_dead_zone": 0.2, "steering_backlash_deg": 8.0},
+        {"command_delay": 2, "torque_dead_zone": 0.2, "steering_backlash_deg": 8.0, "observation_bias": 0.1},
     ],
     ids=["scan", "course", "goal", "faults"],
 )
@@ -106,7 +106,10 @@ def assert_alike(info, known):
         if name == "solver":
             assert info[name].keys() == value.keys()
         elif isinstance(value, dict):
-            assert info[name] == pytest.approx(value, abs=1e-6), name
+            assert info[name].keys() == value.keys()
+            assert_alike(info[name], value)
+        elif isinstance(value, np.ndarray):
+            np.testing.assert_allclose(info[name], value, atol=1e-6)
         else:
             assert info[name] == (pytest.approx(value, rel=1e-5, abs=1e-6) if isinstance(value, float) else value), name
 

@@ -169,6 +169,8 @@ class RoverBatch:
             for name, (_, size) in self.task.domain.further.items()
         }
         self._faults = CommandFaults.of(self.n, self.task)
+        #: Entries of the observation that a bias acts on.
+        self._measured = np.flatnonzero(layout.unbounded)
         #: Entries of the last action of each rover that were clipped to [-1, 1].
         self._clipped = np.zeros(self.n, np.int64)
         #: Generators of the rovers before their first episodes; afterwards the core has them.
@@ -211,7 +213,7 @@ class RoverBatch:
     @property
     def observation(self) -> Observations:
         """`(n, size) float32` copy of the last observations."""
-        return self._with_sent(self.episodes.observations(), slice(None))
+        return self.seen(self.episodes.observations(), slice(None))
 
     def check_options(self, options: Mapping[str, Any] | None, field: str = "options") -> ResetOptions:
         """Checks reset options; `field` is their name in errors."""
@@ -352,7 +354,7 @@ class RoverBatch:
         with self._following_handed_out(self._handed_out if self.task.is_noisy else ()):
             stepped, actions, beyond = self._take(take, actions, moved)
         observation, rewards, terminated, truncated, infos = stepped
-        observation = self._with_sent(observation, slice(None))
+        observation = self.seen(observation, slice(None))
         self._over = np.flatnonzero(terminated | truncated).tolist()
         self._clipped[moved] = 0 if beyond is None else beyond[moved]
         if before is not None:
@@ -384,12 +386,16 @@ class RoverBatch:
         self._faults.keep(clipped, received, moved)
         return stepped, clipped, beyond
 
-    def _with_sent(self, observation: Observations, rovers: slice | int) -> Observations:
-        """Sets the previous actions of observations to what the rovers were sent, not what the motors received."""
+    def seen(self, observation: Observations, rovers: slice | int) -> Observations:
+        """What rovers see of observations of the core: biased, and with what they sent as previous actions."""
         if self._faults is not None:
             layout = self.task.layout
             place = layout["previous_action"]
             observation[..., place] = self._faults.last_sent[rovers] / layout.scale[place]
+        bias = self._drawn.get("observation_bias")
+        if bias is not None:
+            observation = observation.copy()
+            observation[..., self._measured] += bias[rovers]
         return observation
 
     @contextmanager
@@ -687,7 +693,7 @@ class RoverBatch:
             ResetNeeded: The rover has not been reset.
         """
         self.check_begun(i)
-        return self._with_sent(self.episodes.complete(i), i)
+        return self.seen(self.episodes.complete(i), i)
 
     def check_begun(self, i: int) -> None:
         """Refuses a rover that has not been reset.

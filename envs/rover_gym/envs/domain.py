@@ -37,6 +37,7 @@ NEUTRAL = {
     "command_delay": 0.0,
     "torque_dead_zone": 0.0,
     "steering_backlash_deg": 0.0,
+    "observation_bias": 0.0,
 }
 
 #: Properties of the motors, by the field of `Motor` that they scale.
@@ -159,14 +160,22 @@ class DomainDistribution:
         return ranges, further
 
 
-def domain_distribution(given: Mapping[str, Any], rover: RoverModel, soils: tuple[Soil, ...]) -> DomainDistribution:
+def domain_distribution(
+    given: Mapping[str, Any], rover: RoverModel, soils: tuple[Soil, ...], n_measured: int
+) -> DomainDistribution:
     """What checked arguments draw the properties from.
+
+    Args:
+        given: The arguments.
+        rover: The rover.
+        soils: Soils of the sand; none on firm ground.
+        n_measured: Entries of the observation that noise and bias act on.
 
     Raises:
         OptionError: A property does not fit rover or ground; `field` names it.
     """
     sizes: dict[str, Size] = dict.fromkeys(NEUTRAL, ())
-    sizes["mass_centre_offset"] = (3,)
+    sizes |= {"mass_centre_offset": (3,), "observation_bias": (n_measured,)}
     sizes |= dict.fromkeys(("wheel_radius_scale", *OF_MOTORS), (len(rover.wheel_names),))
     further: dict[str, tuple[Distribution, Size]] = {
         name: (given[name], sizes[name])

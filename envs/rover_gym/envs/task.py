@@ -138,8 +138,12 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     start = _start(given, ground)
     substeps = _substeps(given["control_frequency"], step)
     rover = _rover(given["model"], steered=given["steered"], on_sand=sand is not None)
-    domain = domain_distribution(given, rover, soils)
     steering = Steering.of(rover)
+    points = None if given["height_scan"] is None else given["height_scan"].offsets
+    max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
+    rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
+    layout = ObservationLayout(rules)
+    domain = domain_distribution(given, rover, soils, layout.unbounded.sum().astype(int).item())
     options = {
         "gravity": gravity,
         "friction": domain.ranges["friction"][0],
@@ -148,9 +152,6 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         **(given["solver_options"] or {}),
     }
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
-    points = None if given["height_scan"] is None else given["height_scan"].offsets
-    max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
     scenes: dict[str, Any] = {
         "start": start,
         "trunk_load_limit": TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
@@ -177,7 +178,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         dt=substeps * step,
         simulation_options=options,
         max_steering=max_steering,
-        layout=ObservationLayout(rules),
+        layout=layout,
         reward_terms=given["reward_terms"] or {},
         rules=rules,
         domain=domain,

@@ -169,6 +169,7 @@ class JoinedEpisode:
         values = np.concatenate([*parts, reading.heights]) / layout.scale
         if self.task.is_noisy:
             values += rules["noise"] * layout.unbounded * normals
+        values[layout.unbounded > 0.0] += self.scene.domain.further.get("observation_bias", 0.0)
         with np.errstate(over="ignore"):
             return values.astype(np.float32)
 

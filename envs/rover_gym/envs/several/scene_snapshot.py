@@ -17,7 +17,12 @@ from rover_gym.envs.several.joined_scene import Team
 from rover_gym.envs.task import Task
 
 #: Parts of a snapshot that have an entry for each rover, by the types of their entries.
-PER_ROVER: dict[str, Any] = {"rovers": EpisodeScene, "episodes": Mapping, "commands": (Mapping, type(None)), "live": bool}
+PER_ROVER: dict[str, Any] = {
+    "rovers": EpisodeScene,
+    "episodes": Mapping,
+    "commands": (Mapping, type(None)),
+    "live": bool,
+}
 
 
 @dataclass(frozen=True)

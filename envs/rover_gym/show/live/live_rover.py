@@ -234,7 +234,7 @@ class LiveRover:
             return
         self._spent = {name: self.info[name] + joules for name, joules in work.items()}
         self.info = {**leg.info(), **self._spent}
-        self._wheel = replace(self._wheel, seen=leg.observation)
+        self._wheel = replace(self._wheel, seen=env.batch.seen(leg.observation, env.i))
         if self.info["distance_to_goal"] <= env.goal_tolerance:
             self._turn_back()
         elif row[places["cos_tilt"]][0] < rules["cos_max_tilt"]:
