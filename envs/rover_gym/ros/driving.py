@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rover_gym.core import RoverModel, Simulation
+    from rover_gym.drive.commands.wheel_kinematics import WheelCommands
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,9 @@ class Driving:
     """
 
     def __init__(self, model: RoverModel) -> None:
-        self._kinematics, self._model = WheelKinematics(model), model
+        self._kinematics = WheelKinematics(model)
+        #: The commands of a twist, which is sent again in every control period.
+        self._commands = lru_cache(maxsize=1)(self._commands_of)
         self._wheels = [model.dof_names[i] for i in model.wheel_joint_indices]
         self._steering = [model.dof_names[i] for i in self._kinematics.steering.joints]
         described = model.to_dict()["wheels"]
@@ -86,7 +90,8 @@ class Driving:
     def send(self, simulation: Simulation, command: Command) -> None:
         """Commands a simulation of the rover; the command has been checked."""
         if isinstance(command, TwistCommand):
-            self._kinematics.drive(simulation, command.forward, command.turn, command.left)
+            commands = self._commands(command)
+            simulation.set_wheel_speeds(commands.speeds, commands.set_points)
             return
         joints = np.array([[command.angles.get(name, 0.0) for name in self._steering]])
         angles = self._kinematics.wheel_angles(joints)[0].clip(-self._limits, self._limits)
@@ -96,6 +101,9 @@ class Driving:
             simulation.set_commands(values, angles)
         else:
             simulation.set_wheel_speeds(values, angles)
+
+    def _commands_of(self, twist: TwistCommand) -> WheelCommands:
+        return self._kinematics.commands(twist.forward, twist.turn, twist.left)
 
 
 def _finite(name: str, value: float) -> None:
