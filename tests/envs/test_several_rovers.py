@@ -483,6 +483,16 @@ def test_rovers_that_are_driven_by_commands_hold_them_until_they_end():
     assert refused.value.field == "env"
 
 
+def test_rovers_that_are_driven_by_commands_go_on_from_a_snapshot():
+    env = DriveRoversByCommand(rover_gym.parallel_env(2, command_delay=1), repeat=2)
+    env.reset(seed=0)
+    snapshot = env.snapshot()
+    commands = {"rover_0": np.array([1.0, 0.5, 0.0]), "rover_1": np.array([-1.0, 0.0, 0.5])}
+    went = [env.step(commands)[0] for _ in range(2)]
+    env.restore(snapshot)
+    assert bits([env.step(commands)[0] for _ in range(2)]) == bits(went)
+
+
 def test_the_card_lists_the_arguments():
     listed = dict(re.findall(r"^\s*\| (\w+) +\| (\S+) ", RoverParallelEnv.__doc__, flags=re.MULTILINE))
     signature = inspect.signature(RoverParallelEnv.__init__).parameters
