@@ -73,11 +73,18 @@ def live_source(scene: LiveScene | None = None, frequency: float = FREQUENCY, **
 
 
 def node_of(
-    scene: LiveScene | None = None, *, tell: Callable[[str], None] = lambda _text: None, **options: Any
+    scene: LiveScene | None = None,
+    *,
+    tell: Callable[[str], None] = lambda _text: None,
+    grounds: Mapping[str, Any] | None = None,
+    models: Mapping[str, Any] | None = None,
+    **options: Any,
 ) -> tuple[RosNode, KeptTransport]:
-    """A node of a rover in a scene."""
+    """A node of a rover in a scene, whose ground and model may be given by name."""
+    given = {"grounds": grounds, "models": models}
+    source = live_source(scene, **{name: own for name, own in given.items() if own is not None})
     transport = KeptTransport()
-    return RosNode(live_source(scene), transport, options=NodeOptions(pace=0.0, **options), tell=tell), transport
+    return RosNode(source, transport, options=NodeOptions(pace=0.0, **options), tell=tell), transport
 
 
 def drive(

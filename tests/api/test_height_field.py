@@ -27,7 +27,7 @@ from rover_gym.core import (
     Union,
 )
 from rover_gym.envs.arguments import check_terrain
-from rover_gym.ground.maps import read_map
+from rover_gym.ground.maps import patched_map, read_map
 
 #: Corners of a cube and its triangles.
 CUBE = (
@@ -544,3 +544,31 @@ def test_the_gap_of_a_tilted_wheel_in_the_air_does_not_jump_over_steep_ground() 
             assert np.abs(np.diff(gaps[:, in_the_air], axis=0)).max(initial=0.0) < 3.0 * shares[1]
             compared += int(in_the_air.sum())
     assert compared > 300
+
+
+def test_a_map_is_driven_on_as_before_when_it_is_cut_into_patches() -> None:
+    ground = HeightField.fractal(30.0, 0.25, 0.1, seed=2)
+    patches = patched_map(ground, 4, 3)
+    assert [patch.material for patch in patches.parts][:4] == ["patch_0_0", "patch_0_1", "patch_0_2", "patch_1_0"]
+    ends = []
+    for terrain in (ground, patches):
+        simulation = standing(terrain=terrain)
+        simulation.set_wheel_speeds([8.0] * 6)
+        for _ in range(12):
+            assert simulation.step(100).is_converged
+        ends.append(simulation.q)
+    assert ends[0][0] > 4.0, "it has crossed an edge"
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-9)
+
+
+def test_patches_without_ground_are_left_out_and_bad_ones_refused() -> None:
+    heights = np.zeros((9, 9))
+    heights[:5, :5] = np.nan
+    ground = HeightField(heights, 1.0)
+    assert [patch.material for patch in patched_map(ground, 2, 2).parts] == ["patch_0_1", "patch_1_0", "patch_1_1"]
+    with refused(OptionError, "columns"):
+        patched_map(ground, 2, 0)
+    with refused(TerrainError, "rows", "8"):
+        patched_map(ground, 9, 2)
+    with refused(OptionError, "ground"):
+        patched_map(heights, 2, 2)  # type: ignore[arg-type]

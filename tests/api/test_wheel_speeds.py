@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from machines import FOUR, machine
+from machines import FOUR, machine, mecanum
 from rovers import standing
 
 from rover_gym import Plane, RoverModel, Simulation
@@ -17,13 +17,6 @@ GALLERY = ("rover", "four-steered", "skid-steered", "open-rover", "mars-rover")
 
 def gallery(name: str) -> RoverModel:
     return RoverModel() if name == "rover" else RoverModel.named(name)
-
-
-def mecanum() -> RoverModel:
-    description = machine("platform", FOUR).to_dict()
-    for wheel, angle in zip(description["wheels"], (45.0, -45.0, -45.0, 45.0), strict=True):
-        wheel["rollers"] = math.radians(angle)
-    return RoverModel.from_dict(description)
 
 
 def twist_of(sim: Simulation, x_c: float) -> np.ndarray:
@@ -106,6 +99,16 @@ def test_a_twist_beyond_the_machine_is_reduced_by_the_rule():
     many = WheelKinematics(RoverModel()).commands(np.linspace(-1.0, 1.0, 7), 0.1)
     assert many.speeds.shape == many.set_points.shape == (7, 6)
     np.testing.assert_array_equal(many.speeds[2], steered.commands(np.linspace(-1.0, 1.0, 7)[2], 0.1).speeds)
+
+
+@pytest.mark.parametrize("name", [*GALLERY, "mecanum"])
+def test_the_twist_of_the_wheels_is_the_one_that_commanded_them(name):
+    model = mecanum() if name == "mecanum" else gallery(name)
+    kinematics = WheelKinematics(model)
+    asked = kinematics.commands(0.15, 0.05, 0.04)
+    joints = [asked.set_points[own[0]] for own in kinematics.steering.wheels]
+    found = kinematics.twist(asked.speeds, joints)
+    np.testing.assert_allclose(found, [asked.forward, asked.left, asked.yaw_rate], atol=1e-9)
 
 
 def test_the_skid_turn_is_that_of_a_rectangle_and_of_a_differential_drive():

@@ -37,6 +37,7 @@ ALL: dict[str, Any] = {
     "wheel_radius_scale": (0.95, 1.0),
     "stall_torque_scale": LogUniform(0.8, 1.25),
     "no_load_speed_scale": Normal(1.0, 0.05),
+    "observation_bias": Normal(0.0, 0.01),
     **COMMANDS,
 }
 
@@ -116,6 +117,7 @@ def test_neutral_values_are_off() -> None:
         "command_delay": 0,
         "torque_dead_zone": 0.0,
         "steering_backlash_deg": Normal(0.0, 0.0),
+        "observation_bias": 0,
         "soil_scale": {},
         "material_friction": None,
     }
@@ -190,6 +192,27 @@ def test_worn_wheels_stand_on_the_ground_and_roll_as_far_as_their_radius() -> No
         turned = abs(env.simulation.q[env.model.wheel_joint_indices] - angle).mean()
         ways.append((env.simulation.q[0] - start) / turned)
     assert ways == pytest.approx([0.1, 0.08], rel=0.02)
+
+
+def test_an_observation_is_biased_by_what_was_drawn_in_every_period_of_an_episode() -> None:
+    arguments: dict[str, Any] = {"height_scan": True, "terrain": "rocks"}
+    biased, plain = RoverEnv(observation_bias=Normal(0.0, 0.1), **arguments), RoverEnv(**arguments)
+    seen, info = biased.reset(seed=0)
+    measured = biased.observation_layout.unbounded > 0.0
+    bias = info["domain"]["observation_bias"]
+    assert bias.shape == (measured.sum(),)
+    assert bias.std() == pytest.approx(0.1, rel=0.2)
+    scene = biased.scene
+    start = {"position": scene.start.position, "heading_deg": np.degrees(scene.start.heading), "goal": scene.start.goal}
+    ground = {"slope_deg": np.degrees(scene.start.slope), "uphill_deg": np.degrees(scene.start.uphill)}
+    rocks = {"difficulty": scene.difficulty, "field_seed": scene.rocks.seed}  # type: ignore[union-attr]
+    exact, _ = plain.reset(seed=0, options={**start, **ground, **rocks})
+    for period in range(4):
+        np.testing.assert_allclose((seen - exact)[measured], bias, atol=1e-5)
+        np.testing.assert_array_equal(seen[~measured], exact[~measured])
+        np.testing.assert_array_equal(biased.complete_observation(), seen)
+        seen, exact = biased.step(push(0.2 * period))[0], plain.step(push(0.2 * period))[0]
+    assert not np.array_equal(biased.reset()[1]["domain"]["observation_bias"], bias)
 
 
 def test_a_patch_of_ground_has_a_friction_of_its_own() -> None:

@@ -15,7 +15,7 @@ from refusals import refused
 from rovers import placed
 
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField, StateError
-from rover_gym.core.rotations import rotation_matrix, rotation_vector
+from rover_gym.core.rotations import rotation_matrix, rotation_vector, turned
 from rover_gym.envs.sensors import (
     ColourCamera,
     DepthCamera,
@@ -422,3 +422,9 @@ def test_bad_input_is_refused_by_name(make: Callable[[], Any], field: str) -> No
 def test_a_mount_takes_solid_and_position_by_their_places() -> None:
     """`Mount(solid, position)`, as one would write it, was a TypeError."""
     assert Mount("trunk", (0.1, 0.2, 0.0)) == Mount(solid="trunk", position=(0.1, 0.2, 0.0))
+
+
+def test_vectors_are_turned_as_by_a_product_of_matrices() -> None:
+    vectors = np.random.default_rng(0).normal(size=(50, 3))
+    R = rotation_matrix([0.3, -1.2, 0.5])
+    np.testing.assert_allclose(turned(R, vectors), vectors @ R.T, rtol=1e-14, atol=1e-15)

@@ -21,10 +21,11 @@ from rover_gym.learn.command_vec_env import CommandVecEnv
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_each_scene_is_the_parallel_environment_of_its_seed(threads):
-    venv = RoversVecEnv(2, 2, terrain="rocks", height_scan=True, threads=threads)
+    arguments = {"terrain": "rocks", "height_scan": True, "command_delay": (0, 3), "steering_backlash_deg": (0.0, 6.0)}
+    venv = RoversVecEnv(2, 2, threads=threads, **arguments)
     venv.seed(7)
     seen = venv.reset()
-    scenes = [rover_gym.parallel_env(2, terrain="rocks", height_scan=True) for _ in range(2)]
+    scenes = [rover_gym.parallel_env(2, **arguments) for _ in range(2)]
     first = [env.reset(seed=7 + 2 * s)[0] for s, env in enumerate(scenes)]
     np.testing.assert_array_equal(seen, [one[a] for one in first for a in one])
     random = np.random.default_rng(0)

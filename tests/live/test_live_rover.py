@@ -1,9 +1,11 @@
 """The rover of a live drive: what changes under it, what is refused, and the past, which returns bit for bit."""
 
+import math
+
 import numpy as np
 import pytest
 
-from rover_gym import HeightField
+from rover_gym import HeightField, Plane
 from rover_gym.core import OptionError, TerrainError
 from rover_gym.ground.terrain_parts import spheres_of
 from rover_gym.show.live import LiveChoices, LiveRover, LiveScene
@@ -223,3 +225,43 @@ def test_a_rover_that_has_rolled_over_stays_until_it_goes_back() -> None:
     assert rover.ended == ""
     driven(rover, 20)
     assert speed(rover) > 0.5
+
+
+def hold(rover: LiveRover, speed: float) -> float:
+    """Holds the wheels at a speed for a control period, m/s, and returns the work of their drives, J."""
+    radii = rover.env.model.wheel_radii
+    rover.follow(lambda simulation: simulation.set_wheel_speeds(speed / radii))
+    simulation = rover.env.simulation
+    return float(simulation.reading((0.0, 0.0), None)[simulation.reading_layout(0)["work"]][0])
+
+
+def test_commands_of_the_simulation_count_as_energy_and_reach_the_goal() -> None:
+    rover = LiveRover(LiveScene(goal_distance=2.0), LiveChoices(arguments={"goal_bearing_deg": 0.0}))
+    start, work = rover.env.start.position, 0.0
+    while not rover.goals_reached:
+        work += hold(rover, 1.0)
+        assert rover.time < 3.0
+    assert rover.info["energy"] == pytest.approx(work)
+    assert rover.env.goal == start
+    driven(rover, 1, 0.0)
+    assert rover.info["energy"] > work
+    assert rover.ended == ""
+
+
+def test_commands_of_the_simulation_end_the_drive_where_the_rover_rolls_over() -> None:
+    hill = {"hill": Plane.tilted(math.radians(8.0), 0.0)}
+    rover = LiveRover(LiveScene(ground="hill"), LiveChoices(hill, arguments={"max_tilt_deg": 5.0}))
+    hold(rover, 0.0)
+    assert rover.ended == "roll_over"
+    time = rover.time
+    hold(rover, 0.0)
+    assert rover.time == time
+
+
+def test_a_policy_goes_on_where_commands_have_left_the_rover() -> None:
+    rover = LiveRover(LiveScene(driver="pd"))
+    for _ in range(40):
+        hold(rover, -0.5)
+    before = rover.info["distance_to_goal"]
+    driven(rover, 60)
+    assert rover.info["distance_to_goal"] < before - 0.5

@@ -1,5 +1,6 @@
 """Rovers of other builds: four and eight wheels, with skid steering, two or four steered wheels, or a steered axle."""
 
+import math
 from typing import Any
 
 from rover_gym import RoverModel
@@ -54,6 +55,14 @@ def axle() -> RoverModel:
     for solid in described["solids"]:
         if solid["name"] in ("wheel_FL", "wheel_FR"):
             solid |= {"parent": "axle", "position": [0.0, 0.0, solid["position"][2]]}
+    return RoverModel.from_dict(described)
+
+
+def mecanum() -> RoverModel:
+    """Four wheels with rollers at 45 degrees."""
+    described = machine("platform", FOUR).to_dict()
+    for wheel, angle in zip(described["wheels"], (45.0, -45.0, -45.0, 45.0), strict=True):
+        wheel["rollers"] = math.radians(angle)
     return RoverModel.from_dict(described)
 
 

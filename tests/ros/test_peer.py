@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 import rover_gym
 
@@ -86,6 +87,43 @@ def check(found: dict[str, Any]) -> None:
 
 
 LONG = pytest.mark.takes_long("two processes that import NumPy and one that simulates, over the network")
+
+
+#: Prints the parameters of nodes as ROS reads them from a file.
+PARAMETERS = """
+import json, sys, rclpy
+from rclpy.node import Node
+rclpy.init(args=["--ros-args", "--params-file", sys.argv[1]])
+for name, namespace in json.loads(sys.argv[2]):
+    node = Node(name, namespace=namespace, automatically_declare_parameters_from_overrides=True)
+    print(json.dumps({key: one.value for key, one in node.get_parameters_by_prefix("").items()}))
+"""
+
+
+@needs_peer
+@LONG
+def test_ros_reads_the_parameters_of_nav2() -> None:
+    file = PROGRAM.parents[2] / "docs" / "ros" / "nav2.yaml"
+    written = yaml.safe_load(file.read_text(encoding="utf-8"))
+    nodes = [(name, name if name in part else "") for name, part in written.items()]
+    command = [str(PEER), "-c", PARAMETERS, str(file), json.dumps(nodes)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for line, (name, part) in zip(done.stdout.splitlines(), written.items(), strict=True):
+        own, read = part.get(name, part)["ros__parameters"], json.loads(line)
+        assert read.items() >= dict(flat(own)).items()
+        for kind in ("planner", "controller", "goal_checker", "progress_checker", "behavior", ""):
+            for plugin in own.get(f"{kind}_plugins".lstrip("_"), []):
+                assert "::" in read[f"{plugin}.plugin"]
+
+
+def flat(tree: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """The leaves of a tree by their names with dots."""
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from flat(value, f"{above}{name}.")
+        else:
+            yield above + name, value
 
 
 @needs_peer

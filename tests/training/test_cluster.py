@@ -69,3 +69,24 @@ def test_the_page_holds_on_two_nodes_though_workers_are_lost(tmp_path: Path) -> 
     note(word for line in done.stdout.splitlines() if line.startswith("$ python ") for word in line.split())
     # Ray tells of lost workers too, in lines that begin otherwise.
     assert sum(line.startswith("killed ") for line in done.stdout.splitlines()) == 2
+
+
+@pytest.mark.nightly(
+    "tests/envs/test_several_rovers.py::test_rovers_that_are_driven_by_commands_hold_them_until_they_end"
+)
+@pytest.mark.timeout(1800)  # two minutes on two busy cores
+def test_rovers_of_a_scene_train_the_policy_that_they_share_and_go_on(tmp_path: Path) -> None:
+    if not RAY.is_file():
+        pytest.skip(f"{RAY} is not there: make ray")
+    scene = ["--rovers", "3", "--rocks", "--workers", "1", "--envs", "2", "--batch", "256"]
+    for further, expected in ((["2"], 2), (["3", "--resume"], 1)):
+        command = [RAY, EXAMPLE, *scene, "--output", tmp_path, "--iterations", *further]
+        for _ in range(5):  # Ray gives up its own start on a busy machine
+            done = subprocess.run(command, check=False, capture_output=True, text=True)
+            if "timed out during startup" not in done.stderr:
+                break
+        assert done.returncode == 0, done.stdout + done.stderr[-3000:]
+        lines = [line for line in done.stdout.splitlines() if line.startswith("iteration ")]
+        assert lines[-1].startswith(f"iteration {further[0]}: ")
+        assert lines[-1].endswith("1 workers")
+        assert len(lines) == expected, "it goes on where it ended"

@@ -8,6 +8,7 @@
 Needs the extra `rllib`, which pins its own Gymnasium: use a separate virtual environment (`make train-rllib`).
 """
 
+import math
 import shutil
 from pathlib import Path
 from typing import Any
@@ -118,9 +119,10 @@ def train(
         rate = found["num_env_steps_sampled"] / seconds
         alive = algorithm.env_runner_group.num_healthy_remote_workers()
         keep(algorithm, checkpoint)
+        mean = found.get(EPISODE_RETURN_MEAN, math.nan)  # missing at first, and nan where no episode has ended
+        outcome = f"return {mean:.2f}" if math.isfinite(mean) else "no episode has ended"
         typer.echo(
-            f"iteration {algorithm.iteration}: return {found.get(EPISODE_RETURN_MEAN)}, {rate:.0f} decisions/s"
-            f" while sampling, {alive} workers"
+            f"iteration {algorithm.iteration}: {outcome}, {rate:.0f} decisions/s while sampling, {alive} workers"
         )
     algorithm.stop()
     ray.shutdown()

@@ -13,6 +13,19 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
+def turned(R: Array, vectors: Array) -> Array:
+    """Vectors (n, 3) turned by a rotation matrix (3, 3).
+
+    The bits are the same on every machine. A product of matrices starts the threads of NumPy's library from some
+    thousand vectors on, which take many times the processor time where other programs run.
+    """
+    x, y, z = vectors.T
+    result = np.empty((len(vectors), 3))
+    for i in range(3):
+        result[:, i] = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z
+    return result
+
+
 def quaternions(rotations: Array) -> Array:
     """Unit quaternions w, x, y, z of rotation matrices.
 

@@ -482,6 +482,14 @@ class RoverArguments(TypedDict, total=False):
             0.0, Number(at_least=0.0, at_most=MAX_DISTANCE), "standard deviation, in units of the observation's entries"
         ),
     ]
+    observation_bias: Annotated[
+        Quantity,
+        Argument(
+            0.0,
+            NumberOrDistribution(at_least=-MAX_DISTANCE, at_most=MAX_DISTANCE),
+            "constant error of each unbounded entry of the observation, in its units",
+        ),
+    ]
     control_frequency: Annotated[
         float, Argument(20.0, Number(above=0.0), "of actions; a whole number of physics steps a period", "Hz")
     ]

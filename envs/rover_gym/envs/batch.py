@@ -34,7 +34,6 @@ from rover_gym.core import (
 from rover_gym.core.validation import Range, refuse, whole
 from rover_gym.envs.arguments import RoverArguments, check_arguments, takes_arguments
 from rover_gym.envs.command_faults import CommandFaults
-from rover_gym.envs.domain import OF_COMMANDS
 from rover_gym.envs.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
 from rover_gym.envs.episode_scene import (
     EpisodeScene,
@@ -169,7 +168,9 @@ class RoverBatch:
             name: np.zeros((self.n, *size), np.int64 if name == "command_delay" else np.float64)
             for name, (_, size) in self.task.domain.further.items()
         }
-        self._faults = self._make_faults()
+        self._faults = CommandFaults.of(self.n, self.task)
+        #: Entries of the observation that a bias acts on.
+        self._measured = np.flatnonzero(layout.unbounded)
         #: Entries of the last action of each rover that were clipped to [-1, 1].
         self._clipped = np.zeros(self.n, np.int64)
         #: Generators of the rovers before their first episodes; afterwards the core has them.
@@ -195,14 +196,6 @@ class RoverBatch:
             self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=self._threads
         )
 
-    def _make_faults(self) -> CommandFaults | None:
-        """The faults between actions and motors; None without any."""
-        further, task = self.task.domain.further, self.task
-        if not further.keys() & set(OF_COMMANDS):
-            return None
-        longest = int(further["command_delay"][0].support[1]) if "command_delay" in further else 0
-        return CommandFaults(self.n, task.n_actions, len(task.model.wheel_names), longest)
-
     def __getstate__(self) -> dict[str, Any]:
         """Everything but what the core holds, and the snapshots of the rovers whose episodes have begun."""
         begun = np.flatnonzero(self._begun).tolist()
@@ -220,7 +213,7 @@ class RoverBatch:
     @property
     def observation(self) -> Observations:
         """`(n, size) float32` copy of the last observations."""
-        return self._with_sent(self.episodes.observations(), slice(None))
+        return self.seen(self.episodes.observations(), slice(None))
 
     def check_options(self, options: Mapping[str, Any] | None, field: str = "options") -> ResetOptions:
         """Checks reset options; `field` is their name in errors."""
@@ -361,7 +354,7 @@ class RoverBatch:
         with self._following_handed_out(self._handed_out if self.task.is_noisy else ()):
             stepped, actions, beyond = self._take(take, actions, moved)
         observation, rewards, terminated, truncated, infos = stepped
-        observation = self._with_sent(observation, slice(None))
+        observation = self.seen(observation, slice(None))
         self._over = np.flatnonzero(terminated | truncated).tolist()
         self._clipped[moved] = 0 if beyond is None else beyond[moved]
         if before is not None:
@@ -388,23 +381,21 @@ class RoverBatch:
                 return take(clipped), clipped, beyond
         given = check_actions(actions, (self.n, self.task.n_actions))
         beyond, clipped = (np.abs(given) > 1.0).sum(axis=1), np.clip(given, -1.0, 1.0)
-        none = np.zeros(self.n)
-        received = self._faults.received(
-            clipped,
-            self._drawn.get("command_delay", none.astype(np.int64)),
-            self._drawn.get("torque_dead_zone", none),
-            np.radians(self._drawn.get("steering_backlash_deg", none)) / (self.task.max_steering or 1.0),
-        )
+        received = self._faults.received(clipped, self._drawn)
         stepped = take(received)
         self._faults.keep(clipped, received, moved)
         return stepped, clipped, beyond
 
-    def _with_sent(self, observation: Observations, rovers: slice | int) -> Observations:
-        """Sets the previous actions of observations to what the rovers were sent, not what the motors received."""
+    def seen(self, observation: Observations, rovers: slice | int) -> Observations:
+        """What rovers see of observations of the core: biased, and with what they sent as previous actions."""
         if self._faults is not None:
             layout = self.task.layout
             place = layout["previous_action"]
             observation[..., place] = self._faults.last_sent[rovers] / layout.scale[place]
+        bias = self._drawn.get("observation_bias")
+        if bias is not None:
+            observation = observation.copy()
+            observation[..., self._measured] += bias[rovers]
         return observation
 
     @contextmanager
@@ -702,7 +693,7 @@ class RoverBatch:
             ResetNeeded: The rover has not been reset.
         """
         self.check_begun(i)
-        return self._with_sent(self.episodes.complete(i), i)
+        return self.seen(self.episodes.complete(i), i)
 
     def check_begun(self, i: int) -> None:
         """Refuses a rover that has not been reset.

@@ -1,13 +1,16 @@
 """Delay, dead zone and backlash between the actions of rovers and what their motors receive."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import StateError
 from rover_gym.core.validation import refuse
+from rover_gym.envs.domain import OF_COMMANDS
 from rover_gym.envs.observation import Array, Mask
+from rover_gym.envs.task import Task
 
 
 class CommandFaults:
@@ -20,19 +23,25 @@ class CommandFaults:
 
     Args:
         n: Number of rovers.
-        n_actions: Entries of an action: a torque for each wheel, then the set-points.
-        n_wheels: Torques among them.
-        longest: Greatest delay, control periods.
+        task: Their task.
 
     Attributes:
-        sent: `(n, max(longest, 1), n_actions)` actions of the last control periods, the latest first.
+        sent: `(n, max(longest delay, 1), n_actions)` actions of the last control periods, the latest first.
         set_points: `(n, n_actions - n_wheels)` set-points that the steering has.
     """
 
-    def __init__(self, n: int, n_actions: int, n_wheels: int, longest: int) -> None:
-        self.n_wheels = n_wheels
-        self.sent = np.zeros((n, max(longest, 1), n_actions))
-        self.set_points = np.zeros((n, n_actions - n_wheels))
+    def __init__(self, n: int, task: Task) -> None:
+        further = task.domain.further
+        longest = int(further["command_delay"][0].support[1]) if "command_delay" in further else 0
+        self.n_wheels = len(task.model.wheel_names)
+        self._max_steering = task.max_steering or 1.0
+        self.sent = np.zeros((n, max(longest, 1), task.n_actions))
+        self.set_points = np.zeros((n, task.n_actions - self.n_wheels))
+
+    @classmethod
+    def of(cls, n: int, task: Task) -> Self | None:
+        """The faults of a task; None without any."""
+        return cls(n, task) if task.domain.further.keys() & set(OF_COMMANDS) else None
 
     def begin(self, chosen: Sequence[int]) -> None:
         """Starts episodes: nothing is on its way, and the steering is straight."""
@@ -45,22 +54,20 @@ class CommandFaults:
         latest: Array = self.sent[:, 0]
         return latest
 
-    def received(
-        self, actions: Array, delay: npt.NDArray[np.int64], dead_zone: Array, backlash: Array
-    ) -> npt.NDArray[np.float64]:
+    def received(self, actions: Array, drawn: Mapping[str, npt.NDArray[Any]]) -> npt.NDArray[np.float64]:
         """What the motors receive in the coming control period, `(n, n_actions)`; nothing changes until `keep`.
 
         Args:
             actions: Within [-1, 1], `(n, n_actions)`.
-            delay: Control periods, `(n,)`.
-            dead_zone: Least torque that is delivered, as an entry of the action, `(n,)`.
-            backlash: Play of the set-points, as an entry of the action, `(n,)`.
+            drawn: Properties of the rovers, by argument, `(n,)`; those that are missing are neutral.
         """
+        none = np.zeros(len(actions))
+        delay = drawn.get("command_delay", none).astype(np.int64)
+        play = 0.5 * np.radians(drawn.get("steering_backlash_deg", none))[:, None] / self._max_steering
         way = np.concatenate([actions[:, None], self.sent], axis=1)
         arrived: Array = way[np.arange(len(way)), delay]
         torques, set_points = arrived[:, : self.n_wheels], arrived[:, self.n_wheels :]
-        torques[np.abs(torques) < dead_zone[:, None]] = 0.0
-        play = 0.5 * backlash[:, None]
+        torques[np.abs(torques) < drawn.get("torque_dead_zone", none)[:, None]] = 0.0
         set_points[:] = np.clip(self.set_points, set_points - play, set_points + play)
         return arrived
 

@@ -5,7 +5,7 @@ generator and before the scene, because the rover must be known to place it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ NEUTRAL = {
     "command_delay": 0.0,
     "torque_dead_zone": 0.0,
     "steering_backlash_deg": 0.0,
+    "observation_bias": 0.0,
 }
 
 #: Properties of the motors, by the field of `Motor` that they scale.
@@ -47,6 +48,9 @@ OF_MODEL = ("mass_centre_offset", "wheel_radius_scale", *OF_MOTORS)
 
 #: Properties of the way from an action to the motors.
 OF_COMMANDS = ("command_delay", "torque_dead_zone", "steering_backlash_deg")
+
+#: Groups of properties of the ground, which several rovers share.
+OF_GROUND = ("soil_scale", "material_friction")
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,12 @@ class DomainDistribution:
         }
 
     @property
+    def of_rover(self) -> "DomainDistribution":
+        """The distribution without the properties of the ground."""
+        own = {name: one for name, one in self.further.items() if name.partition(".")[0] not in OF_GROUND}
+        return replace(self, further=own)
+
+    @property
     def is_of_core(self) -> bool:
         """Whether the core can draw everything."""
         return not self.further and all(isinstance(own, Uniform) for own in self.core.values())
@@ -150,21 +160,29 @@ class DomainDistribution:
         return ranges, further
 
 
-def domain_distribution(given: Mapping[str, Any], rover: RoverModel, soils: tuple[Soil, ...]) -> DomainDistribution:
+def domain_distribution(
+    given: Mapping[str, Any], rover: RoverModel, soils: tuple[Soil, ...], n_measured: int
+) -> DomainDistribution:
     """What checked arguments draw the properties from.
+
+    Args:
+        given: The arguments.
+        rover: The rover.
+        soils: Soils of the sand; none on firm ground.
+        n_measured: Entries of the observation that noise and bias act on.
 
     Raises:
         OptionError: A property does not fit rover or ground; `field` names it.
     """
     sizes: dict[str, Size] = dict.fromkeys(NEUTRAL, ())
-    sizes["mass_centre_offset"] = (3,)
+    sizes |= {"mass_centre_offset": (3,), "observation_bias": (n_measured,)}
     sizes |= dict.fromkeys(("wheel_radius_scale", *OF_MOTORS), (len(rover.wheel_names),))
     further: dict[str, tuple[Distribution, Size]] = {
         name: (given[name], sizes[name])
         for name, neutral in NEUTRAL.items()
         if given[name].support != (neutral, neutral)
     }
-    for group in ("soil_scale", "material_friction"):
+    for group in OF_GROUND:
         further |= {f"{group}.{name}": (own, ()) for name, own in (given[group] or {}).items()}
     _check_motors(rover, further)
     _check_soils(soils, further)

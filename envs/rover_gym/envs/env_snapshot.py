@@ -72,7 +72,7 @@ def check_snapshot(task: Task, snapshot: object) -> EpisodeRun:
     if snapshot.terms.keys() != task.reward_terms.keys():
         reason = f"must have the terms {', '.join(task.reward_terms) or 'of the environment alone'}"
         refuse(StateError, "snapshot.terms", snapshot.terms, reason)
-    _check_further(task, snapshot.scene.domain.further)
+    check_further(task, snapshot.scene.domain.further)
     try:
         return EpisodeRun.from_bytes(task.rules, snapshot.progress)
     except RoverGymError as error:
@@ -80,9 +80,12 @@ def check_snapshot(task: Task, snapshot: object) -> EpisodeRun:
         refuse(StateError, "snapshot.progress", snapshot.progress, reason)
 
 
-def _check_further(task: Task, given: Mapping[str, Any]) -> None:
-    """Refuses properties other than those that the task draws."""
-    field = "snapshot.scene.domain"
+def check_further(task: Task, given: Mapping[str, Any], field: str = "snapshot.scene.domain") -> None:
+    """Refuses properties other than those that the task draws.
+
+    Raises:
+        StateError: There are others, or one has another shape; `field` is their name.
+    """
     drawn = task.domain.further
     if given.keys() != drawn.keys():
         refuse(StateError, field, list(given), f"must have the properties {', '.join(drawn) or 'of the core alone'}")

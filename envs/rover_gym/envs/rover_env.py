@@ -261,17 +261,18 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | material_friction     | contacts of the rover with parts of the ground             | material       |
     | soil_scale            | numbers of the sand, such as `cohesion`                    | number         |
     | gravity_scale         | gravity                                                    | episode        |
+    | observation_bias      | the entries of the observation that noise acts on          | entry          |
 
     `info["domain"]` has the episode's `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, and the others that
-    are given: numbers, or arrays with an entry for each axis or wheel. Soil and materials have names such as
+    are given: numbers, or arrays with an entry for each axis, wheel or entry. Soil and materials have names such as
     `soil_scale.cohesion` and `material_friction.rock`. With `sensors`, the info of `reset` also has their random
     properties, such as `imu.bias`. `distributions` describes what the properties are drawn from.
 
     If commands are delayed or distorted, `previous_action` is the action as it was given; the terms of the reward count
     what the motors received.
 
-    `observation_noise` is Gaussian, drawn anew each step for every unbounded entry; flags, fractions, unit vectors, the
-    distance and the action stay exact. `set_difficulty` changes the rocks' difficulty, or its range, from the next reset
+    `observation_noise` is Gaussian, drawn anew each step for every unbounded entry, and `observation_bias` is constant
+    during the episode; flags, fractions, unit vectors, the distance and the action stay exact. `set_difficulty` changes the rocks' difficulty, or its range, from the next reset
     on.
 
     ## Info
@@ -477,7 +478,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         info = self.batch.reset(self.i, seed, self.batch.check_options(options))
         if self.on_period is not None:
             self.on_period(self, info)
-        return self.progress.observation, info
+        return self.batch.seen(self.progress.observation, self.i), info
 
     def step(
         self, action: npt.NDArray[np.float32]

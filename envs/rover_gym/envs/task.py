@@ -98,7 +98,7 @@ class Task:
         model = domain.model_of(self.model)
         if domain.mass_scale != 1.0:
             model = model.replace(mass_scale=domain.mass_scale)
-        options = self._options(model, domain) | {"friction": domain.friction}
+        options = self.options_of(model, domain) | {"friction": domain.friction}
         if domain.gravity_scale != 1.0:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
@@ -111,12 +111,12 @@ class Task:
             ranges: Those that the core draws.
         """
         model = domain.model_of(self.model)
-        simulation = Simulation(model, Plane(), **self._options(model, domain))
+        simulation = Simulation(model, Plane(), **self.options_of(model, domain))
         scenes = dict(self.scenes, sand=_sand(domain.soils_of(self.soils)))
         return EpisodeDistribution(self.rules, simulation, domain=ranges, **scenes)
 
-    def _options(self, model: RoverModel, domain: Domain) -> dict[str, Any]:
-        """Keyword arguments of `Simulation` with the frictions of materials."""
+    def options_of(self, model: RoverModel, domain: Domain) -> dict[str, Any]:
+        """Keyword arguments of `Simulation` for a model, with the frictions of materials."""
         materials = domain.materials_of(model, self.simulation_options["restitution"])
         return dict(self.simulation_options, **({"materials": materials} if materials else {}))
 
@@ -138,8 +138,12 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
     start = _start(given, ground)
     substeps = _substeps(given["control_frequency"], step)
     rover = _rover(given["model"], steered=given["steered"], on_sand=sand is not None)
-    domain = domain_distribution(given, rover, soils)
     steering = Steering.of(rover)
+    points = None if given["height_scan"] is None else given["height_scan"].offsets
+    max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
+    rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
+    layout = ObservationLayout(rules)
+    domain = domain_distribution(given, rover, soils, layout.unbounded.sum().astype(int).item())
     options = {
         "gravity": gravity,
         "friction": domain.ranges["friction"][0],
@@ -148,9 +152,6 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         **(given["solver_options"] or {}),
     }
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
-    points = None if given["height_scan"] is None else given["height_scan"].offsets
-    max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
-    rules = _rules(given, rover, substeps=substeps, max_steering=max_steering, scan=points, free_distance=free_distance)
     scenes: dict[str, Any] = {
         "start": start,
         "trunk_load_limit": TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
@@ -177,7 +178,7 @@ def make_task(given: Mapping[str, Any], free_distance: float | None = None) -> T
         dt=substeps * step,
         simulation_options=options,
         max_steering=max_steering,
-        layout=ObservationLayout(rules),
+        layout=layout,
         reward_terms=given["reward_terms"] or {},
         rules=rules,
         domain=domain,

@@ -98,7 +98,7 @@ class DrivenRover:
 
     def __init__(self, rover: LiveRover) -> None:
         self.rover, self.drives_itself = rover, rover.driver is not None
-        self._driving = Driving(rover.env)
+        self._driving = Driving(rover.env.model)
 
     @property
     def episodes(self) -> int:
@@ -145,23 +145,22 @@ class DrivenRover:
 
     def step(self, command: Command | None) -> None:
         """Takes a control period."""
-        self.rover.step(action=None if command is None else self._driving.action(command))
+        if command is None:
+            self.rover.step()
+        else:
+            self.rover.follow(lambda simulation: self._driving.send(simulation, command))
 
     def reset(self, seed: int, difficulty: float) -> None:
         """Begins a drive with a seed and a difficulty."""
         self.rover.restart(seed, difficulty)
-        self._driving = Driving(self.rover.env)
 
-    def snapshot(self) -> tuple[LiveMoment, float]:
+    def snapshot(self) -> LiveMoment:
         """The present state."""
-        return self.rover.moment(), self._driving.correction
+        return self.rover.moment()
 
-    def restore(self, snapshot: tuple[LiveMoment, float]) -> None:
+    def restore(self, snapshot: LiveMoment) -> None:
         """Goes back to a state, also of an earlier drive."""
-        moment, correction = snapshot
-        self.rover.go_back(moment)
-        self._driving = Driving(self.rover.env)
-        self._driving.correction = correction
+        self.rover.go_back(snapshot)
 
 
 class RecordedRover:

@@ -202,6 +202,26 @@ class WheelKinematics:
         simulation.set_wheel_speeds(commands.speeds, commands.set_points)
         return commands
 
+    def twist(self, speeds: Array, joints: Array) -> Array:
+        """The twist that the wheels roll, (3,): forward and left, m/s, yaw rate, rad/s; the inverse of `commands`.
+
+        It is the least-squares solution of the equations above: every wheel turns at its speed, and those without
+        rollers do not slip sideways. Where all of these skid, the machine does not move to the left.
+
+        Args:
+            speeds: Speeds of the wheels, (n_wheels,), rad/s, positive forward.
+            joints: Angles of the joints that steer, (n_joints,), rad.
+        """
+        ahead, left = self.velocities(*np.hsplit(np.eye(3), 3))
+        angles = self.wheel_angles(np.asarray(joints, np.float64)[None]) + self._headings
+        sine, cosine = sin_cos(angles)
+        rolled, wanted = self.rim_speeds(ahead, left, angles).T, speeds * self._radii
+        skids = self._plain.any() and not self._steers.any()
+        across = np.eye(3)[1:2] if skids else (left * cosine - ahead * sine).T[self._plain]
+        rows = np.concatenate((rolled, across))
+        found = np.linalg.lstsq(rows, np.append(wanted, np.zeros(len(across))), rcond=None)[0]
+        return np.asarray(found, np.float64)
+
     def _angles(self, ahead: Array, left: Array) -> Array:
         """Angle of each wheel that steers, within 90 degrees, at which it rolls forward or backward, (n, n_wheels)."""
         angles = np.asarray(atan2(left, ahead)) - self._headings

@@ -6,8 +6,10 @@ from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from rover_gym.core import OptionError, RoverModel
+from rover_gym.core.rotations import turned
 from rover_gym.core.validation import flag, number, refuse, vector, whole
 from rover_gym.envs.sensors.picture import CameraPicture, picture_look
 from rover_gym.envs.sensors.sensor import Array, Moment, Mount, Sensor
@@ -121,20 +123,19 @@ class Camera(Sensor):
                 kept: CameraPicture = picture.within(max_range)
                 return kept
         place, rotation = moment.frame(self.mount)
-        directions = self.directions.reshape(-1, 3)
-        looks = np.isfinite(directions[:, 0])
+        looks, directions = _rays(self.lens)
         model = moment.model
         colours, kinds, distances = moment.simulation.take_picture(
             picture_look(model if self.sees_rover else None),
             place,
-            directions[looks] @ rotation.T,
+            turned(rotation, directions),
             max_range=max_range,
             pixel=1.0 / self.focal_length,
             sun=sun,
             balls=moment.balls,
             without=(self.mount.solid_of(model),),
         )
-        n, shape = len(directions), (self.height, self.width)
+        n, shape = self.width * self.height, (self.height, self.width)
         picture = CameraPicture(np.zeros((n, 3), np.float32), np.zeros(n, np.uint8), np.full(n, np.inf))
         picture.colours[looks], picture.kinds[looks], picture.distances[looks] = colours, kinds, distances
         picture = CameraPicture(*(values.reshape(*shape, *values.shape[1:]) for values in vars(picture).values()))
@@ -171,6 +172,14 @@ def _directions(lens: Lens) -> Array:
         directions[..., 1:] *= (seen / np.maximum(shown, 1e-300))[..., None]
     directions.setflags(write=False)
     return directions
+
+
+@lru_cache(maxsize=8)
+def _rays(lens: Lens) -> tuple[npt.NDArray[np.bool_] | slice, Array]:
+    """Which pixels see something, row by row, and their directions, (n, 3)."""
+    directions = _directions(lens).reshape(-1, 3)
+    looks = np.isfinite(directions[:, 0])
+    return (slice(None), directions) if looks.all() else (looks, directions[looks])
 
 
 def _bent(x: Array, distortion: tuple[float, float]) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.core import GrainSimulation, OptionError, RoverModel, Simulation, SphereField
-from rover_gym.core.rotations import rotation_matrix
+from rover_gym.core.rotations import rotation_matrix, turned
 from rover_gym.core.validation import number, refuse, vector
 from rover_gym.envs.distributions import Distribution, Quantity, distribution, is_fixed
 
@@ -167,7 +167,7 @@ class Moment:
         """
         place, rotation = self.frame(mount)
         without = (mount.solid_of(self.model),) if sees_rover else self.model.solid_names
-        return self.cast_rays(place, directions @ rotation.T, max_range, without)[0]
+        return self.cast_rays(place, turned(rotation, directions), max_range, without)[0]
 
     def cast_rays(
         self, origins: Array, directions: Array, max_range: float, without: Sequence[str] = ()

@@ -10,9 +10,12 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 
-from rover_gym.core import CommandError, OptionError, Plane, Simulation, SimulationBatch
+from rover_gym.core import CommandError, OptionError, Plane, Simulation, SimulationBatch, StateError
 from rover_gym.core.validation import refuse, whole
 from rover_gym.envs.batch import MAX_THREADS, STEP_FAILED
+from rover_gym.envs.command_faults import CommandFaults
+from rover_gym.envs.domain import OF_COMMANDS
+from rover_gym.envs.env_snapshot import check_random_state
 from rover_gym.envs.generators import row_of
 from rover_gym.envs.observation import Array, Mask, Observations
 from rover_gym.envs.reward_terms import earn
@@ -22,6 +25,7 @@ from rover_gym.envs.several.joined_episode import NOTHING_SOLVED, JoinedEpisode,
 from rover_gym.envs.several.joined_scene import JoinedScene, Team, TeamOptions
 from rover_gym.envs.several.machine_contacts import MachineContacts
 from rover_gym.envs.several.machine_view import MachineContact, MachineReader, MachineView
+from rover_gym.envs.several.scene_snapshot import SceneSnapshot, check_scene_snapshot
 from rover_gym.envs.task import check_actions
 
 #: Most scenes of a batch.
@@ -144,6 +148,7 @@ class JoinedBatch:
         self._contacts = MachineContacts(team.model)
         self._torques = np.zeros((self.n, len(team.model.wheel_names)))
         self._set_points = np.zeros_like(self._torques)
+        self._faults = [CommandFaults.of(self.n, task) for task in team.tasks]
         self._scenes: list[RunningScene | None] = [None] * self.n
         self._randoms = [np.random.default_rng() for _ in range(self.n)]
         made = {
@@ -193,15 +198,73 @@ class JoinedBatch:
         random = copy.deepcopy(self._randoms[s]) if seed is None else np.random.default_rng(seed)
         team = self.team
         drawn = team.draw(random, team.check_options(None) if options is None else options)
-        readers = [
-            MachineReader(team.alone(k, drawn), machine, task.scan, self._layout)
-            for k, (machine, task) in enumerate(zip(self._machines, team.tasks, strict=True))
-        ]
-        scene = RunningScene(drawn, random, readers, np.ones(team.n_rovers, np.bool_))
+        scene = RunningScene(drawn, random, self._readers(drawn), np.ones(team.n_rovers, np.bool_))
         self._begin_episodes(scene)
-        self._core.replace(s, drawn.simulation)
-        self._torques[s] = self._set_points[s] = 0.0
-        self._randoms[s], self._scenes[s] = random, scene
+        for faults in filter(None, self._faults):
+            faults.begin([s])
+        self._set_points[s] = 0.0
+        self._adopt(s, scene)
+
+    def _adopt(self, s: int, scene: RunningScene) -> None:
+        """Goes on with another scene."""
+        self._core.replace(s, scene.drawn.simulation)
+        self._torques[s] = 0.0
+        self._randoms[s], self._scenes[s] = scene.random, scene
+
+    def _readers(self, drawn: JoinedScene) -> list[MachineReader]:
+        return [
+            MachineReader(self.team.alone(k, drawn), machine, task.scan, self._layout)
+            for k, (machine, task) in enumerate(zip(self._machines, self.team.tasks, strict=True))
+        ]
+
+    def snapshot(self, s: int) -> SceneSnapshot:
+        """The state of a scene, for `restore`.
+
+        Raises:
+            ResetNeeded: It has not been reset.
+        """
+        scene = self.scene(s)
+        return SceneSnapshot(
+            rovers=scene.drawn.rovers,
+            simulation=self._core.simulation(s).snapshot(),
+            episodes=tuple(episode.state() for episode in scene.episodes),
+            sensors=tuple(copy.deepcopy(scene.sensors)),
+            set_points=self._set_points[s].copy(),
+            commands=tuple(None if faults is None else faults.state_of(s) for faults in self._faults),
+            random_state=copy.deepcopy(scene.random.bit_generator.state),
+            steps=scene.steps,
+            live=tuple(scene.live.tolist()),
+        )
+
+    def restore(self, s: int, snapshot: object) -> None:
+        """Goes on from a snapshot of a scene of the same arguments, bit for bit.
+
+        Raises:
+            StateError: The value is no snapshot, is damaged, or comes from other arguments; nothing has changed.
+        """
+        checked = check_scene_snapshot(self.team, snapshot)
+        for faults, state in zip(self._faults, checked.commands, strict=True):
+            if faults is not None:
+                faults.check_state(state)
+        suites = [suite for suite in self._suites if suite is not None]
+        if len(checked.sensors) != len(suites):
+            refuse(StateError, "snapshot.sensors", checked.sensors, f"must be of {len(suites)} rovers")
+        sensors = [suite.check_state(state) for suite, state in zip(suites, checked.sensors, strict=True)]
+        random = np.random.default_rng()
+        random.bit_generator.state = check_random_state(random, checked.random_state)
+        drawn = self.team.build(checked.rovers)
+        drawn.simulation.restore(checked.simulation)
+        episodes = [
+            JoinedEpisode.resumed(task, own, state)
+            for task, own, state in zip(self.team.tasks, checked.rovers, checked.episodes, strict=True)
+        ]
+        live = np.array(checked.live, np.bool_)
+        scene = RunningScene(drawn, random, self._readers(drawn), live, episodes, sensors, checked.steps)
+        for faults, state in zip(self._faults, checked.commands, strict=True):
+            if faults is not None and state is not None:
+                faults.adopt(s, state)
+        self._set_points[s] = checked.set_points
+        self._adopt(s, scene)
 
     def _begin_episodes(self, scene: RunningScene) -> None:
         simulation = scene.drawn.simulation
@@ -235,8 +298,15 @@ class JoinedBatch:
         return seen if suite is None else with_readings(seen, suite.readings(scene.sensors[k]))
 
     def info(self, s: int, k: int) -> dict[str, Any]:
-        """The info of a rover's last period or of its start."""
+        """The info of a rover's last period."""
         return self.scene(s).episodes[k].info()
+
+    def first_info(self, s: int, k: int) -> dict[str, Any]:
+        """The info of a rover's start, with what was drawn for its sensors."""
+        info, suite = self.info(s, k), self._suites[k]
+        if suite is not None:
+            info["domain"] |= suite.domain(self.scene(s).sensors[k])
+        return info
 
     def check_actions(self, actions: Sequence[Mapping[str, object]]) -> list[list[Array | None]]:
         """Checks the actions of every scene, by rover, and returns them in the order of the rovers.
@@ -271,20 +341,41 @@ class JoinedBatch:
             The outcome of each rover that has an action, else None.
         """
         given = [[None if one is None else np.clip(one, -1.0, 1.0) for one in row] for row in actions]
+        received = self._received(given)
         moving = np.array([any(one is not None for one in row) for row in given])
         for s in np.flatnonzero(moving).tolist():
-            self._command(s, given[s])
+            self._command(s, received[s])
         periods, rows = self._take_steps(moving)
         results: list[list[RoverPeriod | None]] = [[None] * self.team.n_rovers for _ in range(self.n)]
         for s, period in periods.items():
             self.scene(s).steps += 1
             for k, (asked, action) in enumerate(zip(actions[s], given[s], strict=True)):
                 self.scene(s).episodes[k].clipped = 0 if asked is None else int((asked != action).sum())
-            results[s] = self._conclude(s, given[s], period, rows[s])
+            both = [None if a is None or b is None else (a, b) for a, b in zip(given[s], received[s], strict=True)]
+            results[s] = self._conclude(s, both, period, rows[s])
         return results
 
+    def _received(self, given: Sequence[Sequence[Array | None]]) -> list[list[Array | None]]:
+        """What the motors receive of actions, by scene and rover."""
+        received = [list(row) for row in given]
+        for k, (faults, task) in enumerate(zip(self._faults, self.team.tasks, strict=True)):
+            if faults is None:
+                continue
+            moved = np.array([row[k] is not None for row in given])
+            sent = np.array([np.zeros(task.n_actions) if row[k] is None else row[k] for row in given])
+            scenes = [None if scene is None else scene.drawn.rovers[k].domain.further for scene in self._scenes]
+            drawn = {
+                name: np.array([0.0 if own is None else own[name] for own in scenes])
+                for name in task.domain.further.keys() & set(OF_COMMANDS)
+            }
+            arrived = faults.received(sent, drawn)
+            faults.keep(sent, arrived, moved)
+            for s in np.flatnonzero(moved).tolist():
+                received[s][k] = arrived[s]
+        return received
+
     def _command(self, s: int, actions: Sequence[Array | None]) -> None:
-        """Sets the torques and set-points of a scene; without an action, torques are 0 and the steering is kept."""
+        """Sets torques and set-points of a scene by what its motors receive; without, the torques are 0."""
         for k, (action, task) in enumerate(zip(actions, self.team.tasks, strict=True)):
             wheels, n_wheels = self._machines[k].wheels, len(task.model.wheel_names)
             self._torques[s, wheels] = 0.0
@@ -308,13 +399,13 @@ class JoinedBatch:
         return periods, rows
 
     def _conclude(
-        self, s: int, actions: Sequence[Array | None], period: Period, whole: Array
+        self, s: int, actions: Sequence[tuple[Array, Array] | None], period: Period, whole: Array
     ) -> list[RoverPeriod | None]:
         """The outcome of a scene's period.
 
         Args:
             s: Index of the scene.
-            actions: Actions of its rovers, within [-1, 1].
+            actions: Actions of its rovers, as they were given, and what the motors received, within [-1, 1].
             period: Sums over the period.
             whole: The last reading of all rovers.
         """
@@ -331,7 +422,7 @@ class JoinedBatch:
             reading = scene.readers[k].read(view, whole, contact, episode.goal, near=near[k])
             sums, normals = period.sums(k, self.team.agents), self._normals(scene, k)
             reward = episode.advance(reading, action, sums, normals, period.message)
-            reward += _earn_own(episode, before, action)
+            reward += _earn_own(episode, before, action[0])
             if suite is not None:
                 suite.advance(scene.sensors[k], _moment(view))
             results[k] = RoverPeriod(self.observation(s, k), reward, bool(episode.ending), truncated)

@@ -4,10 +4,11 @@ The compiled episodes (`rover_gym.core.EpisodeRun`) step a simulation of one mac
 layout and weights, and readings of one machine of several; a test compares both over whole episodes.
 """
 
+import copy
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -27,6 +28,13 @@ MOST_PROGRESS, MOST_WORK, MOST_TIME, MOST_RATIO = 30.0, 4e5, 60.0, 2.0
 
 #: The only term of a period that fails.
 FAILURE = "failure"
+
+#: Attributes of an episode beside its task and its scene.
+STATE = (
+    *("goals", "reached", "start", "distance", "energy", "energy_positive", "stuck_time", "trunk_load"),
+    *("previous_action", "previous_received", "reward_terms", "clipped", "ending", "message", "observation"),
+    *("_reading", "_forces", "_solver"),
+)
 
 #: What `info` has of the solver before the first step.
 NOTHING_SOLVED: Mapping[str, Any] = {"status": "converged", "iterations": 0, "residual": 0.0, "n_contacts": 0}
@@ -75,12 +83,25 @@ class JoinedEpisode:
         weight = task.model.mass * math.hypot(*task.gravity)
         self.trunk_load = TRUNK_LOAD * weight * scene.domain.mass_scale * scene.domain.gravity_scale
         self.previous_action: Array = np.zeros(task.n_actions)
+        self.previous_received = self.previous_action
         self.reward_terms: dict[str, float] = dict.fromkeys(self.rules["weights"], 0.0)
         self.clipped, self.ending, self.message = 0, "", ""
         self._reading = reading
         self._forces: dict[str, Array] = {}
         self._solver = NOTHING_SOLVED
         self.observation = self._observe(reading, normals)
+
+    @classmethod
+    def resumed(cls, task: Task, scene: EpisodeScene, state: Mapping[str, Any]) -> Self:
+        """The episode of a task, a scene and a `state`."""
+        episode = cls.__new__(cls)
+        vars(episode).update(copy.deepcopy(dict(state)))
+        episode.task, episode.scene, episode.rules = task, scene, task.rules.__getnewargs_ex__()[1]
+        return episode
+
+    def state(self) -> dict[str, Any]:
+        """What the episode has beside its task and its scene, for `resumed`; picklable."""
+        return {name: copy.deepcopy(getattr(self, name)) for name in STATE}
 
     @property
     def goal(self) -> Point:
@@ -90,7 +111,7 @@ class JoinedEpisode:
     def advance(
         self,
         reading: MachineReading,
-        action: Array,
+        actions: tuple[Array, Array],
         sums: PeriodSums,
         normals: Array,
         message: str = "",
@@ -99,16 +120,17 @@ class JoinedEpisode:
 
         Args:
             reading: The rover at the end of the period, with `goal` as its target.
-            action: The action, within [-1, 1], (n_actions,).
+            actions: The action as it was given, and what the motors received, within [-1, 1], (n_actions,).
             sums: Sums over the period.
             normals: Of the observation's noise, (size,).
             message: Message of the physics step that failed; empty if none did.
         """
         approach = self.distance - float(reading.shared[-1])
-        changes = (action - self.previous_action) ** 2
+        action, received = actions
+        changes = (received - self.previous_received) ** 2
         self.message, self._solver = message, sums.solver
         self._forces = {name: p / self.task.dt for name, p in sums.impulses.items()}
-        self.previous_action, self._reading = action, reading
+        self.previous_action, self.previous_received, self._reading = action, received, reading
         self.distance = float(reading.shared[-1])
         work = np.abs(sums.work).sum()
         self.energy += work
@@ -147,6 +169,7 @@ class JoinedEpisode:
         values = np.concatenate([*parts, reading.heights]) / layout.scale
         if self.task.is_noisy:
             values += rules["noise"] * layout.unbounded * normals
+        values[layout.unbounded > 0.0] += self.scene.domain.further.get("observation_bias", 0.0)
         with np.errstate(over="ignore"):
             return values.astype(np.float32)
 

@@ -25,7 +25,7 @@ from rover_gym.core import (
 from rover_gym.core.validation import known_keys, mapping, refuse, vector, whole
 from rover_gym.envs.arguments import MAX_WAYPOINTS, check_arguments, check_model
 from rover_gym.envs.distributions import sampled
-from rover_gym.envs.domain import OF_MODEL, Domain
+from rover_gym.envs.domain import OF_GROUND, Domain
 from rover_gym.envs.episode_scene import (
     FIELD_SEEDS,
     PLACING_ATTEMPTS,
@@ -66,6 +66,7 @@ GROUND_ARGUMENTS = (
     "goal_tolerance",
     "friction",
     "gravity_scale",
+    *OF_GROUND,
     "gravity",
     "time_step",
     "control_frequency",
@@ -78,7 +79,7 @@ class JoinedScene:
 
     Attributes:
         rovers: The scene of each rover; all have the same terrain and rocks.
-        simulation: All rovers at their starts.
+        simulation: All rovers at their starts, or where a snapshot has them.
         models: The model of each rover, with its masses scaled.
     """
 
@@ -136,7 +137,6 @@ class Team:
         self.agents = tuple(f"rover_{k}" for k in range(len(models)))
         self.given = check_arguments("parallel_env", {**arguments, "model": models[0]})
         self._check_number()
-        self._check_domain()
         self.loops = None if loops is None else list(loops)
         self.radii = [task.model.clear_radius for task in self.tasks]
         self.starts = self._row() if starts is None else self._check_starts(starts)
@@ -157,12 +157,6 @@ class Team:
         if self.n_rovers > most:
             reason = f"must be at most {most} with {self.given['waypoints']} goals each"
             refuse(OptionError, "rovers", self.n_rovers, reason)
-
-    def _check_domain(self) -> None:
-        for name, (own, _) in self.tasks[0].domain.further.items():
-            if name not in OF_MODEL:
-                argument = name.partition(".")[0]
-                refuse(OptionError, argument, own, "is not known in scenes of several rovers; it must be the default")
 
     def _row(self) -> list[Point]:
         """Starts along z, so far apart that each rover has room to turn."""
@@ -239,8 +233,10 @@ class Team:
         for drawn, task in zip(starts, self.tasks, strict=True):
             start = replace(drawn, slope=layout.start.slope, uphill=layout.start.uphill)
             mass, gain = (float(sampled(random, self.given[name])) for name in ("mass_scale", "actuator_gain"))
-            _, further = task.domain.draw(random)
-            domain = replace(layout.domain, mass_scale=mass, actuator_gain=gain, further=further)
+            _, further = task.domain.of_rover.draw(random)
+            domain = replace(
+                layout.domain, mass_scale=mass, actuator_gain=gain, further={**further, **layout.domain.further}
+            )
             rovers.append(EpisodeScene(start, layout.terrain, layout.rocks, domain))
         return self._place(tuple(rovers), options)
 
@@ -280,13 +276,13 @@ class Team:
         fixed = {**shared, "position": first, "heading": starts[0].heading, "goal": places[0], "further": further}
         simulation = Simulation(task.model, Plane(), **task.simulation_options)
         episodes = EpisodeBatch(task.rules, simulation, 1, threads=1)
-        ranges, _ = task.domain.draw(random)
-        distribution = task.episodes_in(Domain(1.0, ranges["friction"][0], 1.0, 1.0), ranges)
+        ranges, properties = task.domain.draw(random)
+        distribution = task.episodes_in(Domain(1.0, ranges["friction"][0], 1.0, 1.0, properties), ranges)
         seed = int(random.integers(FIELD_SEEDS))
         drawn = episodes.draw(distribution, seed_generators([seed]), attempts=1, fixed=fixed)
         episodes.begin([0], drawn)
         terrain = episodes.terrain(0) if task.ground is None else task.ground
-        return scene_of(task, episodes.origin(0), terrain, {})
+        return scene_of(task, episodes.origin(0), terrain, properties)
 
     def _place(self, rovers: tuple[EpisodeScene, ...], options: TeamOptions) -> JoinedScene:
         """Places the rovers on their starts.
@@ -294,30 +290,36 @@ class Team:
         Raises:
             TerrainError: A rover overlaps with the ground or with another rover.
         """
-        terrain = rovers[0].terrain
-        models, q, v = [], [], []
-        for task, scene, fixed in zip(self.tasks, rovers, options.rovers, strict=True):
-            scale, start = scene.domain.mass_scale, scene.start
-            model = scene.domain.model_of(task.model)
-            model = model if scale == 1.0 else model.replace(mass_scale=scale)
-            models.append(model)
-            resting = "q" not in fixed
-            q.append(model.resting_pose(_firm(terrain), start.position, start.heading) if resting else fixed["q"])
+        scene = self.build(rovers)
+        q, v = [], []
+        for model, own, fixed in zip(scene.models, rovers, options.rovers, strict=True):
+            start, resting = own.start, "q" not in fixed
+            q.append(model.resting_pose(_firm(scene.terrain), start.position, start.heading) if resting else fixed["q"])
             v.append(fixed.get("v", np.zeros(model.nv)))
+        scene.simulation.set_state(*scene.simulation.model.close_loops(np.concatenate(q), np.concatenate(v)))
+        self._check_room(scene.simulation)
+        return scene
+
+    def build(self, rovers: tuple[EpisodeScene, ...]) -> JoinedScene:
+        """The scene of rovers, before they are placed.
+
+        Raises:
+            ModelError: The drawn properties give a rover that cannot be.
+        """
+        models = []
+        for task, scene in zip(self.tasks, rovers, strict=True):
+            scale, model = scene.domain.mass_scale, scene.domain.model_of(task.model)
+            models.append(model if scale == 1.0 else model.replace(mass_scale=scale))
         is_own = all(model is task.model for model, task in zip(models, self.tasks, strict=True))
         joined = self.model if is_own else self._join(models)
-        simulation = self._simulate(joined, terrain, rovers[0].domain)
-        simulation.set_state(*joined.close_loops(np.concatenate(q), np.concatenate(v)))
-        self._check_room(simulation)
-        return JoinedScene(rovers, simulation, tuple(models))
+        return JoinedScene(rovers, self._simulate(joined, rovers[0].terrain, rovers[0].domain), tuple(models))
 
     def _simulate(self, model: RoverModel, terrain: Terrain, domain: Domain) -> Simulation:
-        """A simulation with the friction and the gravity of an episode."""
+        """A simulation with the frictions and the gravity of an episode."""
         task = self.tasks[0]
         gravity = tuple(domain.gravity_scale * g for g in task.gravity)
-        return Simulation(
-            model, terrain, **{**task.simulation_options, "friction": domain.friction, "gravity": gravity}
-        )
+        options = task.options_of(model, domain) | {"friction": domain.friction, "gravity": gravity}
+        return Simulation(model, terrain, **options)
 
     def alone(self, k: int, scene: JoinedScene) -> Simulation:
         """A simulation of rover k alone in a scene."""

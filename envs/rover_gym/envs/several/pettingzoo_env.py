@@ -17,6 +17,7 @@ from rover_gym.envs.observation import ObservationLayout
 from rover_gym.envs.sensors.sensor_suite import SensorLike
 from rover_gym.envs.several.joined_batch import JoinedBatch, check_limit
 from rover_gym.envs.several.joined_scene import JoinedScene, ModelLike, Team
+from rover_gym.envs.several.scene_snapshot import SceneSnapshot
 from rover_gym.envs.start import Point
 from rover_gym.envs.time_limits import MAX_EPISODE_STEPS
 from rover_gym.show.frames.render_options import RENDER_MODES, RenderOptions
@@ -61,8 +62,8 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle)
     The rovers start in a row along z, with room to turn, or at `starts`; `heading_deg`, `goal_distance` and
     `goal_bearing_deg` are drawn for each. Final goals lie far enough apart for all rovers to reach them. Rocks leave
     room at every start and goal, and on hills a way leads from one to the next. The size of rocks is that among rovers
-    of the model that needs most room. Friction and gravity are drawn for the scene, all other properties for each
-    rover. Faults of commands, `soil_scale` and `material_friction` are refused.
+    of the model that needs most room. Gravity, frictions and soil are drawn for the scene, all other properties for
+    each rover.
 
     `reset(options=...)` fixes `difficulty`, `field_seed`, `slope_deg` and `uphill_deg` of the scene, and under an
     agent's name `position`, `heading_deg`, `goal`, `goals`, `map_position`, `map_goal`, `q` and `v` of its rover:
@@ -88,7 +89,7 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle)
 
     ## Copies
 
-    A copy or a pickle is the environment as it was made, without its episode: reset it.
+    A copy or a pickle is the environment as it was made, without its episode: reset it, or restore a snapshot.
 
     ## Version history
 
@@ -170,7 +171,7 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle)
         self.agents = list(self.possible_agents)
         each = {agent: k for k, agent in enumerate(self.agents)}
         observations = {agent: self.batch.observation(0, k) for agent, k in each.items()}
-        return observations, {agent: self.batch.info(0, k) for agent, k in each.items()}
+        return observations, {agent: self.batch.first_info(0, k) for agent, k in each.items()}
 
     def step(self, actions: Mapping[str, npt.NDArray[np.float32]]) -> Stepped:
         """Applies the actions of all agents for one control period.
@@ -194,6 +195,25 @@ class RoverParallelEnv(ParallelEnv[str, Any, npt.NDArray[np.float32]], EzPickle)
             {agent: one.truncated for agent, one in own.items()},
             {agent: self.batch.info(0, self.possible_agents.index(agent)) for agent in own},
         )
+
+    def snapshot(self) -> SceneSnapshot:
+        """Returns the state of all rovers, their episodes and sensors, and of the random generator, for `restore`.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+        """
+        return self.batch.snapshot(0)
+
+    def restore(self, snapshot: SceneSnapshot) -> None:
+        """Restores a snapshot of an environment with the same arguments, which then continues bit for bit.
+
+        Raises:
+            StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments; nothing
+                has changed.
+        """
+        self.batch.restore(0, snapshot)
+        running = self.batch.scene(0).live
+        self.agents = [agent for agent, runs in zip(self.possible_agents, running, strict=True) if runs]
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Renders all rovers as a frame, (height, width, 3) uint8; None without a render mode.

@@ -161,7 +161,7 @@ class RoversVecEnv(VecEnv):
     def _tell_resets(self, scenes: Sequence[int]) -> None:
         for s in scenes:
             for k in range(self.team.n_rovers):
-                self.reset_infos[s * self.team.n_rovers + k] = self.batch.info(s, k)
+                self.reset_infos[s * self.team.n_rovers + k] = self.batch.first_info(s, k)
 
     def close(self) -> None:
         """Does nothing: there is nothing to free."""

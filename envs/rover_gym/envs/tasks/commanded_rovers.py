@@ -11,6 +11,7 @@ from rover_gym.core.validation import refuse
 from rover_gym.drive.commands.command import N_COMMANDS, command_space
 from rover_gym.envs.observation import Observations
 from rover_gym.envs.several.pettingzoo_env import RoverParallelEnv, Stepped
+from rover_gym.envs.several.scene_snapshot import SceneSnapshot
 from rover_gym.envs.tasks.command_env import HeldCommands, check_commands
 from rover_gym.envs.time_limits import REPEAT
 
@@ -90,6 +91,12 @@ class DriveRoversByCommand(BaseParallelWrapper[str, Any, Observations]):  # type
                 break
         self._seen = {agent: seen[agent] for agent in self.env.agents}
         return self._features({agent: seen[agent] for agent in rewards}), rewards, terminated, truncated, infos
+
+    def restore(self, snapshot: SceneSnapshot) -> None:
+        """Goes on from a snapshot, as `RoverParallelEnv.restore`."""
+        self.env.restore(snapshot)
+        every = {agent: self.env.batch.observation(0, k) for k, agent in enumerate(self.env.possible_agents)}
+        self._seen = {agent: every[agent] for agent in self.env.agents}
 
     def _act(self, agent: str, seen: Mapping[str, Observations], commands: Mapping[str, Any]) -> Observations:
         """The action of an agent; none is known of one whose episode has ended, and any is refused."""

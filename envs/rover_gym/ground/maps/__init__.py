@@ -1,7 +1,8 @@
 """Maps and meshes of the ground: from files, or generated from a seed.
 
-These functions return arrays; `HeightField.from_file`, `HeightField.fractal`, `TriangleMesh.from_file` and
-`SphereField.from_file`, in `terrain_files`, make terrains of them.
+`read_map`, `read_mesh` and `fractal_map` return arrays; `HeightField.from_file`, `HeightField.fractal`,
+`TriangleMesh.from_file` and `SphereField.from_file`, in `terrain_files`, make terrains of them. `patched_map` cuts a
+height field into patches.
 """
 
 import lazy_loader

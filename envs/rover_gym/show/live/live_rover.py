@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.core import EpisodeRun, OptionError, SphereField, TerrainError, Union, sin_cos
+from rover_gym.core import EpisodeRun, OptionError, SphereField, StepError, TerrainError, Union, sin_cos
 from rover_gym.core.validation import checked, number, refuse
 from rover_gym.drive.commands.command import CommandController
+from rover_gym.envs.batch import STEP_FAILED, Restored
 from rover_gym.envs.env_snapshot import EnvSnapshot
 from rover_gym.envs.rover_env import RoverEnv
 from rover_gym.envs.task import TRUNK_LOAD
@@ -20,6 +21,7 @@ from rover_gym.ground.terrain_parts import heights_of, plane_of
 from rover_gym.show.live.live_scene import LiveChoices, LiveScene
 
 if TYPE_CHECKING:
+    from rover_gym.core import Simulation
     from rover_gym.drive.commands.driven import Policy
     from rover_gym.drive.named_policy import NamedPolicy
     from rover_gym.envs.episode_scene import EpisodeScene
@@ -33,6 +35,8 @@ ROCK_AHEAD = 0.3
 MOVING = 0.1
 #: Entries of `info` that an episode counts from its start; a drive is several, one to each goal.
 ENERGIES = ("energy", "energy_positive")
+#: What a reading calls them, for the last call of `Simulation.step`.
+WORK = {"energy": "work", "energy_positive": "positive_work"}
 #: Choices that change the world under the moving rover.
 PROPERTIES = ("friction", "gravity")
 
@@ -172,13 +176,12 @@ class LiveRover:
         """`(n, 4)` centres and radii of the rocks that were thrown, m."""
         return self._rocks.copy()
 
-    def step(self, forward: float = 0.0, turn: float = 0.0, *, action: npt.NDArray[np.float32] | None = None) -> None:
+    def step(self, forward: float = 0.0, turn: float = 0.0) -> None:
         """Takes one control period, by hand or by the driver; a drive that has ended stays as it is.
 
         Args:
             forward: By hand: the speed, over the largest; -1 to 1.
             turn: By hand: the curvature, over the largest, positive to the left; -1 to 1.
-            action: An action of `Rover-v0`, in the place of both and of the driver's.
 
         Raises:
             OptionError: A number is not within -1 to 1.
@@ -189,9 +192,7 @@ class LiveRover:
         if self.ended:
             return
         wheel, state = self._wheel, self._wheel.state
-        if action is not None:
-            pass
-        elif wheel.driver is None:
+        if wheel.driver is None:
             action = self._hand.act(self.env.complete_observation()[None], np.array([[*command, 0.0]]))[0]
         elif wheel.seen is None:
             action = self.env.progress.previous_action.astype(np.float32)
@@ -207,19 +208,51 @@ class LiveRover:
         elif terminated:
             self.ended = info["termination"]
 
+    def follow(self, command: Callable[[Simulation], object]) -> None:
+        """Takes one control period by commands that actions do not have, such as speeds of the wheels.
+
+        A drive that has ended stays as it is. A stuck rover is not ended: its driver may know a way out.
+
+        Args:
+            command: Commands the simulation; it is stepped afterwards.
+        """
+        if self.ended:
+            return
+        env, simulation = self.env, self.env.simulation
+        command(simulation)
+        try:
+            simulation.step(env.task.substeps)
+        except StepError:
+            self.ended = STEP_FAILED
+            return
+        row = simulation.reading(env.goal, None)
+        places = simulation.reading_layout(0)
+        work = {name: float(row[places[part]][0]) for name, part in WORK.items()}
+        rules = env.task.rules.__getnewargs_ex__()[1]
+        leg = self._adopt_leg(env.goal)
+        if leg is None:
+            return
+        self._spent = {name: self.info[name] + joules for name, joules in work.items()}
+        self.info = {**leg.info(), **self._spent}
+        self._wheel = replace(self._wheel, seen=env.batch.seen(leg.observation, env.i))
+        if self.info["distance_to_goal"] <= env.goal_tolerance:
+            self._turn_back()
+        elif row[places["cos_tilt"]][0] < rules["cos_max_tilt"]:
+            self.ended = "roll_over"
+
     def _turn_back(self) -> None:
         """The start becomes the goal, and the goal the start."""
         goal, self._home = self._home, self.env.goal
         self._begin_leg(goal)
         self.goals_reached += 1
 
-    def _begin_leg(self, goal: tuple[float, float]) -> None:
+    def _adopt_leg(self, goal: tuple[float, float]) -> EpisodeRun | None:
         """Begins an episode where the rover is, as it is: the field then spans this place and the goal."""
-        now, simulation = self.env.snapshot(), self.env.simulation
-        domain = now.scene.domain
-        limit = TRUNK_LOAD * self.env.model.mass * domain.mass_scale * math.hypot(*simulation.gravity)
+        env, now = self.env, self.env.snapshot()
+        simulation, domain = env.simulation, now.scene.domain
+        limit = TRUNK_LOAD * env.model.mass * domain.mass_scale * math.hypot(*simulation.gravity)
         leg = EpisodeRun.begin(
-            self.env.task.rules,
+            env.task.rules,
             simulation,
             goal=goal,
             domain=domain.row,
@@ -227,11 +260,19 @@ class LiveRover:
             difficulty=self.info["difficulty"],
         )
         if leg is None:
-            self.ended = "step_failed"
+            self.ended = STEP_FAILED
+            return None
+        scene = replace(now.scene, start=replace(now.scene.start, goal=goal))
+        row = env.batch.generator_rows([env.i])
+        snapshot = replace(now, scene=scene, progress=leg.to_bytes())
+        env.batch.adopt(env.i, Restored(simulation, leg, row, now.difficulty, snapshot))
+        return leg
+
+    def _begin_leg(self, goal: tuple[float, float]) -> None:
+        """Begins an episode where the rover is, and with it the driver's plan."""
+        if self._adopt_leg(goal) is None:
             return
         self._spent = {name: self.info[name] for name in ENERGIES}
-        scene = replace(now.scene, start=replace(now.scene.start, goal=goal))
-        self.env.restore(replace(now, scene=scene, progress=leg.to_bytes()))
         policy = self._wheel.policy
         if policy is not None:  # its plan of the ground, or to the goal, is out of date
             self._wheel = _Wheel(self.env, policy, policy.make(self.env))
