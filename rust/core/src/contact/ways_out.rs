@@ -25,12 +25,12 @@ use crate::law::compliance::Tread;
 /// Most points that are compared, those of the smallest overlaps.
 const MOST: usize = 24;
 
-/// Depth, in bounding radii of the shape, up to which every point counts: ground that is thinner, as
-/// near a sharp ridge, is pierced and still pushes.
+/// Depth, in bounding radii of the shape, up to which every point counts: ground that is thinner,
+/// as near a sharp ridge, is pierced and still pushes.
 const SHALLOW: f64 = 1e-3;
 
-/// Of a wheel that yields, by how many of its deflections at rest more, and at most in bounding
-/// radii. What it yields by is no overlap to be explained.
+/// Number of deflections at rest by which that depth is larger where a wheel yields, and the most
+/// that they add, in bounding radii: what a wheel yields by is no overlap to be explained.
 const DEFLECTIONS: f64 = 6.0;
 const MOST_YIELDING: f64 = 0.01;
 

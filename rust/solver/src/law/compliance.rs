@@ -52,8 +52,8 @@ pub struct Tread {
 }
 
 impl Tread {
-    /// The deflection at which half the length of the contact is the relaxation length, m: that of a
-    /// wheel at rest, unless its description states another length.
+    /// The deflection at which half the length of the contact is the relaxation length, m: that of
+    /// a wheel at rest, unless its description states another length.
     #[inline]
     #[must_use]
     pub fn usual_deflection(&self) -> f64 {

@@ -47,8 +47,9 @@ pub(crate) struct LaneDisc<T> {
     pub centre: Vec3<T>,
     /// Unit.
     pub axle: Vec3<T>,
-    /// Of the disc and of the ball, m.
+    /// Radius of the disc, m.
     pub radius: f64,
+    /// Radius of the ball, m.
     pub rounding: f64,
     /// How near it must come to the ground to touch it, m.
     pub reach: T,

@@ -1,4 +1,5 @@
-//! Contacts of thin discs and tori with the faces of a surface, all lanes at once: [`super::pieces`].
+//! Contacts of thin discs and tori with the faces of a surface, all lanes at once:
+//! [`super::pieces`].
 
 use super::contacts::{ContactSlots, DetectionInput};
 use super::ground::BlockGround;

@@ -40,8 +40,9 @@ struct Search<'a> {
     rounding: f64,
     reach: f64,
     ahead: f64,
-    /// How far from the wheel's lowest point over it a face may be, and a cell from the disc's plane, m.
+    /// How far a face may be from the wheel's lowest point over it, m.
     off: f64,
+    /// How far a cell may be from the disc's plane, m.
     aside: f64,
 }
 

@@ -45,11 +45,11 @@ const LEVEL: f64 = 0.5;
 struct Tube {
     /// Square of its radius, m².
     square: f64,
-    /// Of a cell's middle from the wheel's centre, along x and z: its place across the axle, level;
-    /// and its height over the axle by the axle's tilt, m.
+    /// Level direction across the axle, along x and z.
     across: [f64; 2],
+    /// Height over the axle that its tilt gives a place, a metre along x and along z.
     rise: [f64; 2],
-    /// Half of what these places span in a cell, m.
+    /// Half of what a cell spans across the axle, and of these heights in it, m.
     halves: [f64; 2],
     /// Cosine of the axle's tilt.
     cosine: f64,
