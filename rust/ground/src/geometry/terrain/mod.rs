@@ -101,11 +101,11 @@ pub trait Terrain: Send + Sync {
     }
 
     /// Visits the pieces of a surface that a disc swept by a ball of radius `rounding` (m), with
-    /// its centre in world coordinates, may touch by a gap of up to `reach[0]` (m) while it moves by
-    /// up to `reach[1]` (m): the way of its centre plus that of its axle's tip at 1.5 radii. Returns
-    /// how far it may move, which is `reach[1]` or less. What is visited without motion is among
-    /// what was visited from any earlier place that it has not left so far. None if this is not
-    /// known; then what was visited means nothing.
+    /// its centre in world coordinates, may touch by a gap of up to `reach[0]` (m) while it moves
+    /// by up to `reach[1]` (m): the way of its centre plus that of its axle's tip at 1.5 radii.
+    /// Returns how far it may move, which is `reach[1]` or less. What is visited without motion is
+    /// among what was visited from any earlier place that it has not left so far. None if this is
+    /// not known; then what was visited means nothing.
     fn visit_ahead(
         &self,
         (_disc, _rounding): (&Disc, f64),
