@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::contact_plane::ContactPlane;
 use super::pieces::{LaneDisc, LanePlane, Pieces};
+use crate::contact::Part;
 use crate::contact::box_clearance::over_surfaces;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Coverage, OrientedBox, Sphere, Terrain};
@@ -107,10 +108,11 @@ pub struct BlockGround<T: Lane> {
     /// Terrains of the lanes whose ground may be more than a plane.
     fields: Vec<Option<Arc<dyn Terrain>>>,
     has_spheres: bool,
-    /// Terrains of the lanes whose ground has a surface.
+    /// Terrains of the lanes whose ground has a surface: without the spheres on it where they are
+    /// all else that there is.
     surfaces: Vec<Option<Arc<dyn Terrain>>>,
     has_surfaces: bool,
-    /// Terrains of the lanes whose ground has a surface and is firm.
+    /// Those of them that are firm.
     under_wheels: Vec<Option<Arc<dyn Terrain>>>,
     /// Rovers on soft ground, whose wheels meet spheres alone.
     soft: T::Mask,
@@ -199,10 +201,10 @@ impl<T: Lane> BlockGround<T> {
         self.fields[lane] = (!is_plane).then(|| Arc::clone(terrain));
         self.has_spheres = self.fields.iter().any(Option::is_some);
         let has_surface = terrain.has_surface();
-        self.surfaces[lane] = has_surface.then(|| Arc::clone(terrain));
+        self.surfaces[lane] = has_surface.then(|| Arc::clone(bare(terrain)));
         self.has_surfaces = self.surfaces.iter().any(Option::is_some);
         let is_firm = soft.is_none();
-        self.under_wheels[lane] = (has_surface && is_firm).then(|| Arc::clone(terrain));
+        self.under_wheels[lane] = self.surfaces[lane].clone().filter(|_| is_firm);
         (self.soft, self.mixed) = (self.soft & !own, self.mixed & !own);
         if !is_firm {
             self.soft = self.soft | own;
@@ -302,6 +304,23 @@ impl<T: Lane> BlockGround<T> {
         self.terrains[lane].as_ref()
     }
 
+    /// What a part of a lane may touch of its ground, with the same numbers.
+    pub(crate) fn near(&self, part: Part, lane: usize) -> Option<&Arc<dyn Terrain>> {
+        let terrain = self.terrain(lane)?;
+        let has_no_spheres = |w: usize| {
+            let near = &self.wheels[w];
+            near.counts[lane] == 0 && near.within.get(lane) > 0.0
+        };
+        let surface = self.under_wheels[lane].as_ref();
+        let is_first = |own: &&Arc<dyn Terrain>| {
+            (terrain.members().first()).is_some_and(|first| Arc::ptr_eq(first, own))
+        };
+        match part {
+            Part::Wheel(w) if has_no_spheres(w) => surface.filter(is_first).or(Some(terrain)),
+            _ => Some(terrain),
+        }
+    }
+
     /// Whether a rover's ground is a surface.
     #[inline(always)]
     pub(crate) fn is_surface(&self, lane: usize) -> bool {
@@ -397,7 +416,8 @@ impl<T: Lane> BlockGround<T> {
                     reach: reach.get(lane),
                     motion: motion.get(lane),
                 };
-                if around.search(lane, &**field, &solid, bound, near) {
+                let surface = self.surfaces[lane].as_deref();
+                if around.search(lane, (&**field, surface), &solid, bound, near) {
                     is_near |= 1 << lane;
                 }
             }
@@ -456,11 +476,12 @@ impl<T: Lane> Near<T> {
 }
 
 impl<T: Lane> Around<T> {
-    /// Measures the clearance of one rover's box. True if a sphere is near.
+    /// Measures the clearance of one rover's box from its ground and the surface of that. True if
+    /// something is near.
     fn search(
         &mut self,
         lane: usize,
-        field: &dyn Terrain,
+        (field, surface): (&dyn Terrain, Option<&dyn Terrain>),
         solid: &OrientedBox,
         bound: f64,
         near: Nearness,
@@ -478,8 +499,8 @@ impl<T: Lane> Around<T> {
         } else {
             (clearance, is_near) = kept.search(field, solid, bound, near);
         }
-        if field.has_surface() {
-            let (own, is_near_surface) = over_surface(field, solid, bound, near);
+        if let Some(surface) = surface {
+            let (own, is_near_surface) = over_surface(surface, solid, bound, near);
             clearance = clearance.min(own);
             is_near |= is_near_surface;
         }
@@ -577,6 +598,16 @@ fn clearance_of(solid: &OrientedBox, sphere: &Sphere) -> f64 {
 pub(crate) fn turning<T: Lane>(R: &Mat3<T>, S: &Mat3<T>) -> T {
     let (x, y, z) = (R.x - S.x, R.y - S.y, R.z - S.z);
     (x.dot(x) + y.dot(y) + z.dot(z)).sqrt()
+}
+
+/// A firm terrain without the spheres on its surface, if these are all else that it has.
+fn bare(terrain: &Arc<dyn Terrain>) -> &Arc<dyn Terrain> {
+    let members = terrain.members();
+    let mut surfaces = members.iter().filter(|own| own.has_surface());
+    match (surfaces.next(), surfaces.next()) {
+        (Some(only), None) if terrain.ground().is_none() && terrain.soft().is_none() => only,
+        _ => terrain,
+    }
 }
 
 /// Visits exactly the spheres that come as near to `centre` (world, m) as `within`, m.

@@ -46,7 +46,8 @@ impl<T: Lane> ContactSlots<T> {
             let own = |asked: &&Asked| asked.lanes >> lane & 1 == 1;
             for asked in self.by_lane.asked.iter().filter(own) {
                 let parts = std::iter::once(asked.part);
-                let unknown = detect_parts(parts, &machine, &**terrain, &activation, &mut contacts);
+                let near = &**ground.near(asked.part, lane).unwrap_or(terrain);
+                let unknown = detect_parts(parts, &machine, near, &activation, &mut contacts);
                 fallbacks |= u32::from(unknown.is_some()) << lane;
             }
             if meeting >> lane & 1 == 1 {

@@ -18,8 +18,8 @@ use super::{HeightField, index, narrow};
 use crate::geometry::shape::{Disc, Roller, SupportMap};
 use crate::geometry::terrain::{Neighbourhood, Primitive};
 #[cfg(target_arch = "x86_64")]
-use friction_contact::scalar::{Eights, Fours};
-use friction_contact::scalar::{Instructions, Lane, LaneMask, MAX_LANES, Single, inlined};
+use friction_contact::scalar::{Eights, Fours, inlined};
+use friction_contact::scalar::{Instructions, Lane, LaneMask, Single};
 
 /// How deep a wheel may be in the ground, in bounding radii, so that faces as far beside it are all
 /// that matter.
@@ -80,13 +80,12 @@ impl Tube {
     /// points below the wheel's centre, m.
     #[inline(always)]
     fn meets<T: Lane>(&self, [x, z]: [T; 2], drop: T) -> T::Mask {
-        let number = |value: f64| x.like(value);
-        let place = |[a, b]: [f64; 2]| x * number(a) + z * number(b);
-        let zero = number(0.0);
-        let aside = (place(self.across).abs() - number(self.halves[0])).max(zero);
-        let down = number(self.cosine) * drop + place(self.rise) - number(self.halves[1]);
-        let down = down.max(zero);
-        (aside * aside + down * down).le(number(self.square))
+        let zero = x.like(0.0);
+        let ([a, b], [c, d], [span, tilt]) = (self.across, self.rise, self.halves);
+        let aside = (x * x.like(a) + z * x.like(b)).abs() - x.like(span);
+        let down = drop * x.like(self.cosine) + x * x.like(c) + z * x.like(d) - x.like(tilt);
+        let (aside, down) = (aside.max(zero), down.max(zero));
+        (aside * aside + down * down).le(x.like(self.square))
     }
 }
 
@@ -150,7 +149,7 @@ impl HeightField {
             n: 0,
             cells: [([0; 2], 0); MOST_CELLS],
         };
-        if self.search(wheel, &region, &mut found) {
+        if self.search_strip(wheel, &region, &mut found) {
             for (cell, kinds) in &found.cells[..found.n] {
                 self.visit_kinds(*cell, *kinds, visit);
             }
@@ -160,25 +159,7 @@ impl HeightField {
     }
 
     /// Searches the strip along the wheel. Whether it suffices.
-    fn search(&self, wheel: &SweptWheel<'_>, region: &Region, found: &mut Found) -> bool {
-        match Instructions::of_this_machine() {
-            Instructions::Baseline => {
-                self.search_strip::<f64>(Single::Baseline, wheel, region, found)
-            }
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2(token) => self.search_strip::<Fours>(token, wheel, region, found),
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512(token) => self.search_strip::<Eights>(token, wheel, region, found),
-        }
-    }
-
-    fn search_strip<T: Lane>(
-        &self,
-        token: T::Token,
-        wheel: &SweptWheel<'_>,
-        region: &Region,
-        found: &mut Found,
-    ) -> bool {
+    fn search_strip(&self, wheel: &SweptWheel<'_>, region: &Region, found: &mut Found) -> bool {
         let (c, axle, radius) = (&wheel.part.centre, &wheel.disc.axle, region.radius);
         let [dx, dz] = self.spacing;
         // Half the width of what the wheel crosses, by the cells' middles along the axle, for all
@@ -193,33 +174,24 @@ impl HeightField {
         let per_column = axle.x * dx;
         let tube = Tube::about(wheel, self.spacing);
         let (mut cells, mut has_room, mut may_be_deep) = (Cells::new(), true, false);
-        inlined!(T::vectorize, token, {
-            for j in region.rows[0]..=region.rows[1] {
-                let z = self.origin[1] + (j as f64 + 0.5) * dz - c.z;
-                let range = across(region.columns, middle, [per_column, axle.z * z], wide);
-                let Some(range) = range else {
-                    continue;
-                };
-                self.visit_row::<T>(
-                    token,
-                    (j, range),
-                    region,
-                    (c, tube.as_ref()),
-                    |i, square| {
-                        let beside = per_column * (i as f64 - middle) + axle.z * z;
-                        may_be_deep |= square <= smaller
-                            && beside.abs() <= crossed
-                            && !self.is_under([i, j], wheel, depth);
-                        cells.add(self, [i, j], c);
-                        if cells.n == CELLS {
-                            has_room &=
-                                self.take::<T>(token, wheel, &mut cells, |cell| found.add(cell));
-                        }
-                    },
-                );
-            }
-            has_room &= self.take::<T>(token, wheel, &mut cells, |cell| found.add(cell));
-        });
+        for j in region.rows[0]..=region.rows[1] {
+            let z = self.origin[1] + (j as f64 + 0.5) * dz - c.z;
+            let range = across(region.columns, middle, [per_column, axle.z * z], wide);
+            let Some(range) = range else {
+                continue;
+            };
+            self.visit_row((j, range), region, (c, tube.as_ref()), |i, square| {
+                let beside = per_column * (i as f64 - middle) + axle.z * z;
+                may_be_deep |= square <= smaller
+                    && beside.abs() <= crossed
+                    && !self.is_under([i, j], wheel, depth);
+                cells.add(self, [i, j], c);
+                if cells.n == CELLS {
+                    has_room &= self.take(wheel, &mut cells, |cell| found.add(cell));
+                }
+            });
+        }
+        has_room &= self.take(wheel, &mut cells, |cell| found.add(cell));
         has_room && !(may_be_deep && self.may_look_away(wheel, region))
     }
 
@@ -240,71 +212,62 @@ impl HeightField {
         region: &Region,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
-        let (c, token) = (&wheel.part.centre, Single::Baseline);
+        let c = &wheel.part.centre;
         let mut cells = Cells::new();
         let mut visit = |(cell, kinds): ([usize; 2], u32)| {
             self.visit_kinds(cell, kinds, visit);
             true
         };
         for j in region.rows[0]..=region.rows[1] {
-            self.visit_row::<f64>(token, (j, region.columns), region, (c, None), |i, _| {
+            self.visit_row((j, region.columns), region, (c, None), |i, _| {
                 cells.add(self, [i, j], c);
                 if cells.n == CELLS {
-                    self.take::<f64>(token, wheel, &mut cells, &mut visit);
+                    self.take(wheel, &mut cells, &mut visit);
                 }
             });
         }
-        self.take::<f64>(token, wheel, &mut cells, &mut visit);
+        self.take(wheel, &mut cells, &mut visit);
     }
 
     /// Visits the columns of a row's cells in a region and a tube, and the square of the distance
     /// of a place from all that is over the cell and at most as high as its highest point, m².
     #[inline(always)]
-    fn visit_row<T: Lane>(
+    fn visit_row(
         &self,
-        token: T::Token,
         (j, [begin, end]): (usize, [usize; 2]),
         region: &Region,
         (place, tube): (&Vector3<f64>, Option<&Tube>),
         mut visit: impl FnMut(usize, f64),
     ) {
         let [dx, dz] = self.spacing;
-        let number = |x: f64| T::splat(token, x);
-        let zero = number(0.0);
         let low = self.origin[1] + j as f64 * dz - place.z;
         let z = low.max(-low - dz).max(0.0);
-        let (rest, middle) = (
-            region.radius * region.radius - z * z,
-            number(low + 0.5 * dz),
-        );
-        if rest < 0.0 {
+        if z > region.radius {
             return;
         }
-        for i in (begin..=end).step_by(T::LANES) {
-            let n = (end + 1 - i).min(T::LANES);
+        for i in (begin..=end).step_by(CELLS) {
+            let n = (end + 1 - i).min(CELLS);
             let row = |j: usize| &self.heights[j * self.columns + i..][..n + 1];
             let (near, far) = (row(j), row(j + 1));
             // A cell without heights has no highest.
-            let (mut highest, mut lows) = ([f64::NAN; MAX_LANES], [0.0; MAX_LANES]);
+            let mut part = RowPart {
+                highest: [f64::NAN; CELLS],
+                lows: [0.0; CELLS],
+                squares: [z * z; CELLS],
+                middle: low + 0.5 * dz,
+                width: dx,
+                place_height: place.y,
+            };
             for k in 0..n {
                 let two = [near, far].map(|row| row[k].max(row[k + 1]));
-                highest[k] = f64::from(two[0].max(two[1]));
-                lows[k] = self.origin[0] + (i + k) as f64 * dx - place.x;
+                part.highest[k] = f64::from(two[0].max(two[1]));
+                part.lows[k] = self.origin[0] + (i + k) as f64 * dx - place.x;
             }
-            let highest = T::load(token, &highest[..T::LANES]);
-            let low = T::load(token, &lows[..T::LANES]);
-            let x = low.max(-low - number(dx)).max(zero);
-            let drop = (number(place.y) - highest).max(zero);
-            let square = x * x + drop * drop;
-            let mut near = number(region.floor).le(highest) & square.le(number(rest));
-            if let Some(tube) = tube {
-                near = near & tube.meets([low + number(0.5 * dx), middle], drop);
-            }
-            let mut bits = near.bits();
+            let mut bits = part.find(region, tube);
             while bits != 0 {
                 let k = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
-                visit(i + k, square.get(k) + z * z);
+                visit(i + k, part.squares[k]);
             }
         }
     }
@@ -325,15 +288,13 @@ impl HeightField {
 
     /// Empties `cells` and takes those with pieces that the wheel may touch, in order. Whether it
     /// took all of them.
-    #[inline(always)]
-    fn take<T: Lane>(
+    fn take(
         &self,
-        token: T::Token,
         wheel: &SweptWheel<'_>,
         cells: &mut Cells,
         mut take: impl FnMut(([usize; 2], u32)) -> bool,
     ) -> bool {
-        let near = self.compare::<T>(token, wheel, cells);
+        let near = self.compare(wheel, cells);
         let n = std::mem::take(&mut cells.n);
         let mut any = near.iter().fold(0, |any, near| any | near) & ((1 << n) - 1);
         let mut all = true;
@@ -355,21 +316,89 @@ impl HeightField {
     }
 
     /// Which pieces of cells a wheel may touch: for each kind a bit for each cell.
-    #[inline(always)]
-    fn compare<T: Lane>(
+    fn compare(&self, wheel: &SweptWheel<'_>, cells: &Cells) -> [u32; KINDS] {
+        match Instructions::of_this_machine() {
+            Instructions::Baseline => self.compare_with::<f64>(Single::Baseline, wheel, cells),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(token) => self.compare_with::<Fours>(token, wheel, cells),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(token) => self.compare_with::<Eights>(token, wheel, cells),
+        }
+    }
+
+    fn compare_with<T: Lane>(
         &self,
         token: T::Token,
         wheel: &SweptWheel<'_>,
         cells: &Cells,
     ) -> [u32; KINDS] {
-        let mut near = [0; KINDS];
-        for at in (0..cells.n).step_by(T::LANES) {
-            let own = wheel.compare::<T>(token, self.spacing, (cells, at));
-            for kind in 0..KINDS {
-                near[kind] |= own[kind].bits() << at;
+        inlined!(T::vectorize, token, {
+            let mut near = [0; KINDS];
+            let mut at = 0;
+            while at < cells.n {
+                let own = wheel.compare::<T>(token, self.spacing, (cells, at));
+                for kind in 0..KINDS {
+                    near[kind] |= own[kind].bits() << at;
+                }
+                at += T::LANES;
             }
+            near
+        })
+    }
+}
+
+/// Cells of a row beside each other.
+struct RowPart {
+    /// Highest point of each, m; no number where there is none.
+    highest: [f64; CELLS],
+    /// Where each begins along x, from a place, m.
+    lows: [f64; CELLS],
+    /// Square of the distance of the place from all that is over each cell and no higher than its
+    /// highest point, m²; along z alone, before they are found.
+    squares: [f64; CELLS],
+    /// Place of their middles along z, and their width, m.
+    middle: f64,
+    width: f64,
+    /// Height of the place, m.
+    place_height: f64,
+}
+
+impl RowPart {
+    /// Cells in a region about the place, and in a tube; finds their squares.
+    fn find(&mut self, region: &Region, tube: Option<&Tube>) -> u32 {
+        match Instructions::of_this_machine() {
+            Instructions::Baseline => self.find_with::<f64>(Single::Baseline, region, tube),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(token) => self.find_with::<Fours>(token, region, tube),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(token) => self.find_with::<Eights>(token, region, tube),
         }
-        near
+    }
+
+    fn find_with<T: Lane>(&mut self, token: T::Token, region: &Region, tube: Option<&Tube>) -> u32 {
+        inlined!(T::vectorize, token, {
+            let (zero, half) = (T::splat(token, 0.0), T::splat(token, 0.5));
+            let (width, middle) = (T::splat(token, self.width), T::splat(token, self.middle));
+            let height = T::splat(token, self.place_height);
+            let floor = T::splat(token, region.floor);
+            let most = T::splat(token, region.radius * region.radius);
+            let mut bits = 0;
+            for at in (0..CELLS).step_by(T::LANES) {
+                let own = at..at + T::LANES;
+                let highest = T::load(token, &self.highest[own.clone()]);
+                let low = T::load(token, &self.lows[own.clone()]);
+                let x = low.max(-low - width).max(zero);
+                let drop = (height - highest).max(zero);
+                let square = T::load(token, &self.squares[own.clone()]) + x * x + drop * drop;
+                let mut near = floor.le(highest) & square.le(most);
+                if let Some(tube) = tube {
+                    near = near & tube.meets([low + width * half, middle], drop);
+                }
+                square.store(&mut self.squares[own]);
+                bits |= near.bits() << at;
+            }
+            bits
+        })
     }
 }
 
