@@ -16,7 +16,6 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from reports import DOCS, table as table_of
-from validation.sand_transients import transients
 
 from rover_gym.ground.sand import (
     FittedSoil,
@@ -29,6 +28,7 @@ from rover_gym.ground.sand import (
     named_soil,
     read_runs,
 )
+from validation.sand_transients import transients
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -117,7 +117,7 @@ def errors(found: Array, curve: Curve) -> tuple[float, float, float]:
 def length(slip_sinkage: Array, travel: Array) -> str:
     """Travel to `MOST` of the slip sinkage at the end, mm; none where that is small."""
     if slip_sinkage[-1] < SHAPED:
-        return "–"
+        return "-"
     reached = int(np.argmax(slip_sinkage >= MOST * slip_sinkage[-1]))
     return f"{np.interp(MOST * slip_sinkage[-1], slip_sinkage[: reached + 1], travel[: reached + 1]):.0f}"
 
@@ -142,11 +142,11 @@ def transients(soil: Soil, runs: Sequence[Runs], wheels: dict[str, SingleWheel],
         return [wheel, name, *(f"{mm:.1f}" for mm in (*by_rim, *np.sqrt(np.nanmean(own**2, axis=(0, 1)))))]
 
     lines = []
-    for wheel in wheels:
-        angles = sorted({curve.degrees for curve in curves if curve.wheel == wheel})
-        lines += [row(wheel, f"{angle}°", [angle]) for angle in angles]
-        lines.append(row(wheel, "below 90°", [angle for angle in angles if angle < 90]))
+    for name in wheels:
+        angles = sorted({curve.degrees for curve in curves if curve.wheel == name})
+        lines += [row(name, f"{angle}°", [angle]) for angle in angles]
+        lines.append(row(name, "below 90°", [angle for angle in angles if angle < 90]))
     speeds = [f"{rim} mm/s" for rim in rims]
     heads = ["wheel", "slip angle", *speeds, "all", "ends as measured", "spread of trials"]
-    ways = [[wheel, *(lengths[wheel, rim] for rim in rims)] for wheel in wheels]
+    ways = [[name, *(lengths[name, rim] for rim in rims)] for name in wheels]
     return [table_of(heads, lines), table_of(["wheel", *speeds], ways)]
