@@ -1,6 +1,6 @@
-//! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore|jump] [batch]` prints microseconds
-//! a step of a rover alone and of each of 8 in a batch on one thread. With a scene it steps that
-//! alone, one rover or the batch, for counting instructions:
+//! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore|jump] [batch]` prints
+//! microseconds a step of a rover alone and of each of 8 in a batch on one thread. With a scene it
+//! steps that alone, one rover or the batch, for counting instructions:
 //! `valgrind --tool=callgrind --toggle-collect='*counted*'`. The scenes `derivatives` and
 //! `derivatives-on-firm-ground` take steps of a drive with their derivatives.
 //!
