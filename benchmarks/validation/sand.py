@@ -1,7 +1,7 @@
 """Sand beside measurements: `python -m validation.sand --data FOLDER` writes tables and a figure.
 
-The folder has `wheel_on_sand.csv` and `single_wheels.csv`, which are not in the repository; `docs/sand.md` says where
-the public data are. Without a folder the command says so and ends.
+The folder has `wheel_on_sand.csv`, `sinkage_transients.csv` and `single_wheels.csv`, which are not in the repository;
+`docs/sand.md` says where the public data are. Without a folder the command says so and ends.
 """
 
 import argparse
@@ -28,6 +28,7 @@ from rover_gym.ground.sand import (
     named_soil,
     read_runs,
 )
+from validation.sand_transients import transients
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -47,6 +48,12 @@ MGRU3_MASS = 17.5
 
 #: Heads of columns of errors.
 QUANTITIES = ("pull, N", "across, N", "sinkage, mm")
+
+#: Titles of the tables of slip sinkage over the travel.
+OVER_TRAVEL = (
+    "Errors of the slip sinkage, by rim speed, over 400 mm of travel at 10 mm/s, root mean squares, mm",
+    "Travel to 63% of the slip sinkage at 400 mm, slip angle 0°, measured / predicted, mm",
+)
 
 SIDEWAYS = math.radians(89.0)
 
@@ -197,6 +204,7 @@ def main() -> None:
         "Fitted numbers": fitted(fit),
         "Errors of the soil `cmu-sand`, root mean squares": table(start, runs),
         "Errors of predictions, root mean squares": predictions(start, runs),
+        **dict(zip(OVER_TRAVEL, transients(start, runs, WHEELS, Path(data) / "sinkage_transients.csv"), strict=True)),
         "MGRU3 wheel on GRC-1, nothing fitted": mgru3(),
         "Other wheels, nothing fitted": single_wheels(Path(data) / "single_wheels.csv"),
     }

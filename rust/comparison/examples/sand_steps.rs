@@ -1,11 +1,12 @@
-//! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore] [batch]` prints microseconds
-//! a step of a rover alone and of each of 8 in a batch on one thread. With a scene it steps that
-//! alone, one rover or the batch, for counting instructions:
+//! What a step in sand costs: `sand_steps [STEPS] [rest|drive|explore|jump] [batch]` prints
+//! microseconds a step of a rover alone and of each of 8 in a batch on one thread. With a scene it
+//! steps that alone, one rover or the batch, for counting instructions:
 //! `valgrind --tool=callgrind --toggle-collect='*counted*'`. The scenes `derivatives` and
 //! `derivatives-on-firm-ground` take steps of a drive with their derivatives.
 //!
 //! The rover is `open-rover` on wheels 0.08 m wide with grousers, in dry sand, at 5 ms: parked,
-//! driven by a constant torque, or by torques and steering that change every ten steps.
+//! driven by a constant torque, or by torques and steering that change every ten steps: moderate
+//! ones, or ones that spin the wheels (`jump`).
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
 
@@ -32,8 +33,10 @@ const ROVERS: usize = 8;
 /// Rounds of a measurement; the fastest counts.
 const ROUNDS: usize = 3;
 
-/// Largest torque, N m, and steering angle, rad, of a policy that explores.
+/// Largest torque, N m, of a policy that explores and of one that spins the wheels, and steering
+/// angle, rad.
 const TORQUE: f64 = 2.0;
+const SPINNING: f64 = 8.0;
 const STEERING: f64 = 0.5;
 
 /// Between −1 and 1, spread evenly.
@@ -53,10 +56,13 @@ fn command(model: &Model, scene: &str, k: usize) -> ([f64; 6], [f64; 6]) {
     match scene {
         "rest" => ([0.0; 6], [0.0; 6]),
         "drive" => ([1.0; 6], [0.0; 6]),
-        _ => (
-            std::array::from_fn(|i| at(i, TORQUE)),
-            std::array::from_fn(steering),
-        ),
+        _ => {
+            let torque = if scene == "jump" { SPINNING } else { TORQUE };
+            (
+                std::array::from_fn(|i| at(i, torque)),
+                std::array::from_fn(steering),
+            )
+        }
     }
 }
 
@@ -146,7 +152,7 @@ fn main() {
         "{:<8} {:>10} {:>10}  us a step {:>10} {:>14}",
         "scene", "alone", "in batch", "repeated", "status"
     );
-    for scene in ["rest", "drive", "explore"] {
+    for scene in ["rest", "drive", "explore", "jump"] {
         let (mut alone, mut batch) = (f64::INFINITY, f64::INFINITY);
         let mut report = StepReport::default();
         for _ in 0..ROUNDS {

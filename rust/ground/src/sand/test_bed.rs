@@ -227,6 +227,9 @@ impl TestBed {
     }
 
     /// A step of h (s) of a wheel that sinks with a mass, kg. Returns what is measured at its end.
+    ///
+    /// Newton's method finds the rate at the end of the step, and bisection where that leaves the
+    /// bracket.
     pub fn advance(
         &self,
         state: &mut Sunk,
@@ -239,7 +242,8 @@ impl TestBed {
         let times = (h, self.soil.memory);
         let mut rate = state.rate;
         let mut found = (state.memory, state.sinkage, Vector6::zeros());
-        for _ in 0..MOST_NEWTON {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for k in 0..MOST_ITERATIONS {
             twist.linear.y = -rate;
             let recalled = state.memory.after(&twist, radius, times);
             let sinkage = state.sinkage + h * rate;
@@ -250,9 +254,23 @@ impl TestBed {
             let force = self.force(sinkage, &recalled.memory, drive, want);
             found = (recalled.memory, sinkage, force.wrench);
             let residual = mass * (rate - state.rate) - h * (drive.load - force.wrench[1]);
-            let change = residual / (mass - h * force.slope[(1, 1)].min(0.0));
-            rate -= change;
-            if change.abs() < 1e-12 + 1e-9 * rate.abs() {
+            if residual < 0.0 {
+                low = rate;
+            } else {
+                high = rate;
+            }
+            // The force may change along a step by several times what its slope says.
+            let newton = rate - residual / (mass - h * force.slope[(1, 1)].min(0.0));
+            let is_near = low < newton && newton < high && k < MOST_NEWTON;
+            let middle = 0.5 * (low + high);
+            let next = if is_near || !middle.is_finite() {
+                newton
+            } else {
+                middle
+            };
+            let moved = (next - rate).abs();
+            rate = next;
+            if moved < 1e-12 + 1e-9 * rate.abs() {
                 break;
             }
         }
@@ -265,5 +283,6 @@ impl TestBed {
     }
 }
 
-/// Most Newton iterations of a step.
-const MOST_NEWTON: usize = 30;
+/// Most iterations of a step. After the first ones its bracket is halved.
+const MOST_ITERATIONS: usize = 60;
+const MOST_NEWTON: usize = 16;
