@@ -128,7 +128,7 @@ impl ContactSystem {
                 Some((_, sign, row)) => {
                     VelocityPath::of(mechanism, contact.body).write_joint(row, sign, motion.v, rows)
                 }
-                None => write_rows(motion, contact, rows),
+                None => write_rows(model, motion, contact, rows),
             };
             factor.half_solve_path(mechanism, contact.body, rows);
             u

@@ -37,13 +37,18 @@ pub(crate) fn relative_velocity(motion: &impl BodyMotion, contact: &Contact) -> 
 
 /// Rows of Hᵀ of a contact without another body, along the path of its own, and `Hᵀ v`.
 pub(super) fn write_rows(
+    model: &Model,
     motion: &Still<'_>,
     contact: &Contact,
     rows: &mut [Triple<f64>],
 ) -> Triple<f64> {
     let place = place_at(motion, contact, contact.body);
     let path = VelocityPath::of(motion.mechanism, contact.body);
-    path.write(|m| motion.motion(m), &place, motion.v, rows)
+    let mut u = path.write(|m| motion.motion(m), &place, motion.v, rows);
+    if contact.part.has_rigid_ends(model) {
+        path.level(motion.v, rows, &mut u);
+    }
+    u
 }
 
 /// Calls `act` with each velocity that moves a contact and its entries of the rows of Hᵀ. One that

@@ -123,6 +123,12 @@ impl Part {
         }
     }
 
+    /// Whether the part is a wheel that may touch with the two ends of a rigid tread.
+    #[inline]
+    pub(crate) fn has_rigid_ends(self, model: &Model) -> bool {
+        matches!(self, Self::Wheel(i) if model.wheels()[i].has_rigid_ends())
+    }
+
     /// Tread of a wheel that yields, and the wheel as [`Mechanism::travel`] takes it; `None` if the
     /// part is rigid.
     ///

@@ -282,6 +282,12 @@ impl WheelDisc {
         self.half > 0.0 || self.rounding > 0.0
     }
 
+    /// Whether it may touch with the two ends of a rigid tread.
+    #[must_use]
+    pub fn has_rigid_ends(&self) -> bool {
+        self.half > 0.0 && self.tread.is_none()
+    }
+
     /// Radius of a bounding ball about its centre.
     #[must_use]
     pub fn bound(&self) -> f64 {

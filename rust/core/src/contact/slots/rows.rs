@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::clusters::WidePatterns;
 use super::contacts::{ContactSlots, Slot};
 use super::joint_slots::JointRow;
-use super::machine::SharedMachine;
+use super::machine::{SharedMachine, WheelDisc};
 use crate::contact::body_motion::Still;
 use crate::contact::jacobian::{add_impulse, for_each_row};
 use crate::contact::loops::{Loops, ROUNDED, ROUNDED_SQUARE};
@@ -248,6 +248,9 @@ impl<T: Lane> ContactMatrices<T> {
             if self.bodies[part].is_some() {
                 let place = place_of(contacts.slot(slot));
                 *u = path.write(|m| end.motions[m], &place, v, rows);
+                if (machine.wheels.get(part)).is_some_and(WheelDisc::has_rigid_ends) {
+                    path.level(v, rows, u);
+                }
             } else {
                 let zero = [T::splat(self.token, 0.0); 3];
                 rows.fill(zero);

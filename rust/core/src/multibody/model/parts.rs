@@ -81,6 +81,13 @@ impl Wheel {
         self.width > 0.0
     }
 
+    /// Whether the wheel may touch with the two ends of a rigid tread.
+    #[inline]
+    #[must_use]
+    pub(crate) fn has_rigid_ends(&self) -> bool {
+        0.5 * self.width > self.rounding && self.tread.is_none()
+    }
+
     /// Radius of a bounding ball about the centre, m.
     #[inline]
     #[must_use]

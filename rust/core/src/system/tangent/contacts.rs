@@ -8,7 +8,7 @@ use super::held_tree::HeldContact;
 use crate::contact::contact_slope::SlopeOfBody;
 use crate::contact::jacobian::sides;
 use crate::contact::limit;
-use crate::contact::rows::{Place, Triple, add_scaled};
+use crate::contact::rows::{Place, Triple, add_scaled, levelled};
 use crate::contact::{Contact, Part};
 use crate::law::compliance::Compliance;
 use crate::multibody::{LaneConfiguration, Model, Poses};
@@ -95,6 +95,11 @@ impl<T: Lane> HeldSystem<'_, T> {
                     #[inline(always)]
                     |k, row| rows.push((k, [sign * row[0], sign * row[1], sign * row[2]])),
                 );
+                if contact.other.is_none() && contact.part.has_rigid_ends(model) {
+                    for (_, row) in rows.iter_mut().skip(starts[i] + path.lead()) {
+                        row[0] = levelled(row[0]);
+                    }
+                }
             }
         }
         starts.push(rows.len());
