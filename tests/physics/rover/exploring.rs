@@ -137,16 +137,16 @@ fn cylinders_that_yield_need_few_systems_among_rocks_and_never_the_general_step(
     );
 }
 
-/// The story: the twelve ends of six rigid treads drift apart by rounding, 1e-12 m in some 500 steps.
+/// The story: the ends of six rigid treads drift apart by rounding, 1e-12 m in some 500 steps.
 /// A steering axis that is tilted by as much lifts one end of a tread, and the solver searched for
-/// the ends that bear the load: up to 300 systems a step, and the general code for two of three.
+/// the ends that bear the load. Here it took 37 systems a step, and after more drift 300.
 #[test]
 fn rigid_cylinders_whose_axles_tilt_by_rounding_need_few_systems() {
     let mut drive = first_drive(Scene::of("plane, rigid cylinders").unwrap(), 60.0);
     let simulation = &mut drive.simulation;
     let mut q = coordinates::to_public(simulation.model(), simulation.q());
-    for (k, angle) in q[3..].iter_mut().enumerate() {
-        *angle += 1e-9 * (k as f64).sin();
+    for (k, angle) in q.iter_mut().enumerate().skip(3) {
+        *angle += 1e-12 * (k as f64).sin();
     }
     let tilted = coordinates::from_public(simulation.model(), &q).unwrap();
     simulation.set_state(tilted, vec![0.0; q.len()]);

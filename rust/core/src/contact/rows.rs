@@ -17,11 +17,11 @@ pub(crate) use crate::solver::batch::problem::Triple;
 /// Rate, m/rad, up to which a joint does not move the ends of a rigid wheel's tread along the
 /// normal.
 ///
-/// A steering axis that is normal to the ground but for rounding tells the two ends of a tread apart
-/// by as little, and the solver would search for the end that bears the load. On a plane any value
-/// from 1e-9 to 1e-5 serves; among rocks the axes are tilted, and 1e-7, 1e-6, 1e-5 and 1e-4 leave
-/// 34, 28, 17 and 16 systems a step of 56. A tilt of 1e-4 lifts an end by 1e-5 m in a quarter turn
-/// of the wheel (decision 25).
+/// A steering axis that is normal to the ground but for rounding tells the two ends of a tread
+/// apart by as little, and the solver would search for the end that bears the load. On a plane any
+/// value from 1e-9 to 1e-5 serves; among rocks the axes are tilted, and 1e-7, 1e-6, 1e-5 and 1e-4
+/// leave 34, 28, 16 and 16 systems a step of 56. A tilt of 1e-4 rad lifts an end by 1e-5 m while
+/// its wheel steers by a radian.
 const LEVEL: f64 = 1e-5;
 
 /// A joint's entry of the normal row of an end of a rigid wheel's tread: 0 up to [`LEVEL`].
