@@ -130,7 +130,7 @@ fn cylinders_that_yield_need_few_systems_among_rocks_and_never_the_general_step(
             steps += 1;
         }
     }
-    // Rigid cylinders take some 130.
+    // Rigid cylinders take some 16.
     assert!(
         iterations < 9 * steps,
         "{iterations} systems in {steps} steps"
