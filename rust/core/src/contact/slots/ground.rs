@@ -112,7 +112,7 @@ pub struct BlockGround<T: Lane> {
     /// all else that there is.
     surfaces: Vec<Option<Arc<dyn Terrain>>>,
     has_surfaces: bool,
-    /// Those of them that are firm.
+    /// Terrains of the lanes whose ground has a surface and is firm, likewise.
     under_wheels: Vec<Option<Arc<dyn Terrain>>>,
     /// Rovers on soft ground, whose wheels meet spheres alone.
     soft: T::Mask,
