@@ -282,7 +282,7 @@ impl WheelDisc {
         self.half > 0.0 || self.rounding > 0.0
     }
 
-    /// Whether it may touch with the two ends of a rigid tread.
+    /// Whether the wheel may touch with the two ends of a rigid tread.
     #[must_use]
     pub fn has_rigid_ends(&self) -> bool {
         self.half > 0.0 && self.tread.is_none()
