@@ -247,7 +247,7 @@ impl HeightField {
         }
         for i in (begin..=end).step_by(CELLS) {
             let n = (end + 1 - i).min(CELLS);
-            let row = |j: usize| &self.heights[j * self.columns + i..][..n + 1];
+            let row = |j: usize| &self.heights[j * self.columns + i..][..=n];
             let (near, far) = (row(j), row(j + 1));
             // A cell without heights has no highest.
             let mut part = RowPart {

@@ -218,7 +218,7 @@ impl SweptWheel<'_> {
         if self.rounding > 0.0 {
             let length = planes.squares[half].sqrt();
             let rounding = like.like(self.rounding);
-            low = low - planes.normals[half] * (rounding / length);
+            low -= planes.normals[half] * (rounding / length);
             gap -= rounding * length;
         }
         // At least the gap.
