@@ -109,9 +109,8 @@ def _scored(
     }
     result = BenchmarkResult(policy_name(policy), key, provenance(), _kept(path, key))
     with _shown(result.policy) as show:
-        return score(
-            result, path, partial(named_driver, policy), interface, names=sets, episodes=episodes, progress=show
-        )
+        score(result, path, partial(named_driver, policy), interface, names=sets, episodes=episodes, progress=show)
+    return BenchmarkResult.read(path)  # as the file rounds them
 
 
 def _kept(path: Path, key: Mapping[str, Any]) -> dict[str, Any]:
